@@ -84,14 +84,14 @@ def test_categories_count_points_among_the_obstacles_and_keep_their_maximum() ->
     categories[heights > 0.1] = 2
     categories[np.abs(heights) < 0.05] = 0
     bev.integrate(view, categories)
-    table = bev.category(2)
+    table = bev.core.category(2)
     assert table.max() == 1.0
     assert ((table > 0) <= bev.obstacles).all()
     # Floor is below the obstacles: it counts for no category.
-    assert not bev.category(0).any()
-    assert not bev.category(1).any()
+    assert not bev.core.category(0).any()
+    assert not bev.core.category(1).any()
     bev.integrate(view)
-    assert np.array_equal(bev.category(2), table)
+    assert np.array_equal(bev.core.category(2), table)
 
 
 def test_the_cells_of_a_mask_are_where_its_pixels_lie() -> None:

@@ -141,7 +141,7 @@ def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
     # Three cells across, then five, then four cells deep: and it is stuck.
     assert widths == [(2, 3), (2, 5), (4, 5)]
     assert planner.is_stuck
-    assert planner.counters.collisions == 3
+    assert planner.counters["collisions"] == 3
     # What it has bumped into is walked around from now on.
     ahead_m = (0.0, 3.0)
     step = planner.step(pose, np.array([bev.cell_of(ahead_m)], np.int32), "confirmed")
@@ -259,7 +259,7 @@ def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has
     assert planner.distance_m(pose, goal) is None
     step = planner.step(pose, goal, "confirmed")
     assert (step.goal, step.distance_m, step.short_term_m is None) == ("confirmed", None, False)
-    assert planner.counters.unreachable == 1
+    assert planner.counters["unreachable"] == 1
     # Where it cannot get any nearer, it turns back to where it has been, and comes again from there.
     planned = bev.core = AsNearAsItGets(bev.core)
     back = planner.step(pose, goal, "temporary")

@@ -33,8 +33,8 @@ def test_the_mix_is_the_published_generators() -> None:
 def test_by_number_of_rooms_where_a_plan_is_unknown() -> None:
     """Two and four rooms are 4 and 5 of 18: weights 4/9 and 5/9 over three and one task."""
     found = reweight("procthor-10k", [2, 2, 2, 4, 1], [None] * 5)
-    assert found.by == "number of rooms"
-    assert found.covered_share == pytest.approx(9 / 18)
+    assert found.record.by == "number of rooms"
+    assert found.record.covered_share == pytest.approx(9 / 18)
     assert found.weights == pytest.approx([4 / 9 / 3 * 4] * 3 + [5 / 9 * 4, 0])
     assert found.weights[:4].mean() == pytest.approx(1)
     assert found.task_strata[4] == -1
@@ -43,12 +43,12 @@ def test_by_number_of_rooms_where_a_plan_is_unknown() -> None:
 def test_by_plan_where_all_are_known_and_there() -> None:
     plans = ["bedroom-bathroom", "bedroom-bathroom", "kitchen-living-room", "4-room"]
     found = reweight("procthor-10k", [2, 2, 2, 4], plans)
-    assert found.by == "room plan"
+    assert found.record.by == "room plan"
     assert found.weights == pytest.approx(np.array([1, 1, 2, 5]) / 9 * 4)
     # Without the other plan of two rooms its part would be lost: then two rooms stand for two rooms.
-    assert reweight("procthor-10k", [2, 2, 4], [plans[0], plans[1], plans[3]]).by == "number of rooms"
+    assert reweight("procthor-10k", [2, 2, 4], [plans[0], plans[1], plans[3]]).record.by == "number of rooms"
     # A plan whose name does not fit its rooms is none.
-    assert reweight("procthor-10k", [2, 2, 3, 4], plans).by == "number of rooms"
+    assert reweight("procthor-10k", [2, 2, 3, 4], plans).record.by == "number of rooms"
 
 
 def test_the_mix_itself_is_left_as_it_is() -> None:
@@ -58,7 +58,7 @@ def test_the_mix_itself_is_left_as_it_is() -> None:
         plans += [plan] * weight
     found = reweight("procthor-10k", rooms, plans)
     assert found.weights == pytest.approx(np.ones(18))
-    assert found.covered_share == pytest.approx(1)
+    assert found.record.covered_share == pytest.approx(1)
 
 
 def test_unknown_mixes_and_houses_of_none_are_refused() -> None:

@@ -11,7 +11,7 @@ import pytest
 from evonav.errors import PerceptionError
 from evonav.perception.models import libraries, open_clip_models, torchvision_models, transformers_models
 from evonav.perception.models.prompted import Boxes
-from evonav.perception.stacks import _COCO
+from evonav.perception.predicted import _COCO
 from evonav.perception.vocabulary import DINO_UNIGOAL
 
 pytest.importorskip("torch", reason="needs PyTorch: make test-models")

@@ -9,8 +9,7 @@ import pytest
 from evonav.errors import PerceptionError
 from evonav.perception import StageScene
 from evonav.perception.models import libraries, open_clip_models, ultralytics_models
-from evonav.perception.predicted import StackPerception
-from evonav.perception.stacks import StackConfig, facts_of
+from evonav.perception.predicted import StackConfig, StackPerception, facts_of
 from evonav.tasks.public import StageInput
 from evonav.world.embedded import EmbeddedSimulator
 

@@ -20,9 +20,17 @@ from evonav.house import bundled_houses
 from evonav.perception.detector import Found, nothing_found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
-from evonav.perception.predicted import StackPerception, predicted_perception
+from evonav.perception.predicted import (
+    EVERYTHING,
+    JointDetector,
+    StackConfig,
+    StackPerception,
+    SwappedColours,
+    predicted_perception,
+    stack_of,
+    weights_of,
+)
 from evonav.perception.shorthand import read_word
-from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, SwappedColours, stack_of, weights_of
 from evonav.perception.vocabulary import (
     COCO_UNIGOAL,
     DINO_UNIGOAL,

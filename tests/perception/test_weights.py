@@ -15,8 +15,7 @@ import pytest
 from evonav.errors import InvalidArgumentError, PerceptionError
 from evonav.perception import weights
 from evonav.perception.models import libraries
-from evonav.perception.predicted import predicted_perception
-from evonav.perception.stacks import STACKS, StackConfig, modules_of, weights_of
+from evonav.perception.predicted import STACKS, StackConfig, modules_of, predicted_perception, weights_of
 from evonav.perception.weights import CATALOGUE, LOCK_NAME, WeightFile, Weights, fingerprint, known, located
 
 SAM = known("mobile_sam.pt")

@@ -1,17 +1,279 @@
-"""Perceive with a stack of models, named on the command line and loaded once in each process."""
+"""Perceive with a stack of models, named on the command line and loaded once in each process.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+A stack is put together from models, filters and the words that they look for.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.detector_perception import DetectorPerception
+from evonav.perception.filters import FilterConfig, filtered, joined
+from evonav.perception.models import libraries
+from evonav.perception.models.prompted import PromptedDetector
+from evonav.perception.models.torchvision_models import MaskRcnn
 from evonav.perception.perception import Percept, Perception, StageScene
-from evonav.perception.stacks import STACKS, StackConfig, StackName, facts_of, load_stack, stack_of
+from evonav.perception.vocabulary import COCO_UNIGOAL, DINO_UNIGOAL, VOCABULARIES
+from evonav.perception.weights import Weights, check_folder, fingerprint, known, located, models_folder
 from evonav.world.simulator import Frame
+
+StackName = Literal["3d-mem", "unigoal", "transformers"]
+STACKS: tuple[StackName, ...] = get_args(StackName)
+
+EVERYTHING = FilterConfig(
+    background=(),
+    min_area_fraction=0.0,
+    min_confidence=0.0,
+    max_mask_iou=1.0,
+    min_centre_distance_px=0.0,
+    min_area_px=0.0,
+    max_box_fraction=1.0,
+    min_share_of_inner=1.0,
+)
+"""Filters that drop empty masks alone."""
+UNIGOAL_GRAPH = replace(EVERYTHING, reference_px=(480, 640), min_area_px=25.0, max_box_fraction=0.5)
+"""UniGoal's, of its scene graph; it looks at 640x480."""
+_SAME_IOU = 0.5
+"""UniGoal's two detectors: masks that overlap by more are one object, and the map's detector names it."""
+_MIN_MASK_SCORE = 0.95
+"""UniGoal's, of SAM's masks."""
+_COCO = {{"plant": "potted plant"}.get(word, word): word for word in COCO_UNIGOAL}
+"""UniGoal's word by COCO's category."""
+
+
+@dataclass(frozen=True, slots=True)
+class StackConfig:
+    """Options of the stacks; each takes those that it has models for, and `None` is the published value."""
+
+    vocabulary: str | None = None
+    """`procthor` (default), `scannet200`, or words with semicolons between them; unigoal has its own."""
+    min_confidence: float | None = None
+    """Least confidence of detections; 3d-mem 0.4, transformers 0.3, unigoal 0.5 (Mask R-CNN), 0.3 (Grounding DINO)."""
+    detector: str | None = None
+    """Weights of the detector: 3d-mem yolov8x-world.pt, transformers google/owlv2-base-patch16-ensemble."""
+    sam: str | None = None
+    """Weights of SAM: 3d-mem sam_l.pt, transformers facebook/sam-vit-large, unigoal facebook/sam-vit-huge."""
+    min_mask_score: float | None = None
+    """Least score of SAM's masks; unigoal 0.95, the others accept all."""
+    swapped_colours: bool = False
+    """3d-mem: show detector and SAM red as blue and blue as red, as 3D-Mem's released code does."""
+
+    def __post_init__(self) -> None:
+        """Refuses what makes no sense.
+
+        Raises:
+            InvalidArgumentError: An option is outside its domain; the message names it.
+        """
+        for name in ("min_confidence", "min_mask_score"):
+            value = getattr(self, name)
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if value is not None and not (is_number and 0.0 <= value <= 1.0):
+                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected 0..1")
+        if not isinstance(self.swapped_colours, bool):
+            raise InvalidArgumentError(
+                f"predicted perception: swapped_colours is {self.swapped_colours!r}, expected true or false"
+            )
+        for name in ("vocabulary", "detector", "sam"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, str) and value.strip()):
+                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected words")
+
+    @classmethod
+    def from_options(cls, options: Mapping[str, Any]) -> "StackConfig":
+        """Options as people write them.
+
+        Raises:
+            InvalidArgumentError: There is no such option, or it is outside its domain.
+        """
+        names = [field.name for field in fields(cls)]
+        for name in options:
+            if name not in names:
+                raise InvalidArgumentError(f"predicted perception has no option {name!r}; there are {', '.join(names)}")
+        return cls(**options)
+
+    @property
+    def phrases(self) -> tuple[str, ...]:
+        """Words that an open-vocabulary detector looks for."""
+        name = self.vocabulary or "procthor"
+        for known_name, phrases in VOCABULARIES.items():
+            if name == known_name:
+                return phrases
+        phrases = tuple(dict.fromkeys(word.strip().lower() for word in name.split(";") if word.strip()))
+        if not phrases or (len(phrases) == 1 and name in (*STACKS, "coco", "scannet")):
+            raise InvalidArgumentError(
+                f"predicted perception: no vocabulary {name!r}; there are {', '.join(VOCABULARIES)}, or words with "
+                "semicolons between them"
+            )
+        return phrases
+
+
+@dataclass(frozen=True, slots=True)
+class JointDetector:
+    """UniGoal's two detectors as one: Mask R-CNN for its map, Grounded-SAM for its scene graph."""
+
+    network: MaskRcnn
+    min_confidence: float
+    grounded: Detector
+    graph_filters: FilterConfig = UNIGOAL_GRAPH
+
+    def detect(self, views: Sequence[DetectorView]) -> list[Found]:
+        """Join the detections of both; of a thing that both found, take the map's word, which every table knows."""
+        firsts = self.network.detect([view.rgb for view in views], _COCO, self.min_confidence)
+        seconds = self.grounded.detect(views)
+        return [
+            joined(filtered(first, EVERYTHING), filtered(second, self.graph_filters), _SAME_IOU)
+            for first, second in zip(firsts, seconds, strict=True)
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class SwappedColours:
+    """A detector that is shown red as blue and blue as red."""
+
+    detector: Detector
+
+    def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
+        """Detect objects in the swapped colours."""
+        return self.detector.detect([replace(view, rgb=view.rgb[..., ::-1]) for view in views])
+
+
+def stack_of(agent: str) -> StackName:
+    """Return the stack that `auto` means for an agent."""
+    return "unigoal" if agent.startswith("unigoal") else "3d-mem"
+
+
+def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
+    """Return the weights that a stack loads, by part.
+
+    Raises:
+        PerceptionError: An option names weights that are not known.
+        InvalidArgumentError: An option is none of this stack's.
+    """
+    defaults: dict[StackName, dict[str, str]] = {
+        "3d-mem": {
+            "detector": "yolov8x-world.pt",
+            "text": "timm/vit_base_patch32_clip_224.openai",
+            "sam": "sam_l.pt",
+            "clip": "laion/CLIP-ViT-B-32-laion2B-s34B-b79K",
+        },
+        "unigoal": {
+            "network": "maskrcnn_resnet50_fpn_coco-bf2d0c1e.pth",
+            "detector": "IDEA-Research/grounding-dino-tiny",
+            "sam": "facebook/sam-vit-huge",
+        },
+        "transformers": {
+            "detector": "google/owlv2-base-patch16-ensemble",
+            "sam": "facebook/sam-vit-large",
+            "clip": "laion/CLIP-ViT-B-32-laion2B-s34B-b79K for transformers",
+        },
+    }
+    if stack == "unigoal" and config.vocabulary is not None:
+        raise InvalidArgumentError("predicted:unigoal has words of its own; leave vocabulary out")
+    if stack != "3d-mem" and config.swapped_colours:
+        raise InvalidArgumentError(f"predicted:{stack}: swapped_colours is of 3d-mem")
+    names = {**defaults[stack], **({"detector": config.detector} if config.detector else {})}
+    names |= {"sam": config.sam} if config.sam else {}
+    for part, name in names.items():
+        if ("/" in name) != ("/" in defaults[stack][part]):
+            library = "ultralytics" if stack == "3d-mem" else "transformers"
+            raise InvalidArgumentError(f"predicted:{stack}: {part} is {name!r}, expected weights of {library}")
+    return {part: known(name) for part, name in names.items()}
+
+
+def modules_of(stack: StackName) -> tuple[str, ...]:
+    """Modules that a stack imports."""
+    return {
+        "3d-mem": ("torch", "open_clip", "ultralytics"),
+        "unigoal": ("torch", "torchvision", "transformers"),
+        "transformers": ("torch", "torchvision", "transformers"),
+    }[stack]
+
+
+def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[str, Any]:
+    """Return what decides a stack's results beside its options: hashes of weights and versions of libraries.
+
+    Raises:
+        PerceptionError: A library or a file is missing, or a file is not what it should be.
+        InvalidArgumentError: An option makes no sense.
+    """
+    config.phrases  # noqa: B018 - may raise
+    folder = models_folder(models)
+    weights = list(weights_of(stack, config).values())
+    versions = libraries.versions_of(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
+    if folder is not None:
+        check_folder(weights, folder)
+    return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}
+
+
+def load_stack(stack: StackName, config: StackConfig, models: str | None, device: str) -> DetectorPerception:
+    """Load a stack's models; a model that this process has loaded before is not loaded again.
+
+    Args:
+        stack: Its name.
+        config: Its options.
+        models: Folder of weights.
+        device: `auto`, `cpu`, `cuda` or `cuda:N`.
+
+    Raises:
+        PerceptionError: A library, a file or the device is missing, or a file cannot be loaded.
+        InvalidArgumentError: An option makes no sense.
+    """
+    phrases = config.phrases
+    folder = models_folder(models)
+    paths = {part: str(located(one, folder)) for part, one in weights_of(stack, config).items()}
+    on = libraries.device_of(device)
+    min_score = config.min_mask_score
+    if stack == "3d-mem":
+        from evonav.perception.models import open_clip_models, ultralytics_models
+
+        min_confidence = _either(config.min_confidence, 0.4)
+        detector: Detector = PromptedDetector(
+            ultralytics_models.load_yolo_world(paths["detector"], paths["text"], on),
+            ultralytics_models.load_ultralytics_sam(paths["sam"], on),
+            phrases,
+            min_confidence,
+            _either(min_score, -math.inf),
+        )
+        if config.swapped_colours:
+            detector = SwappedColours(detector)
+        embedder: Embedder = open_clip_models.load_open_clip("ViT-B-32", paths["clip"], on)
+        return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+    from evonav.perception.models import transformers_models
+
+    masker = transformers_models.load_sam(paths["sam"], on)
+    if stack == "transformers":
+        min_confidence = _either(config.min_confidence, 0.3)
+        detector = PromptedDetector(
+            transformers_models.load_owlv2(paths["detector"], on),
+            masker,
+            phrases,
+            min_confidence,
+            _either(min_score, -math.inf),
+        )
+        embedder = transformers_models.load_clip(paths["clip"], on)
+        return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+    from evonav.perception.models.torchvision_models import load_mask_rcnn
+
+    grounded = PromptedDetector(
+        transformers_models.load_grounding_dino(paths["detector"], on),
+        masker,
+        DINO_UNIGOAL,
+        _either(config.min_confidence, 0.3),
+        _either(min_score, _MIN_MASK_SCORE),
+    )
+    least = _either(config.min_confidence, 0.5)
+    network = load_mask_rcnn(paths["network"], on, min(least, 0.05))
+    return DetectorPerception(JointDetector(network, least, grounded), EVERYTHING)
+
+
+def _either(given: float | None, published: float) -> float:
+    return published if given is None else given
 
 
 @dataclass(slots=True)
@@ -38,17 +300,14 @@ class StackPerception:
             PerceptionError: Something is missing; the message says what to do.
             InvalidArgumentError: An option makes no sense.
         """
-        from evonav.perception.models.libraries import device_of
-
         stacks = sorted({self._stack_for(agent) for agent in agents})
         facts: dict[str, Any] = {stack: facts_of(stack, self.config, self.models) for stack in stacks}
-        device_of(self.device)
+        libraries.device_of(self.device)
         return facts
 
     def begin_stage(self, scene: StageScene) -> None:
         """Load the models of the agent's stack; of the scene, only the agent's name is used."""
-        parts = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
-        self._perception = DetectorPerception(parts.detector, parts.filters, parts.embedder)
+        self._perception = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Perceive the views of a round, as one batch."""
@@ -79,7 +338,7 @@ def predicted_perception(
         stack: One of `evonav.perception.shorthand.STACKS`; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others.
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
-        options: See `evonav.perception.stacks.StackConfig`; of `mini`, which needs neither models nor a device,
+        options: See `StackConfig`; of `mini`, which needs neither models nor a device,
             `evonav.perception.mini.MiniPerception`.
 
     Raises:

@@ -25,19 +25,9 @@ from evonav.world.simulator import Frame, SceneObject
 
 F64 = NDArray[np.float64]
 
-_MISS, _CONFUSED, _SIMILAR, _LABEL, _CONFIDENCE, _MARGIN, _SPLIT, _WHERE, _EDGES, _NUM_DRAWS = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    12,
-)
-"""Columns of the standard normals of an object, by what they decide; `_EDGES` are four."""
+_MISS, _CONFUSED, _SIMILAR, _LABEL, _CONFIDENCE, _MARGIN, _SPLIT, _WHERE, _EDGES = range(9)
+"""Columns of the standard normals of an object, by what they decide; `_EDGES` is the first of four."""
+_NUM_DRAWS = _EDGES + 4
 _CELL_M, _STRIDE_PX = 0.25, 6
 """Places where nothing may be taken for something: edge, and spacing of the pixels looked at."""
 _REFERENCE_HEIGHT_PX = 300

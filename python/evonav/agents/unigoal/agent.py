@@ -147,9 +147,9 @@ class UniGoal:
             self._advice = advice = self._graphs.advise(self._is_given_up)
             if advice.target is not None:
                 watch.pursue(advice.target.id, self._cells_of(bev, advice.target))
-            num_targets = planner.counters.targets
+            num_targets = planner.counters["targets"]
             planner.exploration_target(pose, advice.mid_term_m)
-            is_new = planner.counters.targets > num_targets
+            is_new = planner.counters["targets"] > num_targets
             self._wander_m = None if is_new else self._somewhere(bev, planner, pose)
         return self._wander_m or planner.target_m
 
@@ -195,17 +195,13 @@ class UniGoal:
             details |= {"goal": "temporary" if watch.confirmed is None else "confirmed", "goal_m": goal.centre_m}
         if step.distance_m is not None:
             details["distance_m"] = round(step.distance_m, 3)
-        counters = planner.counters
         self._diagnostics = RoundDiagnostics(
             choice=step.goal if goal is None else f"{details['goal']} {goal.source}",
             chosen_entry=None if node is None else self._entry(node),
             num_entries=len(self._graphs.scene.nodes),
             counters={
                 **self._queries.counters,
-                "collisions": counters.collisions,
-                "stuck": counters.stuck,
-                "unreachable": counters.unreachable,
-                "targets": counters.targets,
+                **planner.counters,
                 "given_up": watch.num_given_up,
                 "blacklisted_cells": planner.num_blacklisted,
                 "edges": len(self._graphs.scene.edges),

@@ -3,7 +3,7 @@
 Specification: UniGoal (Yin et al., CVPR 2025), whose mapping is SemExp's; docs/memory.md says where ours differs.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,15 +60,7 @@ class BevMap:
         self.core = _core.BevMap(
             centre_m=centre_m,
             num_categories=num_categories,
-            size_m=config.size_m,
-            cell_m=config.cell_m,
-            block_m=config.block_m,
-            heights_m=config.heights_m,
-            obstacle_min_m=config.obstacle_min_m,
-            obstacle_above_camera_m=config.obstacle_above_camera_m,
-            max_depth_m=config.max_depth_m,
-            stride_px=config.stride_px,
-            category_points=config.category_points,
+            **asdict(config),
         )
         """The map in Rust, on which the planner works."""
         rows, cols = self.core.shape
@@ -139,10 +131,6 @@ class BevMap:
     def collisions(self) -> NDArray[np.bool_]:
         """`(R, C)` copy: True where moves have failed."""
         return self.core.collisions
-
-    def category(self, index: int) -> NDArray[np.float32]:
-        """Return an `(R, C)` copy of how certain a category is in each cell, 0 to 1."""
-        return self.core.category(index)
 
     @property
     def cells(self) -> NDArray[np.uint8]:

@@ -5,6 +5,7 @@ The planner has no goal of its own but the one to get unstuck; the agent decides
 
 import math
 import random
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -82,31 +83,6 @@ class PlannedStep:
     """`(x, z)` that the action heads for."""
 
 
-@dataclass(slots=True)
-class _Stuck:
-    """The consequences of failed moves."""
-
-    width: int = 1
-    is_stuck: bool = False
-    goal_m: Point2 | None = None
-
-
-@dataclass(slots=True)
-class _Exploration:
-    target_m: Point2 | None = None
-    num_steps: int = 0
-
-
-@dataclass(slots=True)
-class _Counters:
-    """Counts since the task began."""
-
-    collisions: int = 0
-    stuck: int = 0
-    unreachable: int = 0
-    targets: int = 0
-
-
 class UniGoalPlanner:
     """Plans on a `BevMap`, and marks there where the agent has been and where it collided."""
 
@@ -120,23 +96,24 @@ class UniGoalPlanner:
         """
         self.bev = bev
         self.config = config or PlannerConfig()
-        self.counters = _Counters()
+        self.counters = Counter(collisions=0, stuck=0, unreachable=0, targets=0)
+        """Counts since the task began."""
         self._random = random.Random(f"unigoal {seed}")  # noqa: S311 - not for secrets
-        self._last: Pose | None = None
-        self._last_action: Action | None = None
-        self._stuck = _Stuck()
-        self._detour_m: Point2 | None = None
-        self._exploration = _Exploration()
-        self._blacklist: set[tuple[int, int]] = set()
+        self.begin_stage()
 
     def begin_stage(self) -> None:
         """Keep the map; drop the exploration target, the blacklist and the stuck state."""
-        self._last = None
-        self._last_action = None
-        self._stuck = _Stuck()
-        self._detour_m = None
-        self._exploration = _Exploration()
-        self._blacklist = set()
+        self._last: Pose | None = None
+        self._last_action: Action | None = None
+        self.is_stuck = False
+        """True if the agent has to leave its place before anything else."""
+        self._stuck_width = 1
+        self._stuck_goal_m: Point2 | None = None
+        self._detour_m: Point2 | None = None
+        self.target_m: Point2 | None = None
+        """The present exploration target."""
+        self._num_target_steps = 0
+        self._blacklist: set[tuple[int, int]] = set()
 
     def observe(self, pose: Pose, *, action: Action | None = None) -> None:
         """Note the present pose; call this once before each `step`.
@@ -152,34 +129,29 @@ class UniGoalPlanner:
         self.bev.core.visit(there, here)
         is_still = abs(here[0] - there[0]) < self.config.still_m and abs(here[1] - there[1]) < self.config.still_m
         if not is_still:
-            self._stuck.is_stuck, self._stuck.goal_m = False, None
+            self.is_stuck, self._stuck_goal_m = False, None
         if self._last is not None and action is Action.MOVE_FORWARD:
             self._learn_from_move(last, math.dist(here, there), is_still)
         self._last = pose
         self._last_action = action
-        self._exploration.num_steps += 1
+        self._num_target_steps += 1
 
     def _learn_from_move(self, start: Pose, moved_m: float, is_still: bool) -> None:
         """Block a strip ahead of a move that failed; after repeated failures the agent is stuck."""
-        stuck = self._stuck
         length, buffer = 2, 4
         if is_still:
-            stuck.width += 2
-            if stuck.width >= 7:
+            self._stuck_width += 2
+            if self._stuck_width >= 7:
                 length, buffer = 4, 3
-                self.counters.stuck += not stuck.is_stuck
-                stuck.is_stuck = True
-            stuck.width = min(stuck.width, 5)
+                self.counters["stuck"] += not self.is_stuck
+                self.is_stuck = True
+            self._stuck_width = min(self._stuck_width, 5)
         else:
-            stuck.width = 1
+            self._stuck_width = 1
         if moved_m < self.config.collision_m:
-            self.counters.collisions += 1
-            self.bev.core.collide((start.x_m, start.z_m), start.yaw_rad, start=buffer, length=length, width=stuck.width)
-
-    @property
-    def is_stuck(self) -> bool:
-        """True if the agent has to leave its place before anything else."""
-        return self._stuck.is_stuck
+            self.counters["collisions"] += 1
+            width = self._stuck_width
+            self.bev.core.collide((start.x_m, start.z_m), start.yaw_rad, start=buffer, length=length, width=width)
 
     def blacklist(self, cells: Cells) -> None:
         """Reject goal cells, grown by `blacklist_radius`, for the rest of the stage."""
@@ -198,19 +170,12 @@ class UniGoalPlanner:
         keep = [(int(row), int(col)) not in self._blacklist for row, col in cells]
         return cells[np.array(keep, np.bool_)] if len(cells) else cells
 
-    @property
-    def target_m(self) -> Point2 | None:
-        """The present exploration target."""
-        return self._exploration.target_m
-
     def needs_target(self, pose: Pose) -> bool:
         """Return whether an exploration target is due: none yet, reached, or `replan_steps` old."""
-        exploration = self._exploration
-        target_m = exploration.target_m
         return (
-            target_m is None
-            or exploration.num_steps >= self.config.replan_steps
-            or math.dist(target_m, (pose.x_m, pose.z_m)) < self.config.reached_m
+            self.target_m is None
+            or self._num_target_steps >= self.config.replan_steps
+            or math.dist(self.target_m, (pose.x_m, pose.z_m)) < self.config.reached_m
         )
 
     def exploration_target(self, pose: Pose, mid_term_goal_m: Point2 | None = None) -> Point2 | None:
@@ -238,11 +203,11 @@ class UniGoalPlanner:
                 path_obstacle_radius=config.obstacle_radius,
                 margin=self._margin,
             )
-        self._exploration.num_steps = 0
+        self._num_target_steps = 0
         if chosen is not None:
-            self.counters.targets += 1
-            self._exploration.target_m = bev.centre_of(chosen[0])
-        return self._exploration.target_m
+            self.counters["targets"] += 1
+            self.target_m = bev.centre_of(chosen[0])
+        return self.target_m
 
     def frontiers(self) -> Cells:
         """Return the frontier cells of the present map."""
@@ -273,9 +238,9 @@ class UniGoalPlanner:
             kind: The kind of goal, which decides how it is grown; only a `confirmed` one ends in `STOP`.
         """
         if self.is_stuck and kind != "confirmed":
-            if self._stuck.goal_m is None:
-                self._stuck.goal_m = self._visited_place(pose)
-            step = self._step_to(pose, self._stuck.goal_m, "stuck")
+            if self._stuck_goal_m is None:
+                self._stuck_goal_m = self._visited_place(pose)
+            step = self._step_to(pose, self._stuck_goal_m, "stuck")
             return step if step.distance_m is not None else self._feel(step)
         step = self._step_to(pose, goal, kind)
         if step.goal == "none" or step.action is Action.STOP:
@@ -283,8 +248,8 @@ class UniGoalPlanner:
         if step.distance_m is not None:
             self._detour_m = None
             return step
-        self.counters.unreachable += 1
-        self._exploration.target_m = None
+        self.counters["unreachable"] += 1
+        self.target_m = None
         if self.is_stuck:
             return self._feel(step)
         if self._detour_m is None and step.short_term_m is None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from evonav.parallel.local import num_cores
-from evonav.perception.stacks import STACKS, StackConfig, StackName, weights_of
+from evonav.perception.predicted import STACKS, StackConfig, StackName, weights_of
 from evonav.perception.weights import models_folder, places
 
 State = Literal["ok", "missing", "failed"]

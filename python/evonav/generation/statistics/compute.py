@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,8 @@ from evonav.tasks.statistics import (
     Estimate,
     Metric,
     Quantity,
-    Stratum,
     TaskStatistics,
     Test,
-    Weighting,
 )
 
 NUM_RESAMPLES = 2000
@@ -74,7 +73,7 @@ def statistics_of(
         num_houses=len(set(tally.houses)),
         num_stages=tally.num_stages,
         parameters=tuple(sorted(tally.parameters)),
-        weighting=None if weighting is None else _weighting(weighting),
+        weighting=None if weighting is None else weighting.record,
         measures=_metrics(tally, weighting),
         tests=_tests(tally, weighting),
         distributions=tuple(
@@ -130,18 +129,6 @@ def house_rejections(folder: Path) -> Counter[str]:
     return read_dataset(folder).num_rejected if (folder / DATASET_NAME).is_file() else Counter()
 
 
-def _weighting(weighting: Reweighting) -> Weighting:
-    strata = zip(weighting.strata, weighting.target_shares, weighting.task_shares, strict=True)
-    return Weighting(
-        mix=weighting.mix,
-        by=weighting.by,
-        covered_share=weighting.covered_share,
-        num_left_out=int((weighting.task_strata < 0).sum()),
-        effective_num_tasks=effective_size(weighting.weights),
-        strata=tuple(Stratum(name=name, target_share=target, task_share=share) for name, target, share in strata),
-    )
-
-
 def _metrics(tally: Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
     raw = _estimates(tally, None)
     reweighted = {} if weighting is None else _estimates(tally, weighting)
@@ -159,17 +146,11 @@ def _metrics(tally: Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
             estimate = Estimate(value=estimate.value, ci95=wilson(estimate.value * n, n))
         metrics.append(
             Metric(
-                key=info.key,
-                label=info.label,
-                group=info.group,
-                unit=info.unit,
+                **{one.name: getattr(info, one.name) for one in fields(info) if one.name != "is_of_tasks"},
                 n=n,
                 raw=estimate,
                 interval="wilson" if is_wilson else "bootstrap",
                 reweighted=reweighted.get(info.key),
-                paper=info.paper,
-                expected=info.expected,
-                accepted=info.accepted,
             )
         )
     return tuple(metrics)

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
+from evonav.statistics import effective_size
+from evonav.tasks.statistics import Stratum, Weighting
 
 PROCTHOR_10K_PLANS = {
     "bedroom-bathroom": (2, 2),
@@ -35,16 +37,8 @@ ROOM_MIXES = {"procthor-10k": PROCTHOR_10K_PLANS}
 class Reweighting:
     """Weights of tasks by stratum."""
 
-    mix: str
-    by: str
-    """The strata: `room plan`, or `number of rooms` if a plan is unknown or only its number of rooms occurs."""
-    strata: tuple[str, ...]
-    """Names of the mix's strata, in its order."""
-    target_shares: tuple[float, ...]
-    task_shares: tuple[float, ...]
-    """Shares of the tasks without weights."""
-    covered_share: float
-    """Share of the mix that has at least one task; the rest is left out of the target shares."""
+    record: Weighting
+    """Description of the weights, for `statistics.json`."""
     weights: NDArray[np.float64]
     """Weight of each task, `(N,)`, mean 1; 0 for houses that the mix does not contain."""
     task_strata: NDArray[np.int64]
@@ -86,16 +80,20 @@ def reweight(mix: str, num_rooms: Sequence[int], plans: Sequence[str | None]) ->
     if covered == 0.0:
         raise InvalidArgumentError(f"argument `reweight` is {mix!r}, but no house has as many rooms as its plans")
     factors = np.divide(target, counts, out=np.zeros_like(target), where=counts > 0) / covered * counts.sum()
-    return Reweighting(
+    weights = np.where(strata >= 0, factors[strata], 0.0)
+    task_shares = counts / max(1.0, counts.sum())
+    record = Weighting(
         mix=mix,
         by="room plan" if is_by_plan else "number of rooms",
-        strata=tuple(names),
-        target_shares=tuple(target.tolist()),
-        task_shares=tuple((counts / max(1.0, counts.sum())).tolist()),
         covered_share=covered,
-        weights=np.where(strata >= 0, factors[strata], 0.0),
-        task_strata=strata,
+        num_left_out=int((strata < 0).sum()),
+        effective_num_tasks=effective_size(weights),
+        strata=tuple(
+            Stratum(name=name, target_share=mix_share, task_share=task_share)
+            for name, mix_share, task_share in zip(names, target.tolist(), task_shares.tolist(), strict=True)
+        ),
     )
+    return Reweighting(record, weights, strata)
 
 
 _Strata = tuple[list[str], NDArray[np.float64], NDArray[np.int64]]

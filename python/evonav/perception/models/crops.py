@@ -1,13 +1,48 @@
-"""Parts of images that features are computed of."""
+"""Compute features of parts of images."""
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.perception.models.libraries import imported
+
 PADDING_PX = 20.0
 """Margin around a box, in 3D-Mem's images of 1280x1280; it is scaled with the image."""
+BATCH = 64
+"""Largest number of crops or texts that are encoded at once."""
 _REFERENCE_PX = 1280.0
+
+
+class CropEmbedder(ABC):
+    """An `Embedder` of padded crops."""
+
+    num_features: int
+    """Number of values of a feature."""
+
+    def image_features(
+        self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
+    ) -> list[NDArray[np.float32]]:
+        """Return unit features of padded crops, all images' in batches of 64."""
+        torch = imported("torch")
+        crops = [
+            np.ascontiguousarray(crop)
+            for image, boxes in zip(images, boxes_px, strict=True)
+            for crop in padded_crops(image, boxes)
+        ]
+        rows = [np.zeros((0, self.num_features), np.float32)]
+        with torch.inference_mode():
+            rows += [self._encode(crops[start : start + BATCH]) for start in range(0, len(crops), BATCH)]
+        features = unit(np.concatenate(rows))
+        ends = np.cumsum([0, *(len(boxes) for boxes in boxes_px)]).tolist()
+        return [features[start:end] for start, end in pairwise(ends)]
+
+    @abstractmethod
+    def _encode(self, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
+        """Return the features `(N, D)` of a batch of crops `(H, W, 3)`, of any length."""
 
 
 def padded_crops(image: NDArray[np.uint8], boxes_px: NDArray[np.float32]) -> list[NDArray[np.uint8]]:

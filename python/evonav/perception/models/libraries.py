@@ -1,6 +1,8 @@
 """Libraries that come with extras, and the device that they compute on."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -88,3 +90,24 @@ def make_repeatable() -> None:
     torch.backends.cudnn.deterministic = True
     torch.backends.cudnn.allow_tf32 = False
     torch.backends.cuda.matmul.allow_tf32 = False
+
+
+@contextmanager
+def loading(path: str, kind: str, files: str = "the file") -> Iterator[None]:
+    """Load weights in the block; libraries have errors of their own kinds, of pickle, of zip files, of shapes.
+
+    Args:
+        path: Path or name of the weights.
+        kind: Name of the model, for the error.
+        files: A noun for what to get again if they cannot be loaded.
+
+    Raises:
+        PerceptionError: They cannot be loaded.
+    """
+    try:
+        yield
+    except Exception as error:
+        reason = " ".join(str(error).split())[:200]
+        raise PerceptionError(
+            f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {reason}); get {files} again"
+        ) from error

@@ -2,21 +2,17 @@
 
 from collections.abc import Sequence
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.errors import PerceptionError
-from evonav.perception.models.crops import padded_crops, unit
-from evonav.perception.models.libraries import imported, make_repeatable
-
-_BATCH = 64
+from evonav.perception.models.crops import BATCH, CropEmbedder, unit
+from evonav.perception.models.libraries import imported, loading, make_repeatable
 
 
-class OpenClip:
-    """An `Embedder`."""
+class OpenClip(CropEmbedder):
+    """An `Embedder` by CLIP."""
 
     def __init__(self, model: Any, preprocess: Any, tokenizer: Any, device: str) -> None:  # noqa: ANN401 - of open_clip
         """Make an embedder.
@@ -31,27 +27,13 @@ class OpenClip:
         self._preprocess = preprocess
         self._tokenizer = tokenizer
         self._device = device
-        self._num_features = int(model.text_projection.shape[1])
+        self.num_features = int(model.text_projection.shape[1])
 
-    def image_features(
-        self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
-    ) -> list[NDArray[np.float32]]:
-        """Return unit features of padded crops, all images' in batches of 64."""
-        torch = imported("torch")
-        pil = imported("PIL.Image")
-        crops = [
-            self._preprocess(pil.fromarray(np.ascontiguousarray(crop)))
-            for image, boxes in zip(images, boxes_px, strict=True)
-            for crop in padded_crops(image, boxes)
-        ]
-        rows = [np.zeros((0, self._num_features), np.float32)]
-        with torch.inference_mode():
-            for start in range(0, len(crops), _BATCH):
-                batch = torch.stack(crops[start : start + _BATCH]).to(self._device)
-                rows.append(self._model.encode_image(batch).float().cpu().numpy())
-        features = unit(np.concatenate(rows))
-        ends = np.cumsum([0, *(len(boxes) for boxes in boxes_px)]).tolist()
-        return [features[start:end] for start, end in pairwise(ends)]
+    def _encode(self, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
+        torch, pil = imported("torch"), imported("PIL.Image")
+        batch = torch.stack([self._preprocess(pil.fromarray(crop)) for crop in crops]).to(self._device)
+        features: NDArray[np.float32] = self._model.encode_image(batch).float().cpu().numpy()
+        return features
 
     def text_feature(self, text: str) -> NDArray[np.float32]:
         """`(D,)` of unit length; what is longer than the model reads is cut off."""
@@ -63,11 +45,11 @@ class OpenClip:
         torch = imported("torch")
         with torch.inference_mode():
             rows = [
-                self._model.encode_text(self._tokenizer(list(texts[start : start + _BATCH])).to(self._device))
+                self._model.encode_text(self._tokenizer(list(texts[start : start + BATCH])).to(self._device))
                 .float()
                 .cpu()
                 .numpy()
-                for start in range(0, len(texts), _BATCH)
+                for start in range(0, len(texts), BATCH)
             ]
         return unit(np.concatenate(rows))
 
@@ -86,15 +68,9 @@ def load_open_clip(architecture: str, path: str, device: str) -> OpenClip:
     """
     open_clip = imported("open_clip")
     make_repeatable()
-    try:
+    with loading(path or architecture, architecture):
         model, _, preprocess = open_clip.create_model_and_transforms(
             architecture, pretrained=path or None, device=device
         )
         tokenizer = open_clip.get_tokenizer(architecture)
-    except Exception as error:
-        reason = " ".join(str(error).split())[:200]
-        raise PerceptionError(
-            f"{path or architecture}: cannot be loaded as {architecture} ({type(error).__name__}: {reason}); get the "
-            "file again"
-        ) from error
     return OpenClip(model.eval(), preprocess, tokenizer, device)

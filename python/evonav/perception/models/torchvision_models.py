@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.errors import PerceptionError
 from evonav.perception.detector import Found
-from evonav.perception.models.libraries import imported, make_repeatable
+from evonav.perception.models.libraries import imported, loading, make_repeatable
 
 _MIN_MASK = 0.5
 """Probability from which a pixel belongs to a mask."""
@@ -77,12 +76,7 @@ def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
     make_repeatable()
     model = detection.maskrcnn_resnet50_fpn(weights=None, weights_backbone=None, box_score_thresh=min_score)
     if path:
-        try:
+        with loading(path, "Mask R-CNN"):
             model.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
-        except Exception as error:  # of pickle, of zip files, of shapes
-            reason = " ".join(str(error).split())[:200]
-            raise PerceptionError(
-                f"{path}: cannot be loaded as Mask R-CNN ({type(error).__name__}: {reason}); get the file again"
-            ) from error
     categories = detection.MaskRCNN_ResNet50_FPN_Weights.COCO_V1.meta["categories"]
     return MaskRcnn(model.eval().to(device), categories, device)

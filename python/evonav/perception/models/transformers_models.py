@@ -1,42 +1,39 @@
 """Transformers (Apache-2.0): boxes by Grounding DINO or OWLv2, masks by SAM, features by CLIP."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.errors import PerceptionError
-from evonav.perception.models.crops import padded_crops, unit
-from evonav.perception.models.libraries import imported, make_repeatable
+from evonav.perception.models.crops import CropEmbedder, unit
+from evonav.perception.models.libraries import imported, loading, make_repeatable
 from evonav.perception.models.prompted import Boxes, Masks, box_masks
 
 _Model = TypeVar("_Model")
-_BATCH = 64
 _MAX_BOXES = 100
 _NMS_IOU = 0.7
 """Largest number of boxes, as in YOLO-World: OWLv2 has a box for every patch of the image and drops none."""
 
 
-class GroundingDino:
-    """Boxes for phrases, all of which go into one text: it is for short lists."""
+@dataclass(eq=False)
+class _OnDevice:
+    """A model of the library with its processor, and the device to compute on."""
 
-    def __init__(self, model: Any, processor: Any, device: str, min_text: float = 0.25) -> None:  # noqa: ANN401
-        """Make a detector.
+    _model: Any
+    _processor: Any
+    _device: str
 
-        Args:
-            model: `GroundingDinoForObjectDetection`.
-            processor: Its own.
-            device: Device to compute on.
-            min_text: Score from which a word of the text belongs to a box.
-        """
-        self._model = model
-        self._processor = processor
-        self._device = device
-        self._min_text = min_text
+
+@dataclass(eq=False)
+class GroundingDino(_OnDevice):
+    """Boxes for phrases by a `GroundingDinoForObjectDetection`. All phrases go into one text: it is for short lists."""
+
+    min_text: float = 0.25
+    """Score from which a word of the text belongs to a box."""
 
     def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch. A box whose phrase holds none of the words is dropped."""
@@ -49,7 +46,7 @@ class GroundingDino:
             outputs,
             inputs["input_ids"],
             threshold=min_confidence,
-            text_threshold=self._min_text,
+            text_threshold=self.min_text,
             target_sizes=[image.shape[:2] for image in images],
         )
         return [
@@ -58,21 +55,11 @@ class GroundingDino:
         ]
 
 
-class Owlv2:
-    """Boxes for any number of words."""
+@dataclass(eq=False)
+class Owlv2(_OnDevice):
+    """Boxes for any number of words, by an `Owlv2ForObjectDetection`."""
 
-    def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
-        """Make a detector.
-
-        Args:
-            model: `Owlv2ForObjectDetection`.
-            processor: Its own.
-            device: Device to compute on.
-        """
-        self._model = model
-        self._processor = processor
-        self._device = device
-        self._queries: dict[tuple[str, ...], Any] = {}
+    _queries: dict[tuple[str, ...], Any] = field(default_factory=dict)
 
     def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch: the best 100 of each, none of them on a better one of its word."""
@@ -113,20 +100,8 @@ class Owlv2:
         return self._queries[phrases]
 
 
-class Sam:
-    """Masks from boxes."""
-
-    def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
-        """Make a segmenter.
-
-        Args:
-            model: `SamModel`.
-            processor: `SamImageProcessor`.
-            device: Device to compute on.
-        """
-        self._model = model
-        self._processor = processor
-        self._device = device
+class Sam(_OnDevice):
+    """Masks from boxes, by a `SamModel`."""
 
     def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
         """Images with boxes are encoded as one batch, then masks are made; an empty one is the box itself."""
@@ -159,45 +134,22 @@ class Sam:
         return made
 
 
-class Clip:
-    """An `Embedder`."""
+@dataclass(eq=False)
+class Clip(_OnDevice, CropEmbedder):
+    """An `Embedder`, by a `CLIPModel`."""
 
-    def __init__(self, model: Any, processor: Any, tokenizer: Any, device: str) -> None:  # noqa: ANN401
-        """Make an embedder.
+    _tokenizer: Any
 
-        Args:
-            model: `CLIPModel`.
-            processor: `CLIPImageProcessor`.
-            tokenizer: Processor of the model.
-            device: Device to compute on.
-        """
-        self._model = model
-        self._processor = processor
-        self._tokenizer = tokenizer
-        self._device = device
+    def __post_init__(self) -> None:
+        """Read the length of features."""
+        self.num_features = self._model.config.projection_dim
 
-    def image_features(
-        self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
-    ) -> list[NDArray[np.float32]]:
-        """Return unit features of padded crops, all images' in batches of 64."""
-        torch = imported("torch")
-        crops = [
-            np.ascontiguousarray(crop)
-            for image, boxes in zip(images, boxes_px, strict=True)
-            for crop in padded_crops(image, boxes)
-        ]
-        rows = [np.zeros((0, self._model.config.projection_dim), np.float32)]
-        with torch.inference_mode():
-            for start in range(0, len(crops), _BATCH):
-                # A crop of a few pixels' width is not to be taken for one with channels first.
-                inputs = self._processor(
-                    images=crops[start : start + _BATCH], input_data_format="channels_last", return_tensors="pt"
-                )
-                pixels = inputs["pixel_values"].to(self._device)
-                rows.append(_pooled(self._model.get_image_features(pixels)).float().cpu().numpy())
-        features = unit(np.concatenate(rows))
-        ends = np.cumsum([0, *(len(boxes) for boxes in boxes_px)]).tolist()
-        return [features[start:end] for start, end in pairwise(ends)]
+    def _encode(self, crops: Sequence[NDArray[np.uint8]]) -> NDArray[np.float32]:
+        # A crop of a few pixels' width is not to be taken for one with channels first.
+        inputs = self._processor(images=crops, input_data_format="channels_last", return_tensors="pt")
+        features = self._model.get_image_features(inputs["pixel_values"].to(self._device))
+        encoded: NDArray[np.float32] = _pooled(features).float().cpu().numpy()
+        return encoded
 
     def text_feature(self, text: str) -> NDArray[np.float32]:
         """`(D,)` of unit length; what is longer than the model reads is cut off."""
@@ -216,13 +168,7 @@ def load_grounding_dino(path: str, device: str) -> GroundingDino:
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
     """
-
-    def load(transformers: Any) -> GroundingDino:  # noqa: ANN401 - a module
-        model = transformers.GroundingDinoForObjectDetection.from_pretrained(path, local_files_only=True)
-        processor = transformers.AutoProcessor.from_pretrained(path, local_files_only=True)
-        return GroundingDino(model.eval().to(device), processor, device)
-
-    return _loaded(path, "Grounding DINO", load)
+    return _loaded(GroundingDino, path, device, "Grounding DINO", "GroundingDinoForObjectDetection", "AutoProcessor")
 
 
 @cache
@@ -232,13 +178,7 @@ def load_owlv2(path: str, device: str) -> Owlv2:
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
     """
-
-    def load(transformers: Any) -> Owlv2:  # noqa: ANN401 - a module
-        model = transformers.Owlv2ForObjectDetection.from_pretrained(path, local_files_only=True)
-        processor = transformers.Owlv2Processor.from_pretrained(path, local_files_only=True)
-        return Owlv2(model.eval().to(device), processor, device)
-
-    return _loaded(path, "OWLv2", load)
+    return _loaded(Owlv2, path, device, "OWLv2", "Owlv2ForObjectDetection", "Owlv2Processor")
 
 
 @cache
@@ -248,13 +188,7 @@ def load_sam(path: str, device: str) -> Sam:
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
     """
-
-    def load(transformers: Any) -> Sam:  # noqa: ANN401 - a module
-        model = transformers.SamModel.from_pretrained(path, local_files_only=True)
-        processor = transformers.AutoImageProcessor.from_pretrained(path, local_files_only=True)
-        return Sam(model.eval().to(device), processor, device)
-
-    return _loaded(path, "SAM", load)
+    return _loaded(Sam, path, device, "SAM", "SamModel", "AutoImageProcessor")
 
 
 @cache
@@ -264,27 +198,19 @@ def load_clip(path: str, device: str) -> Clip:
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
     """
-
-    def load(transformers: Any) -> Clip:  # noqa: ANN401 - a module
-        model = transformers.CLIPModel.from_pretrained(path, local_files_only=True)
-        processor = transformers.AutoImageProcessor.from_pretrained(path, local_files_only=True)
-        tokenizer = transformers.AutoTokenizer.from_pretrained(path, local_files_only=True)
-        return Clip(model.eval().to(device), processor, tokenizer, device)
-
-    return _loaded(path, "CLIP", load)
+    return _loaded(Clip, path, device, "CLIP", "CLIPModel", "AutoImageProcessor", "AutoTokenizer")
 
 
-def _loaded(path: str, kind: str, load: Callable[[Any], _Model]) -> _Model:
+def _loaded(make: Callable[..., _Model], path: str, device: str, kind: str, model: str, *others: str) -> _Model:
+    """Make an object of a model, its processors and the device; `model` and `others` are classes of the library."""
     transformers = imported("transformers")
     make_repeatable()
     transformers.utils.logging.disable_progress_bar()
-    try:
-        return load(transformers)
-    except Exception as error:  # of safetensors, of JSON, of the library
-        reason = " ".join(str(error).split())[:200]
-        raise PerceptionError(
-            f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {reason}); get its files again"
-        ) from error
+    with loading(path, kind, "its files"):
+        network, processor, *more = (
+            getattr(transformers, name).from_pretrained(path, local_files_only=True) for name in (model, *others)
+        )
+        return make(network.eval().to(device), processor, device, *more)
 
 
 def _pooled(features: Any) -> Any:  # noqa: ANN401 - a tensor, which the library wraps since version 5

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.errors import PerceptionError
-from evonav.perception.models.libraries import imported, make_repeatable
+from evonav.perception.models.libraries import imported, loading, make_repeatable
 from evonav.perception.models.open_clip_models import OpenClip, load_open_clip
 from evonav.perception.models.prompted import Boxes, Masks, box_masks
 
@@ -122,11 +121,9 @@ def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
     ultralytics = imported("ultralytics")
     make_repeatable()
     encoder = load_open_clip("ViT-B-32-quickgelu", text_path, device)
-    try:
+    with loading(path, "YOLO-World"):
         model = ultralytics.YOLOWorld(path)
         model.to(device)
-    except Exception as error:  # of pickle, of zip files, of the library
-        raise _unreadable(path, "YOLO-World", error) from error
     return YoloWorld(model, encoder, device)
 
 
@@ -143,17 +140,10 @@ def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
     """
     ultralytics = imported("ultralytics")
     make_repeatable()
-    try:
+    with loading(path, "SAM"):
         model = ultralytics.SAM(path)
         model.to(device)
-    except Exception as error:
-        raise _unreadable(path, "SAM", error) from error
     return UltralyticsSam(model, device)
-
-
-def _unreadable(path: str, kind: str, error: Exception) -> PerceptionError:
-    reason = " ".join(str(error).split())[:200]
-    return PerceptionError(f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {reason}); get the file again")
 
 
 def _bgr(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
