@@ -10,8 +10,7 @@ from gymnasium.error import ResetNeeded
 
 from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.gym import ENV_ID, OBSERVATIONS, NavConfig, VectorEnv
-from evonav.gym.source import TaskSource
-from evonav.gym.worlds import WorldLoader
+from evonav.gym.worlds import TaskSource, WorldLoader
 
 SMALL = {"width_px": 32, "height_px": 24}
 

@@ -16,15 +16,21 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.house import bundled_houses, load_houses, procthor10k_fetch
-from evonav.house.dataset_errors import (
+from evonav.house.procthor10k import (
+    PUBLISHED,
+    REVISION,
+    SPLITS,
     DatasetAccessError,
     DatasetCorruptError,
     DatasetError,
     DatasetMissingError,
     DatasetNetworkError,
     DatasetQuotaError,
+    HouseSet,
+    dataset_folder,
+    house_set,
+    split_path,
 )
-from evonav.house.procthor10k import PUBLISHED, REVISION, SPLITS, HouseSet, dataset_folder, house_set, split_path
 from evonav.house.procthor10k_fetch import fetch_procthor10k
 
 NUM_HOUSES = {"train": 3, "val": 2, "test": 1}

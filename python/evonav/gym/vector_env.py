@@ -21,9 +21,8 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.gym import spaces
 from evonav.gym.config import STOP, NavConfig
-from evonav.gym.source import TaskSource
 from evonav.gym.stage import RewardedStage, task_result
-from evonav.gym.worlds import StageWorld, WorldLoader
+from evonav.gym.worlds import StageWorld, TaskSource, WorldLoader
 from evonav.world.pose import Pose
 
 Observations = dict[str, Any]

@@ -13,8 +13,7 @@ from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from evonav.errors import InvalidArgumentError
-from evonav.house.dataset_errors import DatasetCorruptError, DatasetMissingError
+from evonav.errors import HouseError, InvalidArgumentError
 from evonav.parallel.folders import sha256_of_file
 
 Split = Literal["train", "val", "test"]
@@ -32,6 +31,30 @@ MANIFEST_NAME = "manifest.json"
 INSTEAD = (
     "The bundled houses need none of this (leave `--houses` out), and `--houses FILE` takes any ProcTHOR JSON or JSONL."
 )
+
+
+class DatasetError(HouseError):
+    """A dataset cannot be fetched or used; the message ends with an alternative."""
+
+
+class DatasetMissingError(DatasetError):
+    """The dataset was never fetched."""
+
+
+class DatasetNetworkError(DatasetError):
+    """The dataset's host cannot be reached."""
+
+
+class DatasetQuotaError(DatasetError):
+    """The host refuses too many requests: a rate limit, or the bandwidth of git-lfs."""
+
+
+class DatasetAccessError(DatasetError):
+    """The host does not have this repository or revision, or it is private."""
+
+
+class DatasetCorruptError(DatasetError):
+    """A file differs from the published one: truncated, changed, or only a git-lfs pointer."""
 
 
 class SplitFile(BaseModel):

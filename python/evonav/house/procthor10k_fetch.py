@@ -12,13 +12,6 @@ from typing import NamedTuple
 
 from evonav.downloads import TIMEOUT_S, download
 from evonav.errors import StoreError
-from evonav.house.dataset_errors import (
-    DatasetAccessError,
-    DatasetCorruptError,
-    DatasetError,
-    DatasetNetworkError,
-    DatasetQuotaError,
-)
 from evonav.house.procthor10k import (
     INSTEAD,
     MANIFEST_NAME,
@@ -27,6 +20,11 @@ from evonav.house.procthor10k import (
     REVISION,
     SOURCE,
     SPLITS,
+    DatasetAccessError,
+    DatasetCorruptError,
+    DatasetError,
+    DatasetNetworkError,
+    DatasetQuotaError,
     Manifest,
     Split,
     SplitFile,

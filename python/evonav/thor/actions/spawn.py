@@ -10,13 +10,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
 from evonav import _core
-from evonav.errors import EvonavError
+from evonav.thor import edits
 from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.asset_metadata import metadata_of_asset
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import vector
 from evonav.thor.objects import placed_objects
-from evonav.thor.scene import Document, Scene
+from evonav.thor.scene import Document
 
 # Half the side of the floor that replaces the void of AI2-THOR's empty scene.
 _STAGE_HALF_M = 5.0
@@ -75,22 +75,16 @@ def spawn_asset(
         raise ActionError(
             f"Object '{assetId}' is not contained in asset database, you may need to rebuild asset database."
         )
-    entries = _house_or_stage(engine.scene)["objects"]
-    entries.append(
-        {
-            "id": generatedId,
-            "assetId": assetId,
-            "position": position.model_dump(),
-            "rotation": {axis: angle % 360.0 for axis, angle in rotation},
-            "kinematic": False,
-        }
-    )
-    try:
-        _ = engine.scene.simulator
-    except EvonavError:
-        entries.pop()
-        engine.scene.begin_edit()
-        raise
+    engine.scene.house = engine.scene.house or _stage()
+    entry = {
+        "id": generatedId,
+        "assetId": assetId,
+        "position": position.model_dump(),
+        "rotation": {axis: angle % 360.0 for axis, angle in rotation},
+        "kinematic": False,
+    }
+    with edits.editing(engine.scene) as house:
+        house["objects"].append(entry)
     return {"objectId": generatedId}
 
 
@@ -243,11 +237,10 @@ def pause_physics(engine: Engine) -> None:
     """Do nothing: nothing moves between two actions."""
 
 
-def _house_or_stage(scene: Scene) -> Document:
-    if scene.house is None:
-        corner = _STAGE_HALF_M
-        outline = [(-corner, -corner), (-corner, corner), (corner, corner), (corner, -corner)]
-        floor = [vector((x, 0.0, z)) for x, z in outline]
-        room = {"id": "room|stage", "roomType": "Stage", "floorPolygon": floor, "floorMaterial": {"name": ""}}
-        scene.house = {"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []}
-    return scene.begin_edit()
+def _stage() -> Document:
+    """Return a house that is one floor."""
+    corner = _STAGE_HALF_M
+    outline = [(-corner, -corner), (-corner, corner), (corner, corner), (corner, -corner)]
+    floor = [vector((x, 0.0, z)) for x, z in outline]
+    room = {"id": "room|stage", "roomType": "Stage", "floorPolygon": floor, "floorMaterial": {"name": ""}}
+    return {"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []}
