@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, TypeVar, cast
 
-from evonav.errors import InvalidArgumentError
+from evonav.errors import InvalidArgumentError, StoreError
 
 T = TypeVar("T")
 
@@ -92,3 +92,20 @@ def _file_module(path: str) -> ModuleType:
         del sys.modules[file.stem]
         raise
     return module
+
+
+def optional_module(name: str, purpose: str, install: str) -> Any:  # noqa: ANN401 - a module
+    """Return a module of a library that only some installations have.
+
+    Args:
+        name: Name of the module.
+        purpose: What needs the library, for the message.
+        install: Argument of `pip install` that installs it.
+
+    Raises:
+        StoreError: It cannot be imported.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise StoreError(f"{purpose} ({error}): pip install '{install}'") from error

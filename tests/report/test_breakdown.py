@@ -105,7 +105,7 @@ def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Pa
 def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
     loaded = load_run(run)
     plots = run_plots(loaded)
-    assert [one.plot.title for one in plots] == [
+    assert [plot.title for plot, _ in plots] == [
         "SR differences, points",
         "SR by stratum",
         "SR by evolution",
@@ -113,7 +113,7 @@ def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
         "SR by earlier stages",
         "SR by success radius",
     ]
-    assert all(one.caption.endswith(("house.", "says.")) for one in plots)
+    assert all(caption.endswith(("house.", "says.")) for _, caption in plots)
     titles = [table.title for table in run_tables(loaded)]
     assert [
         title for title in ("SR by path length", "SR by rooms", "SR by success radius") if title not in titles

@@ -23,13 +23,14 @@ from evonav.controlled.paired_maps import (
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import rate_tables
 from evonav.parallel.folders import write_atomically
+from evonav.report.maps.files import SUFFIXES
 from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
 from evonav.report.maps.trajectory import change, rounds
 from evonav.report.pages.template import page_text, picture_uri, text_of
-from evonav.report.plots.render import SUFFIXES, has_renderer, plot_elements, write_plots
+from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.tables.causes import sentence
 from evonav.report.tables.table import Table, latex_tables, markdown_tables

@@ -12,15 +12,8 @@ from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame
-from evonav.report.maps.legend import legend_row
-from evonav.report.maps.stage_map import (
-    change_words,
-    file_css,
-    house_drawing,
-    outcome_words,
-    success_radius_of,
-    task_frame,
-)
+from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
+from evonav.report.maps.stage_map import change_words, house_drawing, success_radius_of, task_frame
 from evonav.report.maps.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.report.maps.trajectory import course
 from evonav.report.tables.causes import sentence
@@ -102,35 +95,18 @@ def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
 def pair_svg(pair: Sequence[Rollout]) -> str:
     """Draw Fixed on the left, Not Fixed on the right, the goal above and the legend below."""
     frame = pair_frame(pair)
-    map_px = round(PANEL_PX * frame.height / frame.width)
     first = pair[0].record
     width_px = GAP_PX + len(pair) * (PANEL_PX + GAP_PX)
-    image = pair[0].maps[first.stage].reference_image if first.stage in pair[0].maps else None
-    shown = (
-        ""
-        if image is None
-        else f'<image href="{escape(image)}" x="{width_px - GAP_PX - IMAGE_PX}" y="6" width="{IMAGE_PX}" '
-        f'height="{IMAGE_PX}"/>'
-    )
-    lines = join(
-        f'<text class="instruction" x="{GAP_PX}" y="{48 + 17 * i}">{escape(line)}</text>'
-        for i, line in enumerate(text_lines(first.goal.instruction, 140, 2))
-    )
     head = f'<text class="stage" x="{GAP_PX}" y="27">{escape(first.agent)}: {escape(first.goal.category)}</text>'
-    panels = join(_panel(one, frame, map_px, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(pair))
-    legend, legend_px = legend_row(width_px - 2 * GAP_PX)
-    top_px = HEAD_PX + map_px + FOOT_PX
-    height_px = top_px + legend_px + 28
+    lines = instruction_lines(first.goal.instruction, 140, 2, f' x="{GAP_PX}"')
+    image = reference_image(pair[0].maps.get(first.stage), width_px - GAP_PX, 6, IMAGE_PX)
+    panels = join(_panel(one, frame, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(pair))
     dotted = (
-        f'<g transform="translate({GAP_PX} {top_px + legend_px})"><path class="walk" d="M0 8h40" stroke-width="3"/>'
-        '<text class="quiet" x="48" y="12">reference trajectory that the agent was walked along before</text></g>'
+        '<path class="walk" d="M0 8h40" stroke-width="3"/>'
+        '<text class="quiet" x="48" y="12">reference trajectory that the agent was walked along before</text>'
     )
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" '
-        f'width="{width_px}" height="{height_px}" role="img"><title>{escape(first.task_id)}: {escape(first.agent)}'
-        f'</title><style>{file_css()}</style><rect class="page" width="100%" height="100%" rx="10"/>{head}{lines}'
-        f'{shown}{panels}<g transform="translate({GAP_PX} {top_px})">{legend}</g>{dotted}</svg>\n'
-    )
+    name, top_px = f"{first.task_id}: {first.agent}", HEAD_PX + panel_height_px(frame, PANEL_PX) + FOOT_PX
+    return sheet(name, head + lines + image + panels, width_px, top_px, GAP_PX, foot=dotted, foot_px=28)
 
 
 def pair_frame(pair: Sequence[Rollout]) -> Frame:
@@ -139,21 +115,16 @@ def pair_frame(pair: Sequence[Rollout]) -> Frame:
     return task_frame(maps, [one.record for one in pair])
 
 
-def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
+def _panel(rollout: Rollout, frame: Frame, left_px: int) -> str:
     record = rollout.record
     verdict = "ok" if record.state is EndState.SUCCESS else "bad"
-    why = text_lines(sentence(record), 90, 1)[0]
-    changed = text_lines(change_sentence(rollout), 90, 1)[0]
     css = "quiet" if record.transition.kind == "static" else "change-words"
+    captions = [
+        ("quiet", 34, text_lines(sentence(record), 90, 1)[0]),
+        (css, 50, text_lines(change_sentence(rollout), 90, 1)[0]),
+    ]
     drawing = house_drawing(record, rollout.maps, frame) + walk_and_course(rollout, frame)
-    return (
-        f'<g transform="translate({left_px} {HEAD_PX})"><svg width="{PANEL_PX}" height="{map_px}" '
-        f'viewBox="{frame.view_box}">{drawing}</svg>'
-        f'<text class="verdict" y="{map_px + 18}"><tspan class="ink">{arm_words(rollout.arm)}</tspan> '
-        f'<tspan class="{verdict}">{escape(outcome_words(record))}</tspan></text>'
-        f'<text class="quiet" y="{map_px + 34}">{escape(why)}</text>'
-        f'<text class="{css}" y="{map_px + 50}">{escape(changed)}</text></g>'
-    )
+    return panel(record, drawing, frame, (left_px, HEAD_PX), PANEL_PX, (arm_words(rollout.arm), verdict), captions)
 
 
 def arm_words(arm: str) -> str:

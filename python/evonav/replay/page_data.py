@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.agent import FrontierBelief
 from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
 from evonav.replay.types import (
     ReplayedEntry,
-    ReplayedFrontier,
     ReplayedMap,
     ReplayedQuestion,
     ReplayedRound,
@@ -275,7 +275,7 @@ def _entry(entry: ReplayedEntry, record: StageRecord) -> list[Any]:
     ]
 
 
-def _frontier(frontier: ReplayedFrontier) -> list[Any]:
+def _frontier(frontier: FrontierBelief) -> list[Any]:
     return [frontier.frontier_id, *cm(frontier.position_m), round(math.degrees(frontier.direction_rad))]
 
 

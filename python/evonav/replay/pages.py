@@ -16,7 +16,7 @@ from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
-from evonav.report.maps.legend import ENTRIES, legend_html
+from evonav.report.maps.legend import entries_of, legend
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
 from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
@@ -172,15 +172,15 @@ def _legend() -> Markup:
             '<g class="now" stroke-width="1.6"><path d="M20 12h22"/><circle cx="45" cy="12" r="4"/></g>',
             54,
         ),
-        *(entry for entry in ENTRIES if entry[0] in _SHARED_MARKS),
-        *(entry for entry in ENTRIES if entry[0].startswith("object moved")),
+        *entries_of(*_SHARED_MARKS),
+        *entries_of("object moved before this stage"),
     )
     heading = Markup('<b class="what">{}</b>')
     return (
         heading.format("The agent's")
-        + legend_html(agent)
+        + legend(agent)
         + heading.format("Evaluator's knowledge; no agent sees it")
-        + legend_html(evaluator)
+        + legend(evaluator)
     )
 
 

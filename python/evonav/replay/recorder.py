@@ -26,7 +26,6 @@ from evonav.replay.types import (
     EXPLORED,
     FREE,
     ReplayedEntry,
-    ReplayedFrontier,
     ReplayedMap,
     ReplayedQuestion,
     ReplayedRound,
@@ -156,9 +155,7 @@ class Recorder:
                 seen,
                 entries=tuple(ReplayedEntry(entry, self._truth(entry.label, entry.centre_m)) for entry in entries),
                 candidate_ids=tuple(belief.candidate_ids),
-                frontiers=tuple(
-                    ReplayedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers
-                ),
+                frontiers=tuple(belief.frontiers),
                 map=_map_of(belief),
                 questions=tuple(self._question(entry) for entry in belief.queries),
             )

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from evonav.component import optional_module
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.parallel.folders import replacing
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
+from evonav.report.maps.files import check_suffix
 from evonav.report.maps.stage_map import outcome_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
@@ -35,8 +37,7 @@ def check_recording(path: Path) -> None:
         InvalidArgumentError: The file's suffix is another one.
         StoreError: rerun is not installed.
     """
-    if path.suffix.lower() != SUFFIX:
-        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {SUFFIX}")
+    check_suffix(path, SUFFIX)
     _rerun()
 
 
@@ -214,8 +215,4 @@ class _Recorder:
 
 
 def _rerun() -> Any:  # noqa: ANN401 - rerun is not there for the type checker
-    try:
-        import rerun
-    except ImportError as error:
-        raise StoreError(f"recordings need rerun ({error}): pip install 'evonav[rerun]'") from error
-    return rerun
+    return optional_module("rerun", "recordings need rerun", "evonav[rerun]")

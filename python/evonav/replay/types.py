@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.agent import FrontierBelief
 from evonav.evaluation.records.schema import (
     EntryRecord,
     FloorPlan,
@@ -41,15 +42,6 @@ class ReplayedEntry:
     record: EntryRecord
     truth: Truth | None
     """`None` when nothing of its label ever stood there."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReplayedFrontier:
-    """A frontier in one round."""
-
-    frontier_id: int
-    position_m: Point2
-    direction_rad: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +93,7 @@ class ReplayedRound:
     """The heading view last."""
     entries: tuple[ReplayedEntry, ...] = ()
     candidate_ids: tuple[int, ...] = ()
-    frontiers: tuple[ReplayedFrontier, ...] = ()
+    frontiers: tuple[FrontierBelief, ...] = ()
     map: ReplayedMap | None = None
     """`None` for an agent that cannot be inspected."""
     questions: tuple[ReplayedQuestion, ...] = ()

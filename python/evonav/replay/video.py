@@ -3,14 +3,15 @@
 import itertools
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.component import optional_module
+from evonav.errors import InvalidArgumentError
 from evonav.parallel.folders import replacing
-from evonav.report.maps.files import check_png
+from evonav.report.maps.files import check_png, check_suffix
 
 SUFFIX = ".mp4"
 MIN_WIDTH_PX = 320
@@ -25,8 +26,7 @@ def check_video(path: Path, fps: float, width_px: int) -> None:
         InvalidArgumentError: The file is no `.mp4`, or a number is out of range.
         StoreError: A library is not installed.
     """
-    if path.suffix.lower() != SUFFIX:
-        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {SUFFIX}")
+    check_suffix(path, SUFFIX)
     if not 0.1 <= fps <= 60:
         raise InvalidArgumentError(f"argument `fps` is {fps}, expected 0.1 to 60 rounds a second")
     if width_px < MIN_WIDTH_PX or width_px % 2:
@@ -91,11 +91,6 @@ def _resized(picture: Image.Image, width_px: int) -> Image.Image:
     return picture.resize((width_px, height_px), Image.Resampling.LANCZOS)
 
 
-def _imageio() -> ModuleType:
-    try:
-        import av  # noqa: F401
-        import imageio.v3
-    except ImportError as error:
-        raise StoreError(f"videos need imageio and PyAV ({error}): pip install 'evonav[video]'") from error
-    module: ModuleType = imageio.v3
-    return module
+def _imageio() -> Any:  # noqa: ANN401 - a module
+    optional_module("av", "videos need imageio and PyAV", "evonav[video]")
+    return optional_module("imageio.v3", "videos need imageio and PyAV", "evonav[video]")

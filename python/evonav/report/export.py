@@ -5,41 +5,62 @@ import csv
 import inspect
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, fields
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from evonav.component import optional_module
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import stage_metrics as metrics
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records import costs
-from evonav.evaluation.records.schema import RoundRecord
+from evonav.evaluation.records.schema import RoundRecord, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import replacing
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """Characters that a spreadsheet takes for the start of a formula."""
-ROUND_COLUMNS = {
-    "agent": "Name of the agent, as the run was started with it.",
-    "task_id": "Id of the task.",
-    "stage": "Number of the stage, from 1.",
-    "round": "Number of the round, from 0.",
-    "x_m": "Position of the agent when it observed.",
-    "z_m": "As `x_m`; AI2-THOR's world frame.",
-    "yaw_rad": "Clockwise from +z, seen from above.",
-    "action": "`move`, `navigate_to` or `stop`.",
-    "target_x_m": "Target of a `navigate_to`.",
-    "target_z_m": "Target of a `navigate_to`.",
-    "is_action_success": "True if the action could be carried out.",
-    "is_target_visible": "True if the target was in one of the round's views.",
-    "choice": "The agent's name for its choice: `object 12`, `frontier 3`, `none`.",
-    "chosen_label": "Label of the entry that was chosen.",
-    "is_chosen_stale": "True if no object of that label was there.",
-    "num_entries": "Number of entries in the agent's memory.",
-    "num_frontiers": "Number of frontiers that the agent could choose from.",
-}
+_ROUND: tuple[tuple[str, str, str, Callable[[StageRecord, RoundRecord], Any]], ...] = (
+    ("agent", "str", "Name of the agent, as the run was started with it.", lambda stage, _: stage.agent),
+    ("task_id", "str", "Id of the task.", lambda stage, _: stage.task_id),
+    ("stage", "int", "Number of the stage, from 1.", lambda stage, _: stage.stage),
+    ("round", "int", "Number of the round, from 0.", lambda _, one: one.round),
+    ("x_m", "float", "Position of the agent when it observed.", lambda _, one: one.pose.x_m),
+    ("z_m", "float", "As `x_m`; AI2-THOR's world frame.", lambda _, one: one.pose.z_m),
+    ("yaw_rad", "float", "Clockwise from +z, seen from above.", lambda _, one: one.pose.yaw_rad),
+    ("action", "str", "`move`, `navigate_to` or `stop`.", lambda _, one: one.action.kind),
+    ("target_x_m", "float", "Target of a `navigate_to`.", lambda _, one: _target(one)[0]),
+    ("target_z_m", "float", "Target of a `navigate_to`.", lambda _, one: _target(one)[1]),
+    ("is_action_success", "bool", "True if the action could be carried out.", lambda _, one: one.is_action_success),
+    (
+        "is_target_visible",
+        "bool",
+        "True if the target was in one of the round's views.",
+        lambda _, one: one.is_target_visible,
+    ),
+    (
+        "choice",
+        "str",
+        "The agent's name for its choice: `object 12`, `frontier 3`, `none`.",
+        lambda _, one: one.choice,
+    ),
+    ("chosen_label", "str", "Label of the entry that was chosen.", lambda _, one: _chosen(one, "label")),
+    ("is_chosen_stale", "bool", "True if no object of that label was there.", lambda _, one: _chosen(one, "is_stale")),
+    ("num_entries", "int", "Number of entries in the agent's memory.", lambda _, one: one.num_entries),
+    (
+        "num_frontiers",
+        "int",
+        "Number of frontiers that the agent could choose from.",
+        lambda _, one: one.num_frontiers,
+    ),
+)
+"""Columns of a table of rounds: name, type, description, and value of a round of a stage."""
+ROUND_COLUMNS = {name: description for name, _, description, _ in _ROUND}
 """Columns of a table of rounds, and their descriptions."""
+ROWS_PER_BLOCK = 20_000
+"""Rows of a Parquet file that are in memory at a time."""
 _ARROW = {"str": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 
 
@@ -68,34 +89,16 @@ def round_table(run_dir: Path, agents: Sequence[str] | None = None) -> Iterator[
     with RunStore(run_dir) as store:
         for agent in agents if agents is not None else (None,):
             for record in store.records(agent):
-                for taken in record.trace:
-                    yield {
-                        "agent": record.agent,
-                        "task_id": record.task_id,
-                        "stage": record.stage,
-                        **_round_row(taken),
-                    }
+                for one in record.trace:
+                    yield {name: value(record, one) for name, _, _, value in _ROUND}
 
 
-def _round_row(taken: RoundRecord) -> dict[str, Any]:
-    goal_m = taken.action.position_m or (None, None)
-    entry = taken.chosen_entry
-    return {
-        "round": taken.round,
-        "x_m": taken.pose.x_m,
-        "z_m": taken.pose.z_m,
-        "yaw_rad": taken.pose.yaw_rad,
-        "action": taken.action.kind,
-        "target_x_m": goal_m[0],
-        "target_z_m": goal_m[1],
-        "is_action_success": taken.is_action_success,
-        "is_target_visible": taken.is_target_visible,
-        "choice": taken.choice,
-        "chosen_label": None if entry is None else entry.label,
-        "is_chosen_stale": None if entry is None else entry.is_stale,
-        "num_entries": taken.num_entries,
-        "num_frontiers": taken.num_frontiers,
-    }
+def _target(one: RoundRecord) -> tuple[float | None, float | None]:
+    return one.action.position_m or (None, None)
+
+
+def _chosen(one: RoundRecord, field: str) -> Any:  # noqa: ANN401 - a field of the entry
+    return None if one.chosen_entry is None else getattr(one.chosen_entry, field)
 
 
 def write_table(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> Path:
@@ -131,12 +134,9 @@ def _write_jsonl(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: 
 
 
 def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> None:
-    try:
-        import pyarrow
-        import pyarrow.parquet as parquet
-    except ImportError as error:
-        raise StoreError(f"Parquet needs pyarrow ({error}): pip install 'evonav[data]'") from error
-    kinds = {**_kinds(StageMetrics), **_round_kinds()}
+    pyarrow = optional_module("pyarrow", "Parquet needs pyarrow", "evonav[data]")
+    parquet = optional_module("pyarrow.parquet", "Parquet needs pyarrow", "evonav[data]")
+    kinds = {**_kinds(StageMetrics), **{name: kind for name, kind, _, _ in _ROUND}}
     schema = pyarrow.schema(
         [
             pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": description})
@@ -145,20 +145,11 @@ def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path
         metadata={"evonav": "one row a stage or round; docs/measures.md"},
     )
     with parquet.ParquetWriter(path, schema) as writer:
-        for block in _blocks(rows):
+        left = iter(rows)
+        while block := list(islice(left, ROWS_PER_BLOCK)):
             writer.write_table(
                 pyarrow.Table.from_pylist([{name: row[name] for name in columns} for row in block], schema)
             )
-
-
-def _blocks(rows: Iterable[dict[str, Any]], size: int = 20_000) -> Iterator[list[dict[str, Any]]]:
-    block: list[dict[str, Any]] = []
-    for row in rows:
-        block.append(row)
-        if len(block) == size:
-            yield block
-            block = []
-    yield block
 
 
 def _kinds(kind: type) -> dict[str, str]:
@@ -169,15 +160,6 @@ def _kinds(kind: type) -> dict[str, str]:
         text = str(field.type) if "|" in str(field.type) else name
         found[field.name] = next(plain for plain in ("bool", "str", "float", "int") if plain in text)
     return found
-
-
-def _round_kinds() -> dict[str, str]:
-    texts = {"action", "choice", "chosen_label"}
-    return {
-        name: "str" if name in texts else "bool" if name.startswith("is_") else "int" if "num_" in name else "float"
-        for name in ROUND_COLUMNS
-        if name not in ("agent", "task_id", "stage", "round")
-    } | {"round": "int"}
 
 
 def _field_docstrings(module: Any) -> dict[str, str]:  # noqa: ANN401 - a module

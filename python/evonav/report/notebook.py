@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from evonav.errors import StoreError
+from evonav.component import optional_module
 from evonav.evaluation.records.store import RunStore
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
 
@@ -50,10 +50,7 @@ class LoadedRun:
         Raises:
             StoreError: pandas is not installed.
         """
-        try:
-            import pandas  # type: ignore[import-untyped, import-not-found, unused-ignore]
-        except ImportError as error:
-            raise StoreError(f"a DataFrame needs pandas ({error}): pip install pandas") from error
+        pandas = optional_module("pandas", "a DataFrame needs pandas", "pandas")
         return pandas.DataFrame(self.rounds if table == "rounds" else self.stages)
 
 

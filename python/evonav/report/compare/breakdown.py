@@ -10,13 +10,13 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
-from evonav.report.compare.compare import MODES, STRATA, check_measure
+from evonav.report.compare.compare import STRATA, check_measure
 from evonav.report.compare.selection import ComparedAgent
 from evonav.report.compare.wording import RATES, measure_name, scale_of
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.report.tables.numbers import NONE, estimate_text, number
-from evonav.report.tables.table import Table
+from evonav.report.tables.table import MODES, Table
 from evonav.statistics import ClusterBootstrap, Estimate
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)

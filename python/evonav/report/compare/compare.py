@@ -20,6 +20,7 @@ from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.selection import ComparedAgent, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
+from evonav.report.tables.table import MODES
 from evonav.statistics import PairedEffect, mcnemar, paired_effects, with_holm
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
@@ -27,14 +28,6 @@ MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_suc
 SAME_PROTOCOL = ("protocol.", "tasks", "num_tasks")
 """Settings that two runs have to share."""
 STRATA = {"stage_1": "first", "relocated": "relocated", "not_relocated": "not relocated"}
-MODES = {
-    "static": "static",
-    "salient_object": "SALIENT_OBJECT",
-    "retain_group": "RETAIN_GROUP",
-    "full_shuffle": "FULL_SHUFFLE",
-    "activities": "daily activities",
-    "extensions": "other extensions",
-}
 ALL = "all"
 GUIDED = EndState.GUIDED.value
 """State of stages that the evaluator guided: no agent is scored on them, and they do not count as missing."""

@@ -2,10 +2,10 @@
 
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.component import optional_module
+from evonav.errors import InvalidArgumentError
 from evonav.parallel.folders import write_atomically
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -27,13 +27,23 @@ def check_picture(path: Path) -> None:
         InvalidArgumentError: The file's suffix is of no format.
         StoreError: The library for its format is not installed.
     """
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {', '.join(SUFFIXES)}")
+    suffix = check_suffix(path, *SUFFIXES)
     if suffix == ".png":
         _resvg()
     elif suffix == ".pdf":
         _typst()
+
+
+def check_suffix(path: Path, *suffixes: str) -> str:
+    """Return a file's suffix in small letters.
+
+    Raises:
+        InvalidArgumentError: It is none of `suffixes`.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in suffixes:
+        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {', '.join(suffixes)}")
+    return suffix
 
 
 def write_picture(svg: str, path: Path) -> Path:
@@ -99,19 +109,9 @@ def _font_folders() -> list[str]:
     return [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")]
 
 
-def _resvg() -> ModuleType:
-    try:
-        import resvg_py
-    except ImportError as error:
-        raise StoreError(f"pictures as PNG need resvg ({error}): pip install 'evonav[viz]'") from error
-    module: ModuleType = resvg_py
-    return module
+def _resvg() -> Any:  # noqa: ANN401 - a module
+    return optional_module("resvg_py", "pictures as PNG need resvg", "evonav[viz]")
 
 
-def _typst() -> ModuleType:
-    try:
-        import typst
-    except ImportError as error:
-        raise StoreError(f"pictures as PDF need typst ({error}): pip install 'evonav[viz]'") from error
-    module: ModuleType = typst
-    return module
+def _typst() -> Any:  # noqa: ANN401 - a module
+    return optional_module("typst", "pictures as PDF need typst", "evonav[viz]")

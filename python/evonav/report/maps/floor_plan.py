@@ -112,12 +112,11 @@ def floors(stage_map: FloorPlan) -> str:
 def structure(stage_map: FloorPlan, frame: Frame) -> str:
     """Draw walls, doors and windows."""
     u = frame.unit
-    walls = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in _distinct(stage_map.walls))
     doors = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "door"]
     windows = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "window"]
     wall_cm = max(9.0, 1.1 * u)
     return (
-        f'<g class="walls" stroke-width="{wall_cm:.0f}">{walls}</g>'
+        f'<g class="walls" stroke-width="{wall_cm:.0f}">{_lines(_distinct(stage_map.walls))}</g>'
         f'<g class="doors" stroke-width="{wall_cm * 1.15:.0f}">{_lines(doors)}</g>'
         f'<g class="windows" stroke-width="{wall_cm * 0.45:.0f}">{_lines(windows)}</g>'
     )

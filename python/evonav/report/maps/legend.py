@@ -1,4 +1,4 @@
-"""Draw the legend of maps, with the same code as their marks."""
+"""Draw the legends of maps, with the same code as their marks."""
 
 from collections.abc import Iterable
 
@@ -6,7 +6,10 @@ from markupsafe import Markup
 
 from evonav.report.maps.svg import arrow_head, escape, join, star
 
-ENTRIES = (
+Entry = tuple[str, str, int]
+"""A mark's meaning, its drawing in a box 24 px high, and the width of the box in pixels."""
+
+ENTRIES: tuple[Entry, ...] = (
     (
         "path, from first round to last",
         '<g class="path" stroke-width="5">'
@@ -62,19 +65,49 @@ ENTRIES = (
         24,
     ),
 )
+_RECT = 'x="3" y="6" width="18" height="12" stroke-width="1.4"'
 
 
-def legend() -> Markup:
-    """Return the legend as HTML."""
-    return legend_html(ENTRIES)
+def _items(css: str) -> str:
+    return f'<g class="{css}"><rect class="item" {_RECT}/></g>'
 
 
-def legend_html(entries: Iterable[tuple[str, str, int]]) -> Markup:
-    """Return marks and what they mean, as HTML.
+def entries_of(*meanings: str) -> tuple[Entry, ...]:
+    """Return the entries of a run's legend with these meanings."""
+    return tuple(entry for entry in ENTRIES if entry[0] in meanings)
 
-    Args:
-        entries: The meaning, the drawing in a box 24 px high, and its width in pixels.
-    """
+
+TASK_ENTRIES: tuple[Entry, ...] = (
+    ("room that changed", f'<rect class="tint" {_RECT}/>', 24),
+    ("transition room", f'<rect class="between" {_RECT}/>', 24),
+    ("moved, or about to", _items("moved"), 24),
+    (
+        "from where to where",
+        '<g class="ghost"><rect class="item dash" x="2" y="6" width="12" height="12" '
+        'stroke-width="1.4"/></g><g class="arrow" stroke-width="2"><path d="M10 12h14"/>'
+        f'<path class="head" d="{arrow_head((34, 12), (1, 0), 9)}"/></g>',
+        38,
+    ),
+    ("found no place", _items("unmoved"), 24),
+    ("came", _items("new"), 24),
+    ("went", _items("gone"), 24),
+    ("opened, closed or switched", _items("opened"), 24),
+    ("asset group", '<g class="groups" stroke-width="4"><path d="M4 6h16v12h-16z"/></g>', 24),
+    *entries_of("start"),
+    ("reference trajectory", '<path class="trajectory" stroke-width="3" d="M2 12h26"/>', 30),
+    (
+        "reference pose and view",
+        '<path class="cone" stroke-width="1" d="M12 20L3 9A13 13 0 0 1 21 9Z"/>'
+        '<circle class="eye" cx="12" cy="20" r="3.4" stroke-width="1"/>',
+        24,
+    ),
+    *entries_of("target", "where it stood in stage 1"),
+)
+"""Entries of the legend of a task's floor plans."""
+
+
+def legend(entries: Iterable[Entry] = ENTRIES) -> Markup:
+    """Return marks and their meanings as HTML, by default those of a run's maps."""
     items = [
         Markup(
             '<span class="key"><svg class="map" width="{}" height="24" viewBox="0 0 {} 24" aria-hidden="true">'

@@ -148,7 +148,7 @@ def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         "headline": headline,
         "bars": [_bars(summary) for summary in run.summaries],
         "others": [table for table in others if table.rows],
-        "plots": list(zip(plot_elements([one.plot for one in plots]), [one.caption for one in plots], strict=False)),
+        "plots": list(zip(plot_elements([plot for plot, _ in plots]), (caption for _, caption in plots), strict=False)),
         "statements": statements(run),
         "overview": overview,
         "causes": [(cause.name, CAUSE_NAMES[cause]) for cause in FailureCause if cause in used],

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
+from evonav.report.maps.files import SUFFIXES, check_suffix
 from evonav.report.maps.svg import escape, title
 from evonav.report.plots.draw import TOOLTIP, draw, size_in
 from evonav.report.plots.specs import Plot
@@ -23,7 +24,6 @@ from evonav.report.plots.style import RC, plot_css
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SUFFIXES = (".svg", ".png", ".pdf")
 HINT = "Plots need: pip install 'evonav[viz]'"
 _PX_PER_POINT = 96 / 72
 _SKIPPED = frozenset(("metadata", "style", "clipPath"))
@@ -54,8 +54,7 @@ def check_plot(path: Path) -> None:
         InvalidArgumentError: The file's suffix is of no format.
         StoreError: matplotlib is not installed.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {', '.join(SUFFIXES)}")
+    check_suffix(path, *SUFFIXES)
     if not has_renderer():
         raise StoreError(f"{path}: matplotlib is not installed. {HINT}")
 

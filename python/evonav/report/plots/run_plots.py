@@ -1,7 +1,6 @@
 """Plot a run: rates by kind of stage, differences between agents."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
 from evonav.report.compare.selection import agents_of
@@ -20,14 +19,6 @@ _CAPTIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class RunPlot:
-    """A plot of a page, and what stands below it."""
-
-    plot: Plot
-    caption: str
-
-
 def run_breakdowns(run: Run, names: Sequence[str] = TABLED) -> list[Breakdown]:
     """Return breakdowns of a run, without those that have no group.
 
@@ -39,18 +30,18 @@ def run_breakdowns(run: Run, names: Sequence[str] = TABLED) -> list[Breakdown]:
     return [one for one in found if one.groups]
 
 
-def run_plots(run: Run) -> list[RunPlot]:
-    """Return the plots of a run, in reading order; none of a run without a scored stage.
+def run_plots(run: Run) -> list[tuple[Plot, str]]:
+    """Return the plots of a run with their captions, in reading order; none of a run without a scored stage.
 
     Raises:
         StoreError: The run cannot be read.
     """
-    plots = []
+    plots: list[tuple[Plot, str]] = []
     if len(run.pairs) > 0:
         caption = "On the stages that both scored; 95% intervals, bootstrap by house. Blue: ahead, as the table says."
-        plots.append(RunPlot(_difference_plot(run), caption))
+        plots.append((_difference_plot(run), caption))
     for one in run_breakdowns(run, PLOTTED):
-        plots.append(RunPlot(breakdown_plot(one), f"{_CAPTIONS[one.by]} 95% intervals, bootstrap by house."))
+        plots.append((breakdown_plot(one), f"{_CAPTIONS[one.by]} 95% intervals, bootstrap by house."))
     return plots
 
 

@@ -122,16 +122,20 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
     return Table("Success rate and SPL", columns, rows, tuple(notes), frozenset(best))
 
 
-SPLIT_TITLES = {
-    "stage_1": "stage 1",
-    "relocated": "target relocated",
-    "not_relocated": "target not relocated",
+MODES = {
     "static": "static",
     "salient_object": "SALIENT_OBJECT",
     "retain_group": "RETAIN_GROUP",
     "full_shuffle": "FULL_SHUFFLE",
     "activities": "daily activities",
     "extensions": "other extensions",
+}
+"""Kinds of the transition before a stage, in reading order, and their titles."""
+SPLIT_TITLES = {
+    "stage_1": "stage 1",
+    "relocated": "target relocated",
+    "not_relocated": "target not relocated",
+    **MODES,
 }
 """The splits of `AgentSummary`, in reading order."""
 
@@ -145,8 +149,7 @@ def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:
     """SR by what happened in the transition before the stage."""
-    names = ("static", "salient_object", "retain_group", "full_shuffle", "activities", "extensions")
-    return _split_table("By evolution before the stage", summaries, names, ("Stages 2 and on.",))
+    return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and on.",))
 
 
 def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:

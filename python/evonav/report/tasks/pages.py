@@ -9,9 +9,9 @@ from markupsafe import Markup
 from evonav.parallel.folders import write_atomically
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame
+from evonav.report.maps.legend import TASK_ENTRIES, legend
 from evonav.report.maps.stage_map import file_css, map_css
 from evonav.report.maps.svg import escape, join, slug
-from evonav.report.maps.task_legend import task_legend
 from evonav.report.pages.template import page_text, text_of
 from evonav.report.tasks.floor_plans import (
     TaskDrawing,
@@ -131,7 +131,7 @@ def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None) -
         has_drawings=True,
         header=drawing.task.header,
         index=index,
-        legend=task_legend(),
+        legend=legend(TASK_ENTRIES),
         defs=Markup(definitions(drawing)),  # noqa: S704 - our own SVG
         stages=[_stage_values(drawing, stage) for stage in stages],
     )

@@ -1,0 +1,84 @@
+"""Lay out maps side by side as one picture, with captions and the legend."""
+
+from collections.abc import Sequence
+
+from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.report.maps.floor_plan import Frame
+from evonav.report.maps.legend import legend_row
+from evonav.report.maps.stage_map import file_css, outcome_words
+from evonav.report.maps.svg import escape, join, text_lines
+
+
+def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, *, foot: str = "", foot_px: int) -> str:
+    """Return a picture as an SVG document, with the legend of maps below its content.
+
+    Args:
+        title: Title of the picture.
+        content: Elements above the legend.
+        width_px: Width of the picture.
+        top_px: Upper edge of the legend.
+        margin_px: Space on both sides of the legend.
+        foot: Elements below the legend, drawn from its lower edge on.
+        foot_px: Space below the legend.
+    """
+    legend, legend_px = legend_row(width_px - 2 * margin_px)
+    height_px = top_px + legend_px + foot_px
+    below = f'<g transform="translate({margin_px} {top_px + legend_px})">{foot}</g>' if foot else ""
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" '
+        f'width="{width_px}" height="{height_px}" role="img"><title>{escape(title)}</title><style>{file_css()}</style>'
+        f'<rect class="page" width="100%" height="100%" rx="10"/>{content}'
+        f'<g transform="translate({margin_px} {top_px})">{legend}</g>{below}</svg>\n'
+    )
+
+
+def panel(
+    record: StageRecord,
+    drawing: str,
+    frame: Frame,
+    place_px: tuple[int, int],
+    width_px: int,
+    heading: tuple[str, str],
+    captions: Sequence[tuple[str, int, str]],
+) -> str:
+    """Draw a map with its outcome and captions below it.
+
+    Args:
+        record: The stage that the map shows.
+        drawing: The map.
+        frame: Frame of the map.
+        place_px: Left and upper edge.
+        width_px: Width of the map.
+        heading: Name before the outcome, and CSS class of the outcome.
+        captions: CSS class, distance of the base line from the map, and text of each line.
+    """
+    height_px = panel_height_px(frame, width_px)
+    name, css = heading
+    lines = join(f'<text class="{css}" y="{height_px + y}">{escape(text)}</text>' for css, y, text in captions)
+    return (
+        f'<g transform="translate({place_px[0]} {place_px[1]})"><svg width="{width_px}" height="{height_px}" '
+        f'viewBox="{frame.view_box}">{drawing}</svg>'
+        f'<text class="verdict" y="{height_px + 18}"><tspan class="ink">{escape(name)}</tspan> '
+        f'<tspan class="{css}">{escape(outcome_words(record))}</tspan></text>{lines}</g>'
+    )
+
+
+def panel_height_px(frame: Frame, width_px: int) -> int:
+    """Return the height of a map of some width."""
+    return round(width_px * frame.height / frame.width)
+
+
+def instruction_lines(text: str, width: int, max_lines: int, place: str = "") -> str:
+    """Draw an instruction in lines of at most `width` letters; `place` holds further attributes of the lines."""
+    return join(
+        f'<text class="instruction"{place} y="{48 + 17 * i}">{escape(line)}</text>'
+        for i, line in enumerate(text_lines(text, width, max_lines))
+    )
+
+
+def reference_image(stage_map: FloorPlan | None, right_px: int, top_px: int, size_px: int) -> str:
+    """Draw the reference image of a stage, where it has one."""
+    if stage_map is None or stage_map.reference_image is None:
+        return ""
+    box = f'x="{right_px - size_px}" y="{top_px}" width="{size_px}" height="{size_px}"'
+    return f'<image href="{escape(stage_map.reference_image)}" {box}/>'
