@@ -99,7 +99,7 @@ def optional_module(name: str, purpose: str, install: str) -> Any:  # noqa: ANN4
 
     Args:
         name: Name of the module.
-        purpose: What needs the library, for the message.
+        purpose: Reason why the library is needed, for the message.
         install: Argument of `pip install` that installs it.
 
     Raises:

@@ -261,11 +261,11 @@ def test_the_crossover_is_where_the_line_falls_through_zero(leads, expected):
 
 
 def test_crossovers_in_words():
-    assert Crossover(0.5, (0.25, math.inf), 0.9).text() == "0.50 (0.25 to >1)"
-    assert Crossover(2.0, (1.5, math.inf), 0.0).text() == "none found: memory is ahead at every rate (>1 to >1)"
-    assert Crossover(-1.0, (-math.inf, -0.2), 0.0).text().startswith("none found: stage-reset is ahead")
-    assert Crossover(-math.inf, (-math.inf, 0.2), 0.1).text() == "none found (<0 to 0.20)"
-    assert Crossover(0.1, (-1.0, math.inf), 0.4).text() == "0.10, undetermined (<0 to >1)"
+    assert Crossover(0.5, (0.25, math.inf)).text() == "0.50 (0.25 to >1)"
+    assert Crossover(2.0, (1.5, math.inf)).text() == "none found: memory is ahead at every rate (>1 to >1)"
+    assert Crossover(-1.0, (-math.inf, -0.2)).text().startswith("none found: stage-reset is ahead")
+    assert Crossover(-math.inf, (-math.inf, 0.2)).text() == "none found (<0 to 0.20)"
+    assert Crossover(0.1, (-1.0, math.inf)).text() == "0.10, undetermined (<0 to >1)"
 
 
 def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):

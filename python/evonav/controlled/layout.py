@@ -51,14 +51,6 @@ class ControlledRecord(Record):
     """Draws over all tasks, those that were dropped included."""
     rejections: tuple[HouseRejection, ...]
 
-    def arm(self, name: str) -> Arm:
-        """Return an arm by its name.
-
-        Raises:
-            KeyError: There is none.
-        """
-        return {arm.name: arm for arm in self.arms}[name]
-
 
 def write_controlled(record: ControlledRecord, directory: Path) -> Path:
     """Write `controlled.json`, all of it or nothing.

@@ -20,8 +20,6 @@ class Crossover:
     """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: at none."""
     ci95: Interval
     """Bootstrap by house; the rate twice where houses agree, or there is but one."""
-    share_within: float
-    """Share of the resamples in which it lies in 0 to 1."""
 
     @property
     def is_found(self) -> bool:
@@ -55,7 +53,7 @@ def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[floa
     return [(arm.evolve_probability, mean) for arm, mean in zip(analysis.record.arms, found, strict=True)]
 
 
-def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0) -> Crossover | None:
+def crossover(analysis: Analysis, agent: str, measure: Measure) -> Crossover | None:
     """Estimate the rate at which the baseline overtakes an agent; `None` without stages of both."""
     keys = rate_keys(analysis, agent, BASELINE)
     if not keys or agent == BASELINE:
@@ -70,15 +68,11 @@ def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0
         ]
     )
     rates = np.array([arm.evolve_probability for arm in analysis.record.arms])
-    bootstrap = ClusterBootstrap(analysis.houses(keys, agent), seed=seed)
+    bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
     drawn = bootstrap.resampled_sums(bootstrap.sums(np.column_stack([leads, np.ones(len(leads))])))
     crossed = np.array([_crossing(rates, row[:-1] / row[-1]) for row in drawn])
     rate = _crossing(rates, leads.mean(axis=0))
-    return Crossover(
-        rate=rate,
-        ci95=bootstrap.estimate(rate, crossed, len(keys)).ci95 or (rate, rate),
-        share_within=float(((crossed >= 0.0) & (crossed <= 1.0)).mean()),
-    )
+    return Crossover(rate, bootstrap.estimate(rate, crossed, len(keys)).ci95 or (rate, rate))
 
 
 def _crossing(rates: NDArray[np.float64], leads: NDArray[np.float64]) -> float:

@@ -218,16 +218,9 @@ def measure_task(
     has_picture: bool = False,
     alive: Callable[[], None] = lambda: None,
 ) -> TaskRecord:
-    """Measure one perception on the houses of one task.
+    """Measure one perception, which was made for it, on the houses of one task; `alive` is called after every place.
 
-    Args:
-        case: The task.
-        perception: A fresh one.
-        simulator: Is reset to each house.
-        config: Settings of the tour.
-        word: Name of the perception.
-        has_picture: Draw the view of the first house that shows the most objects.
-        alive: Called after every place.
+    With `has_picture`, the view of the first house that shows the most objects is drawn.
 
     Raises:
         EvonavError: The simulator, the perception or the object map fails.

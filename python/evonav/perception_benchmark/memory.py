@@ -40,12 +40,7 @@ class JudgedMemory:
     _num_views: int = 0
 
     def begin_stage(self, stage: int, objects: Sequence[SceneObject]) -> None:
-        """Begin another house, with the memory of those before.
-
-        Args:
-            stage: 1-based.
-            objects: The simulator's bodies, in instance order.
-        """
+        """Begin another house, with the memory of those before; `objects` are its bodies, in instance order."""
         if self._stage:
             self._right_before = {belief.entry_id for belief in self._right()}
         self._objects, self._stage, self._num_views, self._seen = objects, stage, 0, set()
@@ -78,11 +73,7 @@ class JudgedMemory:
         self._num_views += 1
 
     def state(self, share: float) -> MemoryState:
-        """Return the state of the memory now.
-
-        Args:
-            share: Share of the stage's tour that is done.
-        """
+        """Return the state of the memory now, after a share of the stage's tour."""
         beliefs = self._beliefs()
         right = self._right()
         remembered = {body.id for body in matched_objects(right, self._bodies()) if body is not None}

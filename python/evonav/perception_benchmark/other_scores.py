@@ -29,11 +29,7 @@ def calibration(
 ) -> tuple[dict[str, Estimate], list[tuple[float, Estimate]]]:
     """Return expected calibration error, and mean confidence and precision by tenths of confidence.
 
-    Args:
-        houses: Confidences of the detections.
-        confidences: `(D,)` of detections that count.
-        is_right: `(D,)`.
-        of: `(D,)` house of each.
+    Confidence, whether it is right, and house of each of the detections that count have shape `(D,)`.
     """
     bins = np.minimum((confidences * NUM_CONFIDENCE_BINS).astype(np.int64), NUM_CONFIDENCE_BINS - 1)
     tops, sums, counts = np.zeros((3, NUM_CONFIDENCE_BINS, houses.num_clusters))

@@ -25,14 +25,7 @@ QUALITY = 82
 
 
 def side_by_side(rgb: NDArray[np.uint8], truth: TrueObjects, found: Detections, matched: Matched) -> str:
-    """JPEG in base64: the objects of a view on the left, the detections on the right.
-
-    Args:
-        rgb: `(H, W, 3)`.
-        truth: Objects from `true_objects`.
-        found: Detections in the same view.
-        matched: Their pairs.
-    """
+    """Draw the objects of a view, `(H, W, 3)`, on the left and its detections on the right, as JPEG in base64."""
     is_found = matched.found.detection_of[: truth.num_wanted] != NONE
     is_located = matched.located.detection_of[: truth.num_wanted] != NONE
     left = [RIGHT if a else MISLABELLED if b else ALONE for a, b in zip(is_found, is_located, strict=True)]

@@ -8,7 +8,6 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -256,7 +255,7 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
     return {word: [read_record(record_path(folder, word, task)) for task in tasks] for word in header.perceptions}
 
 
-def complete_tasks(folder: Path, header: Header, perceptions: Sequence[str] | None = None) -> list[str]:
+def complete_tasks(folder: Path, header: Header) -> list[str]:
     """Return the tasks last requested that have a record of every perception."""
-    requested = header.perceptions if perceptions is None else perceptions
-    return [task for task in header.tasks if all(record_path(folder, word, task).exists() for word in requested)]
+    names = header.perceptions
+    return [task for task in header.tasks if all(record_path(folder, name, task).exists() for name in names)]

@@ -80,14 +80,7 @@ class Rows:
     def add(
         self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: Sequence[SceneObject]
     ) -> Matched:
-        """Add a view.
-
-        Args:
-            stage: Stage of the house.
-            frame: True frame.
-            percept: Perceived frame.
-            truth: Objects from `true_objects`.
-            objects: The simulator's bodies, in instance order.
+        """Add a view of a stage's house; `objects` are the simulator's bodies, in instance order.
 
         Raises:
             InvalidArgumentError: See `check_percept`.

@@ -71,19 +71,15 @@ class Scores:
     """Task and JPEG in base64."""
 
 
-def scores(records: Mapping[str, Sequence[TaskRecord]], *, seed: int = 0) -> list[Scores]:
-    """Score every perception.
-
-    Args:
-        records: Records by perception, of the same tasks.
-        seed: Seed of the bootstrap.
+def scores(records: Mapping[str, Sequence[TaskRecord]]) -> list[Scores]:
+    """Score every perception from its records, which are of the same tasks for all.
 
     Raises:
         StoreError: There is no record.
     """
     if not records or not all(records.values()):
         raise StoreError("no task has a record of every perception yet: run the command again")
-    return [_Scorer(word, mine, seed).scores() for word, mine in records.items()]
+    return [_Scorer(word, mine).scores() for word, mine in records.items()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,11 +92,7 @@ class Difference:
 
 
 def differences(found: Sequence[Scores]) -> list[Difference]:
-    """Return the differences of every two perceptions, in the metrics that detectors are usually compared by.
-
-    Args:
-        found: Scores of the same tasks.
-    """
+    """Return the differences of every two perceptions, in the metrics that detectors are usually compared by."""
     return [
         Difference(
             b.word,
@@ -120,9 +112,9 @@ def differences(found: Sequence[Scores]) -> list[Difference]:
 class _Scorer:
     """One perception's objects and detections as arrays."""
 
-    def __init__(self, word: str, records: Sequence[TaskRecord], seed: int) -> None:
+    def __init__(self, word: str, records: Sequence[TaskRecord]) -> None:
         self.word, self.records = word, records
-        self.houses = ClusterBootstrap([r.house for r in records], num_resamples=NUM_RESAMPLES, seed=seed)
+        self.houses = ClusterBootstrap([r.house for r in records], num_resamples=NUM_RESAMPLES)
         truths, found = [r.truths for r in records], [r.detections for r in records]
         self.truth_house = np.repeat(self.houses.cluster_of, [len(t.view) for t in truths])
         self.house = np.repeat(self.houses.cluster_of, [len(d.view) for d in found])

@@ -19,12 +19,7 @@ TWO_DIGITS, THREE_DIGITS = {"scale": 1, "digits": 2}, {"scale": 1, "digits": 3}
 
 
 def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> list[Table]:
-    """Return all tables, in reading order.
-
-    Args:
-        found: Scores, one per perception.
-        is_brief: Brief tables for a terminal: of categories, the most frequent alone.
-    """
+    """Return all tables, in reading order; if `is_brief`, with the most frequent categories alone, for a terminal."""
     tables = [
         _headline(found),
         _differences(found),
@@ -50,12 +45,7 @@ def _table(
 ) -> Table:
     """Build a table with one row per perception and one column per metric.
 
-    Args:
-        title: Title of the table.
-        rows: Name and metrics of each row.
-        columns: Name of the metric and options of `estimate_text`, by heading.
-        notes: Notes below the table.
-        first: Heading of the rows' names.
+    `columns` has the name of a metric and options of `estimate_text` by heading; `first` is the heading of the names.
     """
     cells = tuple(
         (name, *(estimate_text(measures.get(measure), **form) for measure, form in columns.values()))

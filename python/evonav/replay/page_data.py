@@ -80,14 +80,7 @@ class PageData:
         return self._prompt_index[key]
 
     def add_stage(self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int) -> None:
-        """Add a stage to the page.
-
-        Args:
-            stage: Replayed stage.
-            maps: Floor plans of the task, by stage.
-            frame: Frame of the page's drawings.
-            budget: Rounds that the agent had.
-        """
+        """Add a stage, in which the agent had `budget` rounds, to the page."""
         record = stage.record
         rounds = _Rounds(self, record)
         entry: dict[str, Any] = {

@@ -199,13 +199,7 @@ class Recorder:
 
 
 def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
-    """Return a picture as JPEG, its longer edge at most `longest_px`.
-
-    Args:
-        pixels: `(H, W, 3)` RGB.
-        longest_px: Limit of the longer edge.
-        quality: Quality of the JPEG, 1 to 95.
-    """
+    """Return a picture, `(H, W, 3)` RGB, as JPEG of a quality of 1 to 95, its longer edge at most `longest_px`."""
     picture = Image.fromarray(np.ascontiguousarray(pixels))
     if max(picture.size) > longest_px:
         picture.thumbnail((longest_px, longest_px))

@@ -52,9 +52,6 @@ def write_recording(
         path: `.rrd` file.
         success_radius_m: Radius of the ring around the target.
 
-    Returns:
-        `path`.
-
     Raises:
         InvalidArgumentError: The file's suffix is another one, or there is no stage.
         StoreError: rerun is not installed, or the file cannot be written.

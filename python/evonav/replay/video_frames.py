@@ -34,14 +34,7 @@ _LETTER = 0.56
 def stage_frames(
     stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, *, budget: int, success_radius_m: float
 ) -> Iterator[Image.Image]:
-    """Yield a picture a round, and one of how the stage ended.
-
-    Args:
-        stage: The replayed stage.
-        maps: The task's maps, by stage.
-        frame: The part of the page that all of the task's maps show.
-        budget: Rounds that the agent had.
-        success_radius_m: Radius of the ring around the target.
+    """Yield a picture a round, and one of how the stage ended; the agent had `budget` rounds.
 
     Raises:
         StoreError: resvg is not installed.

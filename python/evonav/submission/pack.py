@@ -21,7 +21,6 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import replacing
 
-FORMAT_VERSION = 1
 SUFFIX = ".evonav.zip"
 HEADER_NAME = "submission.json"
 MAX_TOTAL_BYTES = 2 << 30
@@ -110,12 +109,7 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
 
 
 def packed_summary(records: dict[str, list[StageRecord]], num_stages: int) -> dict[str, Any]:
-    """Compute the scores that a submission claims from the records.
-
-    Args:
-        records: The records of each agent.
-        num_stages: Number of stages that each agent should have.
-    """
+    """Compute the scores that a submission claims from each agent's records, of which there should be `num_stages`."""
     summaries = [summarise(agent, mine, num_stages) for agent, mine in records.items()]
     summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, agent_pairs(records))))
     return summary

@@ -38,11 +38,7 @@ class RecordedAgent:
     """Answers with the recorded actions of an episode."""
 
     def __init__(self, records: Mapping[int, StageRecord]) -> None:
-        """Replay one episode.
-
-        Args:
-            records: The episode's stages, by number.
-        """
+        """Replay an episode, given its stages by number."""
         self.sensing = Sensing()
         self._records = records
         self._record: StageRecord | None = None
@@ -115,13 +111,7 @@ def _nothing(frame: Frame) -> Detections:
 def rescore(
     case: EpisodeSpec, records: Mapping[int, StageRecord], simulator: Simulator, protocol: ProtocolConfig
 ) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """Execute the actions of one episode again.
-
-    Args:
-        case: The task.
-        records: All its stages of one agent, by number.
-        simulator: A simulator of the kind that the run used.
-        protocol: The run's.
+    """Execute the actions of one episode again, in a simulator of the kind and by the protocol that the run used.
 
     Yields:
         A stage, and how its record differs from the result of its actions; no differences for a true record.
@@ -146,8 +136,7 @@ def _checkable(record: StageRecord) -> str:
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the work of a worker: a job holds a task's folder and records, its answer the differences.
 
-    Args:
-        settings: `protocol` and `simulator`, as JSON.
+    `settings` has `protocol` and `simulator`, as JSON.
     """
     values = json.loads(settings)
     simulators: Component[Simulator] = Component(values["simulator"])

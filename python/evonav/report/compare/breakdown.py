@@ -131,7 +131,7 @@ def _grouping(compared_agents: Sequence[ComparedAgent], by: str) -> Grouping:
     if by == "path-length":
         names = [f"{a:g}-{b:g} m" for a, b in pairwise(LENGTH_EDGES_M)] + [f"{LENGTH_EDGES_M[-1]:g} m and more"]
         note = "Shortest path from where the stage began to the target, which depends on where the agent was."
-        return Grouping("path length", lambda row: _length_bin(row, names), names, note)
+        return Grouping("path length", lambda row: _bin(row.reference_length_m, LENGTH_EDGES_M, names), names, note)
     if by == "earlier-stages":
         names = [str(k) for k in range(20)]
         note = "Stages of the task before this one: how long memory has grown, and could grow stale."
@@ -139,7 +139,7 @@ def _grouping(compared_agents: Sequence[ComparedAgent], by: str) -> Grouping:
     if by == "room-count":
         counts = _room_counts(compared_agents)
         names = [_room_group(k) for k in ROOM_EDGES]
-        return Grouping("rooms", lambda row: _rooms_of(counts, row), names)
+        return Grouping("rooms", lambda row: _bin(counts.get(row.task_id), ROOM_EDGES, names), names)
     return _field_grouping(compared_agents, by.replace("-", "_"))
 
 
@@ -181,23 +181,12 @@ def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> s
     return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
 
 
-def _length_bin(row: StageMetrics, names: Sequence[str]) -> str | None:
-    return _bin(row.reference_length_m, LENGTH_EDGES_M, names)
-
-
 def _room_counts(compared_agents: Sequence[ComparedAgent]) -> dict[str, int]:
     counts: dict[str, int] = {}
-    for run_dir in {compared.run.run_dir: None for compared in compared_agents}:
-        with RunStore(run_dir) as store:
-            for task_id in {
-                row.task_id: None
-                for compared in compared_agents
-                if compared.run.run_dir == run_dir
-                for row in compared.rows.values()
-            }:
-                first = next(store.maps(task_id), None)
-                if first is not None:
-                    counts[task_id] = len(first.rooms)
+    for run in {compared.run.run_dir: compared.run for compared in compared_agents}.values():
+        with RunStore(run.run_dir) as store:
+            firsts = {task_id: next(store.maps(task_id), None) for task_id in run.num_stages}
+        counts |= {task_id: len(first.rooms) for task_id, first in firsts.items() if first is not None}
     return counts
 
 
@@ -208,17 +197,10 @@ def _room_group(first: int) -> str:
     return str(first) if following[0] == first + 1 else f"{first}-{following[0] - 1}"
 
 
-def _rooms_of(counts: Mapping[str, int], row: StageMetrics) -> str | None:
-    count = counts.get(row.task_id)
-    return None if count is None else _room_group(max(edge for edge in ROOM_EDGES if edge <= max(1, count)))
-
-
 def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
     """Build a table with one row per group and one column per agent.
 
-    Args:
-        found: The breakdown.
-        is_brief: Half of an interval's width in place of its ends: six agents fit a terminal.
+    If `is_brief`, half of an interval's width stands in place of its ends, so that six agents fit a terminal.
     """
     rows = []
     for group in found.groups:

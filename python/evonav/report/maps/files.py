@@ -53,9 +53,6 @@ def write_picture(svg: str, path: Path) -> Path:
         svg: The drawing, as an SVG document.
         path: `.svg`, `.png` or `.pdf` file; folders are made.
 
-    Returns:
-        `path`.
-
     Raises:
         InvalidArgumentError: The file's suffix is of no format.
         StoreError: The library for its format is not installed, or the file cannot be written.

@@ -142,11 +142,7 @@ def item_labels(
 ) -> str:
     """Write the names of the furniture that is large enough to hold them, none over another.
 
-    Args:
-        items: Furniture.
-        frame: The frame of the picture.
-        min_m2: Footprint from which furniture is named.
-        letters: Their height, in units of the frame.
+    Furniture with a footprint below `min_m2` has no name. `letters` is the height of names, in units of the frame.
     """
     size = letters * frame.unit
     placed: list[Box] = []

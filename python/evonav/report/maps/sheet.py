@@ -10,17 +10,7 @@ from evonav.report.maps.svg import escape, join, text_lines
 
 
 def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, *, foot: str = "", foot_px: int) -> str:
-    """Return a picture as an SVG document, with the legend of maps below its content.
-
-    Args:
-        title: Title of the picture.
-        content: Elements above the legend.
-        width_px: Width of the picture.
-        top_px: Upper edge of the legend.
-        margin_px: Space on both sides of the legend.
-        foot: Elements below the legend, drawn from its lower edge on.
-        foot_px: Space below the legend.
-    """
+    """Return a picture as an SVG document: its content, the legend of maps from `top_px` on, and a foot below it."""
     legend, legend_px = legend_row(width_px - 2 * margin_px)
     height_px = top_px + legend_px + foot_px
     below = f'<g transform="translate({margin_px} {top_px + legend_px})">{foot}</g>' if foot else ""
@@ -41,16 +31,10 @@ def panel(
     heading: tuple[str, str],
     captions: Sequence[tuple[str, int, str]],
 ) -> str:
-    """Draw a map with its outcome and captions below it.
+    """Draw a stage's map with its outcome and captions below it.
 
-    Args:
-        record: The stage that the map shows.
-        drawing: The map.
-        frame: Frame of the map.
-        place_px: Left and upper edge.
-        width_px: Width of the map.
-        heading: Name before the outcome, and CSS class of the outcome.
-        captions: CSS class, distance of the base line from the map, and text of each line.
+    `heading` is the name before the outcome, and the CSS class of the outcome. `captions` are CSS class, distance of
+    the base line from the map, and text.
     """
     height_px = panel_height_px(frame, width_px)
     name, css = heading

@@ -31,11 +31,7 @@ def file_css() -> str:
 
 
 def light_css(more: str = "") -> str:
-    """Return the colours of a light page written out.
-
-    Args:
-        more: Further rules, which may have custom properties of their own.
-    """
+    """Return the colours of a light page written out, with further rules that may have custom properties, too."""
     light, _, rules = str(map_css()).split("/* --- */")
     return _inlined(rules + more, light + more)
 
@@ -52,13 +48,7 @@ def stage_svg(
     *,
     success_radius_m: float = SUCCESS_RADIUS_M,
 ) -> str:
-    """Return one stage as an SVG document.
-
-    Args:
-        record: The stage.
-        maps: The task's maps by stage; a stage without one is drawn without its house.
-        success_radius_m: Radius of the ring around the target.
-    """
+    """Return one stage as an SVG document; a stage without a map is drawn without its house."""
     frame = task_frame(maps, [record])
     height_px = round(STAGE_WIDTH_PX * frame.height / frame.width)
     drawing = stage_drawing(record, maps, frame, success_radius_m, has_item_names=True)

@@ -33,9 +33,6 @@ def write_strip(
         path: The `.svg`, `.png` or `.pdf` file to write.
         stages: Numbers of stages; default all that have a record (of the most telling task, three).
 
-    Returns:
-        `path`.
-
     Raises:
         InvalidArgumentError: The run has no such stage, or the file's suffix is of no format.
         StoreError: There is no run, it cannot be read, or the file cannot be written, or not without an extra.

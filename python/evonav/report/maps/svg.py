@@ -15,6 +15,7 @@ Point = tuple[float, float]
 
 MAX_SLUG_LENGTH = 80
 MAX_M = 1e7
+TOLERANCE_CM = 2.0
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _NOT_SLUG = re.compile(r"[^A-Za-z0-9._-]+")
@@ -64,15 +65,15 @@ def polyline(points_cm: Sequence[tuple[int, int]], *, closed: bool = False) -> s
     return "".join(parts) + ("z" if closed else "")
 
 
-def simplified(points_cm: Sequence[tuple[int, int]], tolerance_cm: float = 2.0) -> list[tuple[int, int]]:
-    """Return a polyline without the points that lie within `tolerance_cm` of the line they are on (Douglas-Peucker)."""
+def simplified(points_cm: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return a polyline without the points that lie within `TOLERANCE_CM` of the line they are on (Douglas-Peucker)."""
     if len(points_cm) < 3:
         return list(points_cm)
     chosen = {0, len(points_cm) - 1}
     todo = [(0, len(points_cm) - 1)]
     while todo:
         first, last = todo.pop()
-        farthest, distance_cm = first, tolerance_cm
+        farthest, distance_cm = first, TOLERANCE_CM
         for i in range(first + 1, last):
             d = _distance_to_segment(points_cm[i], points_cm[first], points_cm[last])
             if d > distance_cm:

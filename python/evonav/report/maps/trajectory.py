@@ -45,11 +45,7 @@ def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame) -> 
     """Draw relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
     The same for all agents. What was carried along on a moved piece of furniture is stressed, but has no arrow.
-
-    Args:
-        record: The stage before which they moved.
-        maps: The task's maps by stage; objects of a stage without one are left out.
-        frame: Frame of the picture.
+    Objects of a stage without a map are left out.
     """
     relocations = record.transition.relocations
     if not relocations:

@@ -7,8 +7,11 @@ from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedStage, Run
 from evonav.report.tables.causes import FailureCause
 
+NUM_STAGES = 3
+"""Number of stages to show, ending with the highlighted one."""
 
-def best_highlight(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
+
+def best_highlight(run: Run, agents: Sequence[str]) -> tuple[str, list[int]]:
     """Return the episode that shows the benchmark best, and the stages to show.
 
     Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
@@ -17,7 +20,6 @@ def best_highlight(run: Run, agents: Sequence[str], num_stages: int = 3) -> tupl
     Args:
         run: A run.
         agents: Agents whose episodes to show; the last one should succeed.
-        num_stages: Number of stages to show, ending with the highlighted one.
 
     Raises:
         InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
@@ -25,7 +27,7 @@ def best_highlight(run: Run, agents: Sequence[str], num_stages: int = 3) -> tupl
     best: tuple[float, str, list[int]] | None = None
     for task_id, last_stage in run.num_stages.items():
         for stage in range(1, last_stage + 1):
-            shown = list(range(max(1, stage - num_stages + 1), stage + 1))
+            shown = list(range(max(1, stage - NUM_STAGES + 1), stage + 1))
             keys = [(agent, task_id, k) for agent in agents for k in shown]
             if any(key not in run.outcomes for key in keys):
                 continue

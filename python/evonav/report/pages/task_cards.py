@@ -20,11 +20,7 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
     Returns the values of the template: its `goals` are stage, a record that states the goal, what changed before and
     the reference image; its `rows` are an agent and a cell per stage.
 
-    Args:
-        run: Its run.
-        task: Task with its records and maps.
-        prefix: Prefix of the names in the page.
-        hrefs: Links to stages that are shown round by round, by agent, task and stage.
+    `prefix` begins the ids in the page; `hrefs` link to stages round by round, by agent, task and stage.
     """
     records = list(task.records.values())
     frame = task_frame(task.maps, records)

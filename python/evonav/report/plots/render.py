@@ -67,9 +67,6 @@ def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
         path: `.svg`, `.png` or `.pdf` file; folders are made.
         columns: Number of plots side by side.
 
-    Returns:
-        `path`.
-
     Raises:
         InvalidArgumentError: The file's suffix is of no format.
         StoreError: matplotlib is not installed, or the file cannot be written.

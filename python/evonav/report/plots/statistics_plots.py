@@ -8,6 +8,7 @@ from evonav.statistics import Interval, wilson
 from evonav.tasks.statistics import Distribution, Estimate, TaskStatistics
 
 OURS, REWEIGHTED = "these tasks", "reweighted"
+MAX_NAMES = 12
 MEDIAN_GROUP = "10-20%"
 """The bar of the relocated-object ratio that holds the paper's median."""
 
@@ -17,8 +18,8 @@ def paper_plots(found: TaskStatistics) -> list[BarPlot]:
     return [plot for plot in (_evolutions(found), _goals(found), _ratio(found)) if plot is not None]
 
 
-def other_plots(found: TaskStatistics, most: int = 12) -> list[BarPlot]:
-    """Return the other distributions; of long ones the most frequent names."""
+def other_plots(found: TaskStatistics) -> list[BarPlot]:
+    """Return the other distributions; of long ones the `MAX_NAMES` most frequent names."""
     shown = {"num_evolutions", "relocated_ratio"}
     plots = []
     for one in found.distributions:
@@ -27,10 +28,12 @@ def other_plots(found: TaskStatistics, most: int = 12) -> list[BarPlot]:
             test = found.test(one.key)
             if test is not None and test.cells == one.names:
                 paper = test.paper_shares
-            num_more = max(0, len(one.names) - most)
+            num_more = max(0, len(one.names) - MAX_NAMES)
             notes = (f"{num_more} more",) if num_more else ()
-            references = tuple(paper or ())[:most]
-            plots.append(_plot(one, one.label, f"n = {sum(one.counts)}", references=references, notes=notes, most=most))
+            references = tuple(paper or ())[:MAX_NAMES]
+            plots.append(
+                _plot(one, one.label, f"n = {sum(one.counts)}", references=references, notes=notes, most=MAX_NAMES)
+            )
     return plots
 
 

@@ -39,12 +39,7 @@ def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[
 
 
 def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
-    """Build the table of one kind of metric.
-
-    Args:
-        rows: Rows of a run.
-        kind: Kind of metric, a key of `MEASURES`.
-    """
+    """Build the table of one kind of metric, a key of `MEASURES`, from the rows of a run."""
     found = explain(rows, MEASURES[kind])
     totals = {agent: sum(row.is_scored for row in rows if row.agent == agent) for agent in found}
     lines = []

@@ -20,7 +20,7 @@ def run_tables(run: Run) -> list[tables.Table]:
         tables.stage_table(records),
         tables.relocation_table(run.summaries),
         tables.mode_table(run.summaries),
-        tables.cause_count_table(run.cause_counts()),
+        tables.cause_table(run.cause_counts()),
         effort_table(run),
         failure_table(run),
         *(breakdown_table(one) for one in run_breakdowns(run)),

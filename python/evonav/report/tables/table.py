@@ -5,7 +5,6 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 """
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +15,7 @@ from rich.text import Text
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.report.export import csv_text
-from evonav.report.tables.causes import CAUSE_NAMES, FailureCause, cause_of
+from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.numbers import NONE, percent, points
 from evonav.statistics import LEVEL, NUM_RESAMPLES, PairedEffect
 
@@ -162,14 +161,8 @@ def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
     return _rates_table("By stage", [f"stage {k}" for k in stages], cells, ())
 
 
-def cause_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
-    """Stages without success by cause."""
-    counts = {agent: Counter(cause_of(record) for record in part) for agent, part in records.items()}
-    return cause_count_table(counts)
-
-
-def cause_count_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Table:
-    """`cause_table` from counts."""
+def cause_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Table:
+    """Build a table of the stages without success by cause, from counts by agent."""
     causes = [cause for cause in FailureCause if any(part.get(cause) for part in counts.values())]
     rows = tuple((CAUSE_NAMES[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
     note = "One cause a stage, the first that fits."

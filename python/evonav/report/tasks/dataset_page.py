@@ -18,10 +18,7 @@ PLOT_NAME = "statistics.svg"
 def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
     """Write `statistics.html`, `statistics.json` and, with the extra `viz`, `statistics.svg`.
 
-    The same statistics give the same bytes.
-
-    Returns:
-        Path of the page.
+    The same statistics give the same bytes. Returns the path of the page.
 
     Raises:
         StoreError: A file cannot be written.
@@ -33,14 +30,7 @@ def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
 
 
 def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
-    """Write the paper's figure of statistics: three plots side by side.
-
-    Args:
-        found: Statistics of tasks.
-        path: `.svg`, `.png` or `.pdf` file.
-
-    Returns:
-        `path`.
+    """Write the paper's figure of statistics, three plots side by side, as a `.svg`, `.png` or `.pdf` file.
 
     Raises:
         InvalidArgumentError: The file's suffix is of no format.

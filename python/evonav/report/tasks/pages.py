@@ -31,23 +31,14 @@ PLAN_HEIGHT_PX = 700
 CAPTION_PX = 40
 
 
-def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None, index: str | None = None) -> Path:
-    """Write a task as one HTML file that needs no other.
-
-    Args:
-        task: The task.
-        path: The file.
-        stages: Stages to show; default all.
-        index: Address of the gallery that links here.
-
-    Returns:
-        `path`.
+def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None) -> Path:
+    """Write all of a task's stages, or only some, as one HTML file that needs no other; return its path.
 
     Raises:
         HouseError: A stage house is malformed.
         StoreError: The file cannot be written.
     """
-    return write_atomically(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1), index))
+    return write_atomically(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1)))
 
 
 def write_stage_picture(task: Task, stage: int, path: Path) -> Path:
@@ -69,12 +60,9 @@ def write_gallery(
 
     Args:
         tasks: Any number, taken one at a time.
-        out_dir: Folder of the pages.
+        out_dir: Folder of the pages; the path of the index is returned.
         name: Heading.
         on_task: Called with each task's id when its page is written.
-
-    Returns:
-        Path of the index.
 
     Raises:
         HouseError: A stage house is malformed.
@@ -124,7 +112,8 @@ def stage_svg(drawing: TaskDrawing, stage: int) -> str:
     )
 
 
-def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None) -> str:
+def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None = None) -> str:
+    """Return a page; `index` is the address of the gallery that links to it."""
     return page_text(
         "stages.html.j2",
         _css(),
