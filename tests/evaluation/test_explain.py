@@ -40,12 +40,12 @@ def memory():
 def values(run_dir, measures):
     with RunStore(run_dir) as store:
         (found,) = explain(read_stage_metrics(store), measures).values()
-    return {one.measure.name: one for one in found}
+    return {one.name: estimate for one, estimate in zip(measures, found, strict=True)}
 
 
 def test_shares_are_of_what_could_have_been_counted(run_dir):
     told = values(run_dir, (*SUCCESS, *STALENESS, *MEMORY, *COSTS))
-    assert (told["sr"].value, told["sr"].n, told["sr"].num_houses) == (0.5, 2, 2)
+    assert (told["sr"].value, told["sr"].n, told["sr"].num_clusters) == (0.5, 2, 2)
     assert told["sr"].ci95 == (0.0, 1.0)
     assert (told["sr_1m"].value, told["sr_1.5m"].value, told["sr_3m"].value) == (0.0, 0.5, 0.5)
     # Entries are pooled: 7 of 8 are right, though the stages' means are 1/2 and 1.
@@ -68,7 +68,7 @@ def test_a_rate_has_the_interval_of_the_summary(tmp_path):
         for record in records:
             store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=1.0))
     told, summary = values(tmp_path, SUCCESS), summarise("fu", records, 24)
-    assert (told["sr"].num_houses, told["sr"].value) == (8, summary.sr)
+    assert (told["sr"].num_clusters, told["sr"].value) == (8, summary.sr)
     assert told["sr"].ci95 == told["sr_2m"].ci95 == summary.sr_ci95 is not None
     assert told["spl"].ci95 == pytest.approx(summary.spl_ci95)
 

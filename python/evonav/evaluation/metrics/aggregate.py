@@ -12,7 +12,7 @@ import numpy as np
 
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
-from evonav.statistics import ClusterBootstrap, Interval
+from evonav.statistics import ClusterBootstrap, Estimate
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 """Radii at which success is computed."""
@@ -30,19 +30,6 @@ class Measure:
     label: str
     unit: Unit
     part: Callable[[StageMetrics], Part]
-
-
-@dataclass(frozen=True, slots=True)
-class MetricSummary:
-    """A measure of one agent."""
-
-    measure: Measure
-    n: int
-    """Stages that have a value."""
-    num_houses: int
-    value: float | None
-    ci95: Interval | None
-    """Bootstrap by house; `None` of one house, or where all of them agree."""
 
 
 def _ratio(
@@ -137,24 +124,26 @@ MEASURES = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs
 """The measures by kind. `costs` depend on the machine; the others depend on the run's inputs alone."""
 
 
-def explain(rows: Sequence[StageMetrics], measures: Sequence[Measure]) -> dict[str, list[MetricSummary]]:
-    """Return measures by agent, in the order of the rows.
+def explain(rows: Sequence[StageMetrics], measures: Sequence[Measure]) -> dict[str, list[Estimate]]:
+    """Estimate measures for each agent, in the order of the rows.
 
     Args:
         rows: The stages of a run, or some of them.
         measures: Measures of `MEASURES`.
+
+    Returns:
+        An estimate of each measure by agent; its `n` is the number of stages that have a value.
     """
     agents = dict.fromkeys(row.agent for row in rows)
     return {
-        agent: [_summary_of([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
+        agent: [_estimate_of([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
     }
 
 
-def _summary_of(rows: Sequence[StageMetrics], measure: Measure) -> MetricSummary:
+def _estimate_of(rows: Sequence[StageMetrics], measure: Measure) -> Estimate:
     parts = [(house_of(row), part) for row in rows if (part := measure.part(row)) is not None]
     if not parts:
-        return MetricSummary(measure, 0, 0, None, None)
+        return Estimate(None, None, 0, 0)
     bootstrap = ClusterBootstrap([house for house, _ in parts])
     tops, bottoms = bootstrap.sums(np.array([part for _, part in parts])).T
-    found = bootstrap.ratio(tops, bottoms, len(parts))
-    return MetricSummary(measure, found.n, found.num_clusters, found.value, found.ci95)
+    return bootstrap.ratio(tops, bottoms, len(parts))

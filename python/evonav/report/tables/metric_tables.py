@@ -1,13 +1,14 @@
 """Tables of what explains the rates: see docs/measures.md."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
-from evonav.evaluation.metrics.aggregate import MEASURES, MetricSummary, explain
+from evonav.evaluation.metrics.aggregate import MEASURES, explain
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import RunStore
-from evonav.report.tables.numbers import NONE, number
+from evonav.report.tables.numbers import estimate_text
 from evonav.report.tables.table import Table
 
 TITLES = {
@@ -47,16 +48,9 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
         cells = {agent: metrics[index] for agent, metrics in found.items()}
         if any(cell.value is not None for cell in cells.values()):
             name = f"{measure.label}, {measure.unit}" if measure.unit else measure.label
-            lines.append((name, *(_cell(cell, totals[agent]) for agent, cell in cells.items())))
+            written = partial(estimate_text, scale=100 if measure.unit == "%" else 1, digits=_DIGITS[measure.unit])
+            lines.append((name, *(written(cell, has_n=cell.n != totals[agent]) for agent, cell in cells.items())))
     houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
     sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
     note = f"{sizes}. 95% bootstrap over houses. In parentheses: how many stages have a value, if not all."
     return Table(TITLES[kind], ("Measure", *found), tuple(lines), (note,))
-
-
-def _cell(cell: MetricSummary, num_stages: int) -> str:
-    if cell.value is None:
-        return NONE
-    unit = cell.measure.unit
-    text = number(cell.value, cell.ci95, scale=100 if unit == "%" else 1, digits=_DIGITS[unit])
-    return text if cell.n == num_stages else f"{text} ({cell.n})"
