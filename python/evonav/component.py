@@ -100,7 +100,7 @@ def optional_module(name: str, purpose: str, install: str) -> Any:  # noqa: ANN4
     Args:
         name: Name of the module.
         purpose: Reason why the library is needed, for the message.
-        install: Argument of `pip install` that installs it.
+        install: Argument of `pip install` that installs it, in quotes where a shell needs them.
 
     Raises:
         StoreError: It cannot be imported.
@@ -108,4 +108,4 @@ def optional_module(name: str, purpose: str, install: str) -> Any:  # noqa: ANN4
     try:
         return import_module(name)
     except ImportError as error:
-        raise StoreError(f"{purpose} ({error}): pip install '{install}'") from error
+        raise StoreError(f"{purpose} ({error}): pip install {install}") from error

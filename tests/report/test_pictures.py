@@ -1,7 +1,7 @@
 """Drawings as PNG and PDF."""
 
-import builtins
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -49,14 +49,8 @@ def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match=re.escape(str(tmp_path / "file" / "x.svg"))):
         write_picture(SVG, tmp_path / "file" / "x.svg")
-    real = builtins.__import__
-
-    def without_extras(name: str, *args: object, **kwargs: object) -> object:
-        if name in ("resvg_py", "typst"):
-            raise ImportError(f"No module named {name!r}")
-        return real(name, *args, **kwargs)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(builtins, "__import__", without_extras)
+    monkeypatch.setitem(sys.modules, "resvg_py", None)
+    monkeypatch.setitem(sys.modules, "typst", None)
     for suffix in ("png", "pdf"):
         with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
             write_picture(SVG, tmp_path / f"x.{suffix}")

@@ -1,6 +1,6 @@
 """Recordings for rerun, read back with rerun's own reader."""
 
-import builtins
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -119,13 +119,6 @@ def test_cameras_stand_at_their_height_and_look_where_the_agent_looks(recording:
 def test_what_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidArgumentError, match=r"expected a file .rrd"):
         check_recording(tmp_path / "x.mp4")
-    real = builtins.__import__
-
-    def without_rerun(name: str, *args: object, **kwargs: object) -> object:
-        if name == "rerun":
-            raise ImportError("No module named 'rerun'")
-        return real(name, *args, **kwargs)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(builtins, "__import__", without_rerun)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(StoreError, match=r"pip install 'evonav\[rerun\]'"):
         check_recording(tmp_path / "x.rrd")

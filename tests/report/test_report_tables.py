@@ -74,7 +74,7 @@ def test_a_verdict_is_that_of_the_effect() -> None:
 
 
 def test_causes_add_up_to_the_stages_without_success(write_run: WriteRun) -> None:
-    table = tables.cause_count_table(load_run(write_run()).cause_counts())
+    table = tables.cause_table(load_run(write_run()).cause_counts())
     assert table.columns == ("Cause", "fu", "ftu")
     assert table.rows == (("stopped at a stale entry", "6", "0"), ("stopped without an object", "0", "1"))
 

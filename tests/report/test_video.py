@@ -1,6 +1,6 @@
 """Videos: as many pictures as rounds, in the asked size, showing what the round holds."""
 
-import builtins
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -103,14 +103,7 @@ def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, monkeypa
         write_video([], tmp_path / "x.mp4", fps=float("nan"))
     with pytest.raises(InvalidArgumentError, match="`stages` is empty"):
         write_video([], tmp_path / "x.mp4")
-    real = builtins.__import__
-
-    def without_av(name: str, *args: object, **kwargs: object) -> object:
-        if name == "av":
-            raise ImportError("No module named 'av'")
-        return real(name, *args, **kwargs)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(builtins, "__import__", without_av)
+    monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(StoreError, match=r"pip install 'evonav\[video\]'"):
         write_video([], tmp_path / "x.mp4")
     assert list(tmp_path.iterdir()) == []

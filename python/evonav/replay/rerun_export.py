@@ -212,4 +212,4 @@ class _Recorder:
 
 
 def _rerun() -> Any:  # noqa: ANN401 - rerun is not there for the type checker
-    return optional_module("rerun", "recordings need rerun", "evonav[rerun]")
+    return optional_module("rerun", "recordings need rerun", "'evonav[rerun]'")

@@ -92,5 +92,5 @@ def _resized(picture: Image.Image, width_px: int) -> Image.Image:
 
 
 def _imageio() -> Any:  # noqa: ANN401 - a module
-    optional_module("av", "videos need imageio and PyAV", "evonav[video]")
-    return optional_module("imageio.v3", "videos need imageio and PyAV", "evonav[video]")
+    optional_module("av", "videos need imageio and PyAV", "'evonav[video]'")
+    return optional_module("imageio.v3", "videos need imageio and PyAV", "'evonav[video]'")

@@ -134,8 +134,8 @@ def _write_jsonl(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: 
 
 
 def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> None:
-    pyarrow = optional_module("pyarrow", "Parquet needs pyarrow", "evonav[data]")
-    parquet = optional_module("pyarrow.parquet", "Parquet needs pyarrow", "evonav[data]")
+    pyarrow = optional_module("pyarrow", "Parquet needs pyarrow", "'evonav[data]'")
+    parquet = optional_module("pyarrow.parquet", "Parquet needs pyarrow", "'evonav[data]'")
     kinds = {**_kinds(StageMetrics), **{name: kind for name, kind, _, _ in _ROUND}}
     schema = pyarrow.schema(
         [

@@ -107,8 +107,8 @@ def _font_folders() -> list[str]:
 
 
 def _resvg() -> Any:  # noqa: ANN401 - a module
-    return optional_module("resvg_py", "pictures as PNG need resvg", "evonav[viz]")
+    return optional_module("resvg_py", "pictures as PNG need resvg", "'evonav[viz]'")
 
 
 def _typst() -> Any:  # noqa: ANN401 - a module
-    return optional_module("typst", "pictures as PDF need typst", "evonav[viz]")
+    return optional_module("typst", "pictures as PDF need typst", "'evonav[viz]'")

@@ -60,5 +60,6 @@ def viewer_js() -> Markup:
 
 
 def page_code() -> str:
-    """Return a digest of the style, the script and the template of an episode's page."""
-    return hashlib.sha256((viewer_css() + viewer_js() + text_of("viewer.html.j2")).encode()).hexdigest()
+    """Return a digest of the style, the script and the templates of an episode's page."""
+    templates = text_of("page.html.j2") + text_of("viewer.html.j2")
+    return hashlib.sha256((viewer_css() + viewer_js() + templates).encode()).hexdigest()
