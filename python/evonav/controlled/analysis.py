@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
@@ -67,6 +68,10 @@ class Analysis:
         """Return the house of each stage, all of which the agent has scored."""
         return [house_of(self.outcomes[self.arms[0], agent][key].row) for key in keys]
 
+    def values(self, agent: str, measure: Measure, keys: Sequence[Key]) -> NDArray[np.float64]:
+        """Return a measure of some stages of an agent in every arm, `(K, A)`."""
+        return np.array([[measure(self.outcomes[arm, agent][key]) for arm in self.arms] for key in keys])
+
     def effect(
         self, a: tuple[str, str], b: tuple[str, str], measure: Measure, keys: Sequence[Key] | None = None
     ) -> PairedEffect | None:
@@ -78,22 +83,16 @@ class Analysis:
         keys = self.keys(a[1], b[1]) if keys is None else keys
         if not keys:
             return None
-        values = [np.array([measure(self.outcomes[side][key]) for key in keys]) for side in (a, b)]
-        return paired_effect(values[0], values[1], self.houses(keys, a[1]))
+        before, after = (self.values(agent, measure, keys)[:, self.arms.index(arm)] for arm, agent in (a, b))
+        return paired_effect(before, after, self.houses(keys, a[1]))
 
     def effect_on_change(self, a: str, b: str, measure: Measure) -> PairedEffect | None:
         """Estimate how much more agent `b` gains from the first arm to the last than agent `a`, pair by pair."""
         keys = self.keys(a, b)
         if not keys:
             return None
-        first, last = self.arms[0], self.arms[-1]
-        gains = [
-            np.array(
-                [measure(self.outcomes[last, name][key]) - measure(self.outcomes[first, name][key]) for key in keys]
-            )
-            for name in (a, b)
-        ]
-        return paired_effect(gains[0], gains[1], self.houses(keys, a))
+        gain_a, gain_b = (found[:, -1] - found[:, 0] for found in (self.values(name, measure, keys) for name in (a, b)))
+        return paired_effect(gain_a, gain_b, self.houses(keys, a))
 
 
 def load_analysis(directory: Path) -> Analysis:

@@ -28,11 +28,11 @@ from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
-from evonav.report.maps.trajectory import change, rounds
+from evonav.report.maps.trajectory import change
+from evonav.report.pages.task_cards import stage_cell
 from evonav.report.pages.template import page_text, picture_uri, text_of
 from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.style import plot_css
-from evonav.report.tables.causes import sentence
 from evonav.report.tables.table import Table, latex_tables, markdown_tables
 
 PAGE_NAME = "index.html"
@@ -170,13 +170,8 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
 
     def cell(i: int, one: Rollout) -> dict[str, Any]:
         drawn = f'<use href="#house"/><use href="#arm{i}"/>{walk_and_course(one, frame)}'
-        return {
-            "state": one.record.state.value,
-            "words": outcome_words(one.record),
-            "sentence": sentence(one.record),
-            "rounds": rounds(one.record.trace),
-            "svg": Markup(f'<svg class="map" viewBox="{frame.view_box}" role="img">{drawn}</svg>'),  # noqa: S704
-        }
+        svg = f'<svg class="map" viewBox="{frame.view_box}" role="img">{drawn}</svg>'
+        return stage_cell(one.record, Markup(svg))  # noqa: S704 - our own SVG
 
     first = pair[0].record
     return {

@@ -1,7 +1,5 @@
 """Plot a controlled analysis: bars of Fixed and Not Fixed as in the paper, lines over evolution rates."""
 
-import numpy as np
-
 from evonav.controlled.analysis import MEASURES, Analysis, Measure
 from evonav.controlled.rates import by_rate
 from evonav.report.plots.specs import BarPlot, CurvePlot, Line, Plot, Series
@@ -20,12 +18,11 @@ def controlled_plots(analysis: Analysis) -> list[Plot]:
 def _arm_plot(analysis: Analysis, name: str, measure: Measure) -> BarPlot:
     """Return means in both arms, over the pairs that each agent has scored."""
     groups, arm_means = [], []
-    for agent in analysis.agents:
+    for agent in analysis.paired_agents:
         keys = analysis.keys(agent)
-        if keys:
-            values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
-            groups.append(f"{agent}\n({len(keys)})")
-            arm_means.append(ClusterBootstrap(analysis.houses(keys, agent)).column_means(values))
+        groups.append(f"{agent}\n({len(keys)})")
+        bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
+        arm_means.append(bootstrap.column_means(analysis.values(agent, measure, keys)))
     series = tuple(Series.of(arm, [found[j] for found in arm_means]) for j, arm in enumerate(ARM_NAMES))
     note = "in parentheses: pairs; whiskers: 95%, bootstrap by house"
     return BarPlot(f"{name}, %", tuple(groups), series, notes=(note,), y_top=100.0, has_values=True)

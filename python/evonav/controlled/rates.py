@@ -48,8 +48,7 @@ def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[floa
     keys = rate_keys(analysis, agent)
     if not keys:
         return []
-    values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
-    found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(values)
+    found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(analysis.values(agent, measure, keys))
     return [(arm.evolve_probability, mean) for arm, mean in zip(analysis.record.arms, found, strict=True)]
 
 
@@ -58,15 +57,7 @@ def crossover(analysis: Analysis, agent: str, measure: Measure) -> Crossover | N
     keys = rate_keys(analysis, agent, BASELINE)
     if not keys or agent == BASELINE:
         return None
-    leads = np.array(
-        [
-            [
-                measure(analysis.outcomes[arm, agent][key]) - measure(analysis.outcomes[arm, BASELINE][key])
-                for arm in analysis.arms
-            ]
-            for key in keys
-        ]
-    )
+    leads = analysis.values(agent, measure, keys) - analysis.values(BASELINE, measure, keys)
     rates = np.array([arm.evolve_probability for arm in analysis.record.arms])
     bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
     drawn = bootstrap.resampled_sums(bootstrap.sums(np.column_stack([leads, np.ones(len(leads))])))

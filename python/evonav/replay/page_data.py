@@ -28,6 +28,7 @@ from evonav.replay.types import (
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, outcome_words
 from evonav.report.maps.svg import clean, cm, polyline, simplified
+from evonav.report.maps.trajectory import choice_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
@@ -270,14 +271,6 @@ def _entry(entry: ReplayedEntry, record: StageRecord) -> list[Any]:
 
 def _frontier(frontier: FrontierBelief) -> list[Any]:
     return [frontier.frontier_id, *cm(frontier.position_m), round(math.degrees(frontier.direction_rad))]
-
-
-def choice_words(record: RoundRecord) -> str:
-    """Return the agent's choice, as the agent names it."""
-    text = record.choice or record.action.kind.replace("_", " ")
-    if record.chosen_entry is not None:
-        text += f" ({noun_of(record.chosen_entry.label)})"
-    return f"{text}, stop" if record.action.kind == "stop" else text
 
 
 def _kind(record: RoundRecord | None) -> str:

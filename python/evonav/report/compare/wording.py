@@ -9,6 +9,7 @@ from evonav.report.tables.table import (
     INTERVALS,
     VERDICTS,
     Table,
+    effect_cells,
     latex_tables,
     markdown_tables,
     p_heading,
@@ -51,10 +52,8 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
             (
                 f"{one.b} less {one.a}",
                 f"{100 * sr.mean_a:.1f} to {100 * sr.mean_b:.1f}",
-                difference(sr, "success"),
-                p_words(sr.adjusted_p),
-                NONE if spl is None else difference(spl, "spl"),
-                NONE if spl is None else p_words(spl.adjusted_p),
+                *effect_cells(sr),
+                *effect_cells(spl),
                 str(one.all.n),
                 f"{one.all.num_only_b} / {one.all.num_only_a}",
                 NONE if sr.detectable is None else f"{100 * sr.detectable:.1f}",
@@ -88,9 +87,9 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     for one in comparisons:
         effect = one.all.effects.get(field)
         if effect is not None:
-            p = effect.adjusted_p
             shown = [f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
-            rows.append((f"{one.b} less {one.a}", *shown, difference(effect, field), p_words(p), says(one, field)))
+            cells = effect_cells(effect, scale_of(field))
+            rows.append((f"{one.b} less {one.a}", *shown, *cells, says(one, field)))
     columns = ("", "second", "first", "difference [95% CI]", p_heading(len(comparisons)), "")
     sizes = sorted({one.all.n for one in comparisons})
     return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
@@ -108,8 +107,7 @@ def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
                 part.label,
                 str(part.n),
                 *(f"{100 * mean:.1f}" for mean in (sr.mean_a, sr.mean_b)),
-                difference(sr, "success"),
-                p_words(sr.adjusted_p),
+                *effect_cells(sr),
             )
             for part, sr in effects
         )
@@ -143,8 +141,7 @@ def part_table(one: Comparison) -> Table:
         cells = [part.label, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
         cells += [f"{100 * sr.mean_a:.1f}", f"{100 * sr.mean_b:.1f}"]
         for field in fields:
-            effect = part.effects.get(field)
-            cells += [NONE, NONE] if effect is None else [difference(effect, field), p_words(effect.adjusted_p)]
+            cells += effect_cells(part.effects.get(field), scale_of(field))
         rows.append(tuple(cells))
     return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING))
 
@@ -193,7 +190,7 @@ def warnings(comparisons: Sequence[Comparison]) -> list[str]:
 def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 1) -> str:
     """Describe one difference in words."""
     p = f"p = {p_words(effect.adjusted_p)}".replace("= <", "< ")
-    measured = f"{difference(effect, field)}{' points' if field in RATES else ''}, {p}"
+    measured = f"{points(effect, scale_of(field))}{' points' if field in RATES else ''}, {p}"
     measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
     on = f"on {effect.n} stages of {effect.num_clusters} houses"
     verdict = effect.verdict
@@ -284,11 +281,6 @@ def comparison_latex(comparisons: Sequence[Comparison]) -> str:
     """Return the pairs and every pair's parts as tables for `booktabs`; sentences as comments."""
     lines = "".join(f"% {line}\n" for line in statements(comparisons))
     return lines + latex_tables([pair_table(comparisons), *(part_table(one) for one in comparisons)])
-
-
-def difference(effect: PairedEffect, field: str) -> str:
-    """Return the difference in points, or in the unit of a metric that is no rate."""
-    return points(effect, scale_of(field))
 
 
 def amount(value: float, field: str) -> str:

@@ -292,16 +292,19 @@ def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visit
     return f'<g class="{css}">{title(text)}<rect {box}/>{mark}</g>'
 
 
-def _choice(entry: RoundRecord) -> str:
-    """Describe what a round chose."""
+def choice_words(entry: RoundRecord, *, has_truth: bool = False) -> str:
+    """Describe what a round chose, and with `has_truth` whether the entry was stale and the action failed."""
     text = entry.choice or entry.action.kind.replace("_", " ")
     if entry.chosen_entry is not None:
-        text += f" ({noun_of(entry.chosen_entry.label)}{', stale' if entry.chosen_entry.is_stale else ''})"
+        stale = ", stale" if has_truth and entry.chosen_entry.is_stale else ""
+        text += f" ({noun_of(entry.chosen_entry.label)}{stale})"
     if entry.action.kind == "stop":
         text += ", stop"
-    if not entry.is_action_success:
-        text += ", action failed"
-    return text
+    return f"{text}, action failed" if has_truth and not entry.is_action_success else text
+
+
+def _choice(entry: RoundRecord) -> str:
+    return choice_words(entry, has_truth=True)
 
 
 def _ground(point_m: Sequence[float]) -> Point:

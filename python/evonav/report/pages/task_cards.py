@@ -49,15 +49,8 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
         name = clean(f"Map of stage {stage} for {agent}")
         opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
         drawn = opening + Markup(below + course(record, frame, run.success_radius_m) + "</svg>")  # noqa: S704
-        return {
-            "state": record.state.value,
-            "outcome": outcome_words(record),
-            "sentence": sentence(record),
-            "facts": _facts(record),
-            "rounds": rounds(record.trace),
-            "svg": drawn,
-            "href": hrefs.get((agent, task.task_id, stage)),
-        }
+        href = hrefs.get((agent, task.task_id, stage))
+        return {**stage_cell(record, drawn), "facts": _facts(record), "href": href}
 
     goals = []
     for stage in stages:
@@ -73,6 +66,17 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
         "goals": goals,
         "rows": [(agent, [cell_of(agent, stage) for stage in stages]) for agent in run.agents],
         "data": filter_data(run, task.task_id),
+    }
+
+
+def stage_cell(record: StageRecord, svg: Markup) -> dict[str, Any]:
+    """Return a stage of an agent as templates show it, below its map."""
+    return {
+        "state": record.state.value,
+        "outcome": outcome_words(record),
+        "sentence": sentence(record),
+        "rounds": rounds(record.trace),
+        "svg": svg,
     }
 
 

@@ -186,10 +186,8 @@ def paired_table(pairs: Sequence[AgentPair]) -> Table:
     rows = tuple(
         (
             f"{pair.b} less {pair.a}",
-            points(pair.sr),
-            p_words(pair.sr.adjusted_p),
-            points(pair.spl),
-            p_words(pair.spl.adjusted_p),
+            *effect_cells(pair.sr),
+            *effect_cells(pair.spl),
             str(pair.n),
             str(pair.num_only_b),
             str(pair.num_only_a),
@@ -213,6 +211,11 @@ def verdict_words(a: str, b: str, effect: PairedEffect) -> str:
         "a": f"{a} is ahead",
         "b": f"{b} is ahead",
     }[effect.verdict]
+
+
+def effect_cells(effect: PairedEffect | None, scale: float = 100) -> tuple[str, str]:
+    """Return a difference with its interval, by default in percentage points, and its adjusted p."""
+    return (NONE, NONE) if effect is None else (points(effect, scale), p_words(effect.adjusted_p))
 
 
 def p_heading(num_pairs: int) -> str:
