@@ -4,7 +4,6 @@ import math
 import subprocess
 import sys
 import warnings
-from dataclasses import replace
 from itertools import count
 
 import gymnasium
@@ -255,5 +254,5 @@ def test_wrong_settings_are_reported(tmp_path):
         LifelongNavEnv(tmp_path)
     with pytest.raises(InvalidArgumentError, match="no such task"):
         LifelongNavEnv().reset(options={"task": "house-9"})
-    assert replace(NavConfig(), max_steps=3).budget == 3
+    assert NavConfig(max_steps=3).budget == 3
     assert (NavConfig().budget, NavConfig(action_mode="waypoints").budget) == (500, 50)

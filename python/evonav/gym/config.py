@@ -1,8 +1,9 @@
 """Define the settings of an environment: camera, actions, observations, reward."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
@@ -13,7 +14,7 @@ ActionMode = Literal["actions", "waypoints"]
 WaypointFrame = Literal["relative", "polar", "start"]
 Reward = Literal["sparse", "spl", "progress"]
 
-OBSERVATIONS = (
+ObservationName = Literal[
     "depth",
     "rgb",
     "semantic",
@@ -25,7 +26,8 @@ OBSERVATIONS = (
     "steps_left",
     "is_action_success",
     "has_arrived",
-)
+]
+OBSERVATIONS: tuple[ObservationName, ...] = get_args(ObservationName)
 """Keys that an observation may have; docs/gym.md describes them."""
 ACTIONS = (Action.MOVE_FORWARD, Action.TURN_LEFT, Action.TURN_RIGHT, Action.STOP)
 """Discrete actions by number: AI2-THOR's MoveAhead, RotateLeft and RotateRight, and the end of the stage."""
@@ -36,63 +38,50 @@ SUCCESS_REWARD = 2.5
 """Reward of a success under `progress`: the value of habitat's point goal task."""
 
 
-@dataclass(frozen=True, slots=True)
-class NavConfig:
+class NavConfig(BaseModel):
     """Settings of an environment; `gymnasium.make` takes them by name."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     action_mode: ActionMode = "actions"
     """`actions`: one of `ACTIONS` a step. `waypoints`: a point to approach along the planner's waypoints."""
     waypoint_frame: WaypointFrame = "relative"
     """Meaning of the point's two numbers; see `evonav.gym.spaces.waypoint_m`."""
-    waypoint_range_m: float = 5.0
+    waypoint_range_m: float = Field(5.0, ge=0.01, le=100.0)
     """Length in metres of a number of 1."""
-    observations: tuple[str, ...] = tuple(name for name in OBSERVATIONS if name != "semantic")
-    width_px: int = 128
-    height_px: int = 128
-    hfov_deg: float = 90.0
+    observations: tuple[ObservationName, ...] = Field(
+        tuple(name for name in OBSERVATIONS if name != "semantic"), min_length=1
+    )
+    width_px: int = Field(128, ge=1, le=8192)
+    height_px: int = Field(128, ge=1, le=8192)
+    hfov_deg: float = Field(90.0, ge=1.0, le=170.0)
     """Horizontal field of view in degrees."""
-    turn_deg: float = SimulatorConfig().turn_deg
-    move_m: float = SimulatorConfig().move_m
-    max_steps: int | None = None
+    turn_deg: float = Field(SimulatorConfig().turn_deg, ge=1.0, le=180.0)
+    move_m: float = Field(SimulatorConfig().move_m, ge=0.01, le=10.0)
+    max_steps: int | None = Field(None, ge=1, le=1_000_000)
     """Number of steps of a stage; by default the protocol's, 500 actions or 50 waypoint rounds."""
-    success_radius_m: float = ProtocolConfig().success_radius_m
+    success_radius_m: float = Field(ProtocolConfig().success_radius_m, ge=0.01, le=100.0)
     reward: Reward = "progress"
-    reference_image_px: int = 300
+    reference_image_px: int = Field(300, ge=1, le=4096)
     """Side of `reference_image` in pixels; images of another size are resampled."""
     allow_unknown_assets: bool = False
     """Whether to draw assets that the catalogue lacks in the usual size of their category, not to refuse the house."""
     oracle_info: bool = False
     """Whether `info["oracle"]` contains the target. For debugging and imitation, never for evaluation."""
-    protocol: ProtocolConfig = field(default=ProtocolConfig(), repr=False)
+    protocol: ProtocolConfig = Field(ProtocolConfig(), repr=False)
 
-    def __post_init__(self) -> None:
-        """Check what the simulator does not.
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - the fields
+        """Check the settings.
 
         Raises:
-            InvalidArgumentError: A setting is out of range.
+            InvalidArgumentError: A setting does not exist, or is out of range.
         """
-        for name, choices in (("action_mode", ActionMode), ("waypoint_frame", WaypointFrame), ("reward", Reward)):
-            if getattr(self, name) not in get_args(choices):
-                expected = ", ".join(get_args(choices))
-                raise InvalidArgumentError(f"argument `{name}` is {getattr(self, name)!r}, expected one of {expected}")
-        unknown = [name for name in self.observations if name not in OBSERVATIONS]
-        if unknown or not self.observations:
-            expected = ", ".join(OBSERVATIONS)
-            raise InvalidArgumentError(f"argument `observations` holds {unknown!r}, expected some of {expected}")
-        for name, low, high in (
-            ("width_px", 1, 8192),
-            ("height_px", 1, 8192),
-            ("hfov_deg", 1.0, 170.0),
-            ("turn_deg", 1.0, 180.0),
-            ("move_m", 0.01, 10.0),
-            ("success_radius_m", 0.01, 100.0),
-            ("waypoint_range_m", 0.01, 100.0),
-            ("reference_image_px", 1, 4096),
-        ):
-            if not low <= getattr(self, name) <= high:
-                raise InvalidArgumentError(f"argument `{name}` is {getattr(self, name)}, expected {low} to {high}")
-        if self.max_steps is not None and not 1 <= self.max_steps <= 1_000_000:
-            raise InvalidArgumentError(f"argument `max_steps` is {self.max_steps}, expected 1 to 1000000")
+        try:
+            super().__init__(**settings)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            message = f"argument `{first['loc'][0]}` is {first['input']!r}: {first['msg']}"
+            raise InvalidArgumentError(message) from None
 
     @property
     def simulator(self) -> SimulatorConfig:

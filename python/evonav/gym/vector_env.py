@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -94,7 +94,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             InvalidArgumentError: A setting is out of range.
             TaskError: The folder has no tasks, or not the subset.
         """
-        self.config = replace(config or NavConfig(), **settings)
+        self.config = NavConfig(**(dict(config or NavConfig()) | settings))
         self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
         self.single_observation_space = spaces.observation_space(self.config)
         self.single_action_space = spaces.action_space(self.config)

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from pydantic import BaseModel, ConfigDict
-
 from evonav.errors import EvonavError
 from evonav.thor.actions import registry
-from evonav.thor.actions.registry import ActionError, ErrorCode
+from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode
 from evonav.thor.agent import Agent
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView, Images
@@ -22,10 +20,8 @@ _MAX_MESSAGE = 4000
 _logged: set[tuple[str, int | None]] = set()
 
 
-class Settings(BaseModel):
+class Settings(Arguments, extra="allow"):
     """The settings of `Initialize`, by AI2-THOR's names; the client also passes other keywords of its constructor."""
-
-    model_config = ConfigDict(extra="allow", allow_inf_nan=False, frozen=True)
 
     agentMode: str = "default"
     agentCount: int = 1
@@ -44,6 +40,8 @@ class Settings(BaseModel):
     renderDepthImage: bool = False
     renderInstanceSegmentation: bool = False
     renderSemanticSegmentation: bool = False
+    renderNormalsImage: bool = False
+    renderFlowImage: bool = False
     fastActionEmit: bool = False
     """Answer an action that changed nothing with its result alone."""
 

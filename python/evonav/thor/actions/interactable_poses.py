@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -72,19 +73,13 @@ def get_interactable_poses(
             f" and {num_tests} poses near {objectId}, more than {_MAX_TESTS}."
         )
     poses: list[Pose] = []
-    for horizon_deg in chosen[0]:
-        for is_standing in chosen[1]:
-            for yaw_deg in yaws_deg:
-                there = replace(agent, horizon_deg=horizon_deg, is_standing=is_standing, yaw_deg=yaw_deg % 360.0)
-                for position in near:
-                    there.x_m, there.y_m, there.z_m = position.x, position.y, position.z
-                    if _may_frame(engine, there, record) and objectId in objects.visible_ids(
-                        engine.scene, there, reach_m
-                    ):
-                        pose = {"rotation": yaw_deg, "standing": is_standing, "horizon": horizon_deg}
-                        poses.append(position.model_dump() | pose)
-                        if len(poses) >= maxPoses:
-                            return poses
+    for horizon_deg, is_standing, yaw_deg, at in product(*chosen, yaws_deg, near):
+        there = replace(agent, horizon_deg=horizon_deg, is_standing=is_standing, yaw_deg=yaw_deg % 360.0)
+        there.x_m, there.y_m, there.z_m = at.x, at.y, at.z
+        if _may_frame(engine, there, record) and objectId in objects.visible_ids(engine.scene, there, reach_m):
+            poses.append(at.model_dump() | {"rotation": yaw_deg, "standing": is_standing, "horizon": horizon_deg})
+            if len(poses) >= maxPoses:
+                break
     return poses
 
 

@@ -1,14 +1,10 @@
 """Set up a session: scenes, houses, settings, image sizes."""
 
-import reprlib
 from dataclasses import replace
-from typing import Any
-
-from pydantic import ValidationError
 
 from evonav.errors import EvonavError
 from evonav.thor import objects
-from evonav.thor.actions.registry import ActionError, ErrorCode, action
+from evonav.thor.actions.registry import ActionError, action
 from evonav.thor.agent import Agent, body_of
 from evonav.thor.engine import Engine, Settings
 from evonav.thor.events.images import FAR_M
@@ -68,7 +64,7 @@ def check_settings(settings: Settings) -> None:
     if settings.agentCount != 1:
         raise ActionError(f"agentCount {settings.agentCount}: this engine has one agent")
     for name in _MISSING_IMAGES:
-        if (settings.model_extra or {}).get(name):
+        if getattr(settings, name):
             raise ActionError(f"{name} is not supported by this engine")
     if settings.fieldOfView is not None and (settings.fieldOfView < 0 or settings.fieldOfView >= 180):
         raise ActionError("fov must be set to (0, 180) noninclusive.")
@@ -91,15 +87,8 @@ def check_settings(settings: Settings) -> None:
 
 
 @action("Initialize")
-def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
+def initialize(engine: Engine, wanted: Settings) -> dict[str, float]:
     """Set the settings; any keyword of the client's constructor is accepted."""
-    try:
-        wanted = Settings.model_validate(settings)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        name, value = first["loc"][0], reprlib.repr(first["input"])
-        problem = f"action: Initialize has an invalid argument: {name} (=={value}). {first['msg']}"
-        raise ActionError(problem, ErrorCode.INVALID_ARGUMENT) from error
     check_settings(wanted)
     body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
     before = engine.settings, engine.agent.body
