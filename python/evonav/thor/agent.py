@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from evonav.thor.actions.registry import ActionError, Vector3
-from evonav.world.pose import Pose
+from evonav.world.pose import Pose, canonical_deg, canonical_yaw_deg
 
 BODY_Y_M = 0.9009992
 """AI2-THOR's `agent.position.y` on a floor, in all of its agent modes."""
@@ -61,17 +61,6 @@ def body_of(agent_mode: str, max_upward_deg: float = 0.0, max_downward_deg: floa
     )
 
 
-def canonical_deg(angle_deg: float) -> float:
-    """Round an angle to 1e-4 degrees, so that degrees on the wire and radians inside name the same angle."""
-    return round(angle_deg, 4) + 0.0
-
-
-def canonical_yaw_deg(yaw_deg: float) -> float:
-    """Return a yaw in [0, 360), rounded to 1e-4 degrees."""
-    wrapped_deg = canonical_deg(yaw_deg % 360.0)
-    return wrapped_deg if wrapped_deg < 360.0 else 0.0
-
-
 class HousePose(BaseModel):
     """The start pose that a house gives for an agent mode."""
 
@@ -84,20 +73,6 @@ class HousePose(BaseModel):
 
 
 _POSES = TypeAdapter(dict[str, HousePose])
-
-
-def house_poses(house: Mapping[str, Any]) -> dict[str, HousePose]:
-    """Return `metadata.agentPoses` of a house, by agent mode.
-
-    Raises:
-        ActionError: The poses are malformed.
-    """
-    metadata = house.get("metadata")
-    poses = metadata.get("agentPoses") if isinstance(metadata, dict) else None
-    try:
-        return _POSES.validate_python(poses or {})
-    except ValidationError as error:
-        raise ActionError(f"CreateHouse: metadata.agentPoses: {error}") from error
 
 
 @dataclass(slots=True)
@@ -149,8 +124,16 @@ class Agent:
         """Take the pose that `metadata.agentPoses` of a house gives for the agent's mode; without one, stay.
 
         AI2-THOR's `setAgentPose` in `ProceduralTools` does the same. The client itself teleports to `metadata.agent`.
+
+        Raises:
+            ActionError: The house's poses are malformed.
         """
-        pose = house_poses(house).get(self.body.mode)
+        metadata = house.get("metadata")
+        poses = metadata.get("agentPoses") if isinstance(metadata, dict) else None
+        try:
+            pose = _POSES.validate_python(poses or {}).get(self.body.mode)
+        except ValidationError as error:
+            raise ActionError(f"CreateHouse: metadata.agentPoses: {error}") from error
         if pose is None:
             return
         if pose.position is not None:

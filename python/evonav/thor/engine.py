@@ -11,8 +11,8 @@ from evonav.thor.actions import registry
 from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode
 from evonav.thor.agent import Agent
 from evonav.thor.scene import Scene
-from evonav.world.camera import CameraView, Images
-from evonav.world.simulator import Frame, SimulatorConfig
+from evonav.world.camera import Images
+from evonav.world.simulator import SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
 # Maximal number of characters of an error message.
@@ -100,11 +100,6 @@ class Engine:
         )
 
     @property
-    def field_of_view_deg(self) -> float:
-        """Vertical field of view of the agent's camera."""
-        return self.scene.config.vertical_fov_deg
-
-    @property
     def camera_position_m(self) -> tuple[float, float, float]:
         """Position of the agent's camera, `(x, y, z)`."""
         if self.map_view is not None:
@@ -112,16 +107,11 @@ class Engine:
             return (at["x"], at["y"], at["z"])
         return self.agent.camera.position_m
 
-    def view(self, *, rgb: bool, instances: bool) -> Frame | Images:
+    def view(self, *, rgb: bool, instances: bool) -> Images:
         """Render the agent's camera, which crouching, a forced teleport or the map view may have moved."""
         if self.map_view is not None:
             return self.map_view.render(self.scene, rgb=rgb, instances=instances)
-        simulator, camera = self.scene.simulator, self.agent.camera
-        if camera.y_m == simulator.config.camera_height_m:
-            return simulator.render(self.agent.pose, rgb=rgb, instances=instances)
-        intrinsics = simulator.intrinsics
-        seen = CameraView(camera, intrinsics.width_px, intrinsics.height_px, intrinsics.vertical_fov_rad)
-        return Frame(camera, intrinsics, *simulator.render_camera(seen, rgb=rgb, instances=instances))
+        return self.scene.simulator.render_camera(self.scene.seen_from(self.agent.camera), rgb=rgb, instances=instances)
 
     def execute(self, message: Mapping[str, Any]) -> Result:
         """Execute one action. Every failure becomes a failed action, never an exception."""

@@ -21,7 +21,6 @@ from evonav.thor.agent import Agent
 from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
 from evonav.thor.geometry import Vec3, box_around, vector
 from evonav.thor.scene import Scene
-from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SceneObject
 
@@ -325,10 +324,9 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     """Return the ids of the objects that AI2-THOR calls visible, by `EmbeddedSimulator.visible_objects`."""
     if scene.house is None:
         return set()
-    simulator, camera = scene.simulator, scene.simulator.intrinsics
-    view = CameraView(agent.camera, camera.width_px, camera.height_px, camera.vertical_fov_rad)
     by_body = table_of(scene).by_body
-    return {by_body[body] for body in simulator.visible_objects(view, max_distance_m=distance_m)}
+    seen = scene.simulator.visible_objects(scene.seen_from(agent.camera), max_distance_m=distance_m)
+    return {by_body[body] for body in seen}
 
 
 def eye_m(agent: Agent) -> Vec3:

@@ -7,7 +7,9 @@ from itertools import count
 from typing import Any, TypeVar, cast
 
 from evonav.thor.actions.registry import ActionError
+from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
 Document = dict[str, Any]
@@ -73,6 +75,10 @@ class Scene:
         if config != self.config:
             self.config, self._simulator = config, None
             self.mark_changed()
+
+    def seen_from(self, camera: Pose) -> CameraView:
+        """Return the view of the agent's camera from a pose."""
+        return CameraView(camera, self.config.width_px, self.config.height_px, self.config.intrinsics.vertical_fov_rad)
 
     @property
     def simulator(self) -> EmbeddedSimulator:

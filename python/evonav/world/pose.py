@@ -38,12 +38,12 @@ class Pose:
     @property
     def yaw_deg(self) -> float:
         """Yaw in `[0, 360)`, rounded to 1e-4 degrees: the value for AI2-THOR."""
-        return _round_deg(math.degrees(self.yaw_rad) % 360.0) % 360.0
+        return canonical_yaw_deg(math.degrees(self.yaw_rad))
 
     @property
     def horizon_deg(self) -> float:
         """Horizon rounded to 1e-4 degrees: the value for AI2-THOR."""
-        return _round_deg(math.degrees(self.horizon_rad))
+        return canonical_deg(math.degrees(self.horizon_rad))
 
     def canonical(self) -> "Pose":
         """Return this pose with angles rounded to 1e-4 degrees and its yaw in `[0, 2 pi)`.
@@ -58,13 +58,19 @@ class Pose:
 
 def canonical_yaw_rad(yaw_rad: float) -> float:
     """Return a yaw in `[0, 2 pi)`, rounded to 1e-4 degrees; see `Pose.canonical`."""
-    return math.radians(_round_deg(math.degrees(yaw_rad) % 360.0) % 360.0)
+    return math.radians(canonical_yaw_deg(math.degrees(yaw_rad)))
 
 
 def canonical_horizon_rad(horizon_rad: float) -> float:
     """Round a horizon to 1e-4 degrees; see `Pose.canonical`."""
-    return math.radians(_round_deg(math.degrees(horizon_rad)))
+    return math.radians(canonical_deg(math.degrees(horizon_rad)))
 
 
-def _round_deg(angle_deg: float) -> float:
+def canonical_yaw_deg(yaw_deg: float) -> float:
+    """Return a yaw in `[0, 360)`, rounded to 1e-4 degrees."""
+    return canonical_deg(yaw_deg % 360.0) % 360.0
+
+
+def canonical_deg(angle_deg: float) -> float:
+    """Round an angle to 1e-4 degrees."""
     return round(angle_deg, _DECIMALS_DEG) + 0.0  # no negative zero

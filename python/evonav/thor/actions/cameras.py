@@ -168,7 +168,7 @@ def toggle_map_view(engine: Engine) -> None:
     seen = get_map_view_camera_properties(engine)
     at, size_m = seen["position"], seen["orthographicSize"]
     position_m = (at["x"], at["y"], at["z"])
-    fov_deg = engine.field_of_view_deg
+    fov_deg = engine.scene.config.vertical_fov_deg
     engine.map_view = ThirdPartyCamera(-1, position_m, (90.0, 0.0, 0.0), fov_deg, NEAR_M, FAR_M, True, size_m, None)
     engine.map_view_size_m = size_m
 

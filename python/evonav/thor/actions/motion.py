@@ -8,9 +8,9 @@ import math
 from collections.abc import Callable
 
 from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
-from evonav.thor.agent import canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import Point, Vec3, box_around, ground_gap_m
+from evonav.world.pose import canonical_deg, canonical_yaw_deg
 
 # AI2-THOR's parameters for objects in the agent's hand, other agents, and the motion of arms. They have no effect here.
 _UNUSED = {

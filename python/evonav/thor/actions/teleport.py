@@ -7,8 +7,9 @@ import math
 
 from evonav.thor.actions.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
 from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode, Vector3, action
-from evonav.thor.agent import BODY_Y_M, canonical_deg, canonical_yaw_deg
+from evonav.thor.agent import BODY_Y_M
 from evonav.thor.engine import Engine
+from evonav.world.pose import canonical_deg, canonical_yaw_deg
 
 _FLOAT32_MAX = 3.4028234663852886e38
 _GROUND_M = 0.05

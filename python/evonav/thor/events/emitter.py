@@ -12,7 +12,6 @@ from evonav.thor.events.metadata import pack_event, patch
 from evonav.thor.scene import Scene
 from evonav.thor.transport.fifo import Field, FieldType
 from evonav.world.camera import Images
-from evonav.world.simulator import Frame
 
 
 class Emitter:
@@ -81,12 +80,12 @@ class Emitter:
     def _rendered(self, kinds: ImageKinds) -> list[Field]:
         engine = self._engine
         palette = engine.scene.derived(palette_of)
-        views: list[Callable[..., Frame | Images]] = [engine.view]
+        views: list[Callable[..., Images]] = [engine.view]
         views += [partial(camera.render, engine.scene) for camera in engine.cameras]
         fields: list[Field] = []
         for index, render in enumerate(views):
             if engine.scene.house is None:
-                seen: Frame | Images = images.blank(engine.width_px, engine.height_px)
+                seen = images.blank(engine.width_px, engine.height_px)
             else:
                 seen = render(rgb=kinds.rgb, instances=kinds.needs_instances)
             fields += images.encode(seen, kinds, palette, is_third_party=index > 0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evonav.thor.scene import Scene
 from evonav.thor.transport.fifo import Field, FieldType
 from evonav.world.camera import Images
-from evonav.world.simulator import Frame, SceneObject
+from evonav.world.simulator import SceneObject
 
 FAR_M = 20.0
 """Depth in metres where nothing is in reach: the far plane of the agent's camera."""
@@ -57,7 +57,7 @@ _THIRD_PARTY = (
 )
 
 
-def encode(frame: Frame | Images, kinds: ImageKinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
+def encode(frame: Images, kinds: ImageKinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
     """Return the images of one camera, each with its field type."""
     rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
     far_m = np.inf if is_third_party else FAR_M  # a third-party camera has a far plane of its own

@@ -111,7 +111,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "screenWidth": engine.width_px,
         "screenHeight": engine.height_px,
         "depthFormat": "Meters",
-        "fov": engine.field_of_view_deg,
+        "fov": engine.scene.config.vertical_fov_deg,
         "cameraPosition": vector(engine.camera_position_m),
         "cameraOrthSize": engine.map_view_size_m,
         "thirdPartyCameras": [camera.metadata() for camera in engine.cameras],
