@@ -459,7 +459,8 @@ class BevMap:
     def collide(
         self, position_m: tuple[float, float], yaw_rad: float, *, start: int, length: int, width: int
     ) -> NDArray[np.int32]: ...
-    def grown(self, cells: NDArray[np.int32], radius: int) -> NDArray[np.int32]: ...
+    def grown(self, cells: NDArray[np.int32], radius: int) -> NDArray[np.int32]:
+        """Return the cells within `radius` cells of some, sorted, each once; those off the map are left out."""
     def frontiers(self, *, obstacle_radius: int, min_cells: int) -> NDArray[np.int32]: ...
     def choose_frontier(
         self,
@@ -494,13 +495,17 @@ class BevMap:
     @property
     def corner_m(self) -> tuple[float, float]: ...
     @property
-    def obstacles(self) -> NDArray[np.bool_]: ...
+    def obstacles(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: True where an obstacle was ever seen."""
     @property
-    def explored(self) -> NDArray[np.bool_]: ...
+    def explored(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: True where anything was seen, at any height."""
     @property
-    def visited(self) -> NDArray[np.bool_]: ...
+    def visited(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: True where the agent has been."""
     @property
-    def collisions(self) -> NDArray[np.bool_]: ...
+    def collisions(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: True where moves have failed."""
 
 # camera
 

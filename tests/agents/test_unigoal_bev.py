@@ -53,7 +53,7 @@ def test_a_table_is_an_obstacle_where_it_stands(yaw_deg: float, horizon_deg: flo
     x_m, z_m = 2.0 * math.sin(yaw_rad), 2.0 * math.cos(yaw_rad)
     box = (x_m - 0.4, x_m + 0.4, z_m - 0.4, z_m + 0.4)
     bev.integrate(floor_and_box(yaw_rad, math.radians(horizon_deg), box))
-    obstacles = where(bev.obstacles, bev)
+    obstacles = where(bev.core.obstacles, bev)
     assert len(obstacles) > 15
     assert np.abs(obstacles - (x_m, z_m)).max() < 0.4 + 0.05
     # Its near side is there from end to end; the floor before it is free, where the camera sees any.
@@ -63,17 +63,17 @@ def test_a_table_is_an_obstacle_where_it_stands(yaw_deg: float, horizon_deg: flo
     assert free is not None
     assert bev.cells[free] == (FREE if horizon_deg else UNKNOWN)
     assert bev.cells[0, 0] == UNKNOWN
-    assert bev.cells[tuple(np.argwhere(bev.obstacles)[0])] == BLOCKED
+    assert bev.cells[tuple(np.argwhere(bev.core.obstacles)[0])] == BLOCKED
 
 
 def test_a_table_that_was_moved_away_stays_on_the_map() -> None:
     bev = BevMap((0.0, 0.0), 0)
     bev.integrate(floor_and_box(0.0, 0.5, (-0.4, 0.4, 1.6, 2.4)))
-    before = bev.obstacles
+    before = bev.core.obstacles
     bev.integrate(floor_and_box(0.0, 0.5, None))
     assert before.any()
-    assert np.array_equal(bev.obstacles, before)
-    assert bev.explored[before].all()
+    assert np.array_equal(bev.core.obstacles, before)
+    assert bev.core.explored[before].all()
 
 
 def test_categories_count_points_among_the_obstacles_and_keep_their_maximum() -> None:
@@ -86,7 +86,7 @@ def test_categories_count_points_among_the_obstacles_and_keep_their_maximum() ->
     bev.integrate(view, categories)
     table = bev.core.category(2)
     assert table.max() == 1.0
-    assert ((table > 0) <= bev.obstacles).all()
+    assert ((table > 0) <= bev.core.obstacles).all()
     # Floor is below the obstacles: it counts for no category.
     assert not bev.core.category(0).any()
     assert not bev.core.category(1).any()
@@ -103,7 +103,7 @@ def test_the_cells_of_a_mask_are_where_its_pixels_lie() -> None:
     points = np.array([bev.centre_of((int(row), int(col))) for row, col in cells])
     assert np.abs(points - (0.0, 2.0)).max() < 0.43
     assert len(bev.cells_of(view, np.zeros((300, 300), np.bool_))) == 0
-    grown = bev.grown(cells[:1], 3)
+    grown = bev.core.grown(cells[:1], 3)
     assert len(grown) == 29  # the disk of radius 3
     assert np.hypot(*(grown - cells[0]).T).max() == 3.0
 
@@ -128,4 +128,4 @@ def test_bad_images_are_refused_by_name() -> None:
         bev.cells_of(view, np.zeros((3, 3), np.bool_))
     with pytest.raises(InvalidArgumentError, match="stride_px"):
         BevMap((0.0, 0.0), 2, BevConfig(stride_px=0))
-    assert not bev.explored.any()
+    assert not bev.core.explored.any()

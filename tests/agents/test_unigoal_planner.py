@@ -59,7 +59,7 @@ def test_exploring_sees_both_rooms_without_bumping_much():
         walk.step("explore", "exploration")
     free = walk.simulator.reachable_positions()
     cells = [walk.bev.cell_of((float(x), float(z))) for x, _, z in free]
-    assert np.mean([walk.bev.explored[cell] for cell in cells]) > 0.95
+    assert np.mean([walk.bev.core.explored[cell] for cell in cells]) > 0.95
     assert walk.num_bumps <= 6
 
 
@@ -134,7 +134,7 @@ def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
     for _ in range(3):
         planner.observe(pose, action=Action.TURN_LEFT)
         planner.observe(pose, action=Action.MOVE_FORWARD)
-        rows, cols = np.nonzero(bev.collisions)
+        rows, cols = np.nonzero(bev.core.collisions)
         widths.append((np.ptp(rows) + 1, np.ptp(cols) + 1))
         centres = np.array([bev.centre_of((int(r), int(c))) for r, c in zip(rows, cols, strict=True)])
         assert centres[:, 1].min() > 0.1
@@ -155,11 +155,11 @@ def test_a_move_that_gets_on_is_no_collision():
     planner = UniGoalPlanner(bev, 0)
     for z_m in (0.0, 0.25, 0.5):
         planner.observe(Pose(0.0, 0.9, z_m, 0.0), action=Action.MOVE_FORWARD)
-    assert not bev.collisions.any()
-    rows = np.flatnonzero(bev.visited.any(axis=1))
+    assert not bev.core.collisions.any()
+    rows = np.flatnonzero(bev.core.visited.any(axis=1))
     assert np.array_equal(rows, np.arange(rows[0], rows[0] + 11))
     planner.observe(Pose(0.0, 0.9, 0.6, 0.0), action=Action.MOVE_FORWARD)  # only 0.1 m on: a strip of width 1
-    assert bev.collisions.sum() == 2
+    assert bev.core.collisions.sum() == 2
 
 
 def test_moves_that_were_not_its_own_tell_nothing_of_obstacles():
@@ -167,7 +167,7 @@ def test_moves_that_were_not_its_own_tell_nothing_of_obstacles():
     planner = UniGoalPlanner(bev, 0)
     for _ in range(4):
         planner.observe(START, action=None)
-    assert not bev.collisions.any()
+    assert not bev.core.collisions.any()
     assert not planner.is_stuck
 
 
@@ -207,7 +207,7 @@ def test_a_loop_of_failed_moves_is_left():
             break
     assert step.action is Action.STOP
     assert 1 <= walk.num_bumps <= 12
-    assert walk.bev.collisions.any()
+    assert walk.bev.core.collisions.any()
 
 
 @pytest.mark.parametrize("kind", ["exploration", "confirmed"])

@@ -142,7 +142,7 @@ def test_memories_place_objects_where_they_are_at_any_camera_height(camera_heigh
     assert len(entries.entries) > 3
     for entry in entries.entries:
         assert is_of_a_body(entries.points_m(entry.id), entry.label, simulator.objects), entry.label
-    assert 0.0 < bev.obstacles.sum() < 0.5 * bev.explored.sum(), "the floor is no obstacle"
+    assert 0.0 < bev.core.obstacles.sum() < 0.5 * bev.core.explored.sum(), "the floor is no obstacle"
 
 
 def is_of_a_body(points_m, label, bodies):

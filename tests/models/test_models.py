@@ -41,22 +41,22 @@ def assert_same(batch: list[Boxes], single: list[Boxes]) -> None:
 
 @pytest.fixture
 def grounding_dino(tiny_models: Path) -> transformers_models.GroundingDino:
-    return transformers_models.load_grounding_dino(str(tiny_models / "IDEA-Research/grounding-dino-tiny"), "cpu")
+    return transformers_models.GroundingDino.load(str(tiny_models / "IDEA-Research/grounding-dino-tiny"), "cpu")
 
 
 @pytest.fixture
 def owlv2(tiny_models: Path) -> transformers_models.Owlv2:
-    return transformers_models.load_owlv2(str(tiny_models / "google/owlv2-base-patch16-ensemble"), "cpu")
+    return transformers_models.Owlv2.load(str(tiny_models / "google/owlv2-base-patch16-ensemble"), "cpu")
 
 
 @pytest.fixture
 def sam(tiny_models: Path) -> transformers_models.Sam:
-    return transformers_models.load_sam(str(tiny_models / "facebook/sam-vit-large"), "cpu")
+    return transformers_models.Sam.load(str(tiny_models / "facebook/sam-vit-large"), "cpu")
 
 
 @pytest.fixture
 def clip(tiny_models: Path) -> transformers_models.Clip:
-    return transformers_models.load_clip(str(tiny_models / "laion/CLIP-ViT-B-32-laion2B-s34B-b79K"), "cpu")
+    return transformers_models.Clip.load(str(tiny_models / "laion/CLIP-ViT-B-32-laion2B-s34B-b79K"), "cpu")
 
 
 def test_grounding_dino_finds_words_and_a_batch_is_its_images_one_by_one(grounding_dino, images) -> None:
@@ -165,9 +165,9 @@ def test_mask_rcnn_finds_cocos_categories_in_unigoals_words(images) -> None:
 
 def test_models_are_loaded_once_a_process(tiny_models: Path) -> None:
     path = str(tiny_models / "facebook/sam-vit-large")
-    assert transformers_models.load_sam(path, "cpu") is transformers_models.load_sam(path, "cpu")
+    assert transformers_models.Sam.load(path, "cpu") is transformers_models.Sam.load(path, "cpu")
     other = str(tiny_models / "facebook/sam-vit-huge")
-    assert transformers_models.load_sam(path, "cpu") is not transformers_models.load_sam(other, "cpu")
+    assert transformers_models.Sam.load(path, "cpu") is not transformers_models.Sam.load(other, "cpu")
 
 
 def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_file_that_is_no_model_is_refused(tmp_path: Path) -> None:
     with pytest.raises(PerceptionError, match=r"mask\.pth: cannot be loaded as Mask R-CNN .* get the file again"):
         torchvision_models.load_mask_rcnn(str(bad), "cpu")
     with pytest.raises(PerceptionError, match="cannot be loaded as SAM"):
-        transformers_models.load_sam(str(tmp_path), "cpu")
+        transformers_models.Sam.load(str(tmp_path), "cpu")
 
 
 def test_devices_are_found_or_refused() -> None:

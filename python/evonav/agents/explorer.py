@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from evonav.decision.candidates import Point2
 from evonav.memory import Frontier, FrontierConfig, OccupancyMap
-from evonav.memory.occupancy import FREE, UNKNOWN
+from evonav.memory.occupancy import UNKNOWN
 from evonav.sensors.observation import MapFrame, Observation
 
 
@@ -129,22 +129,14 @@ class Explorer:
         """Note that the agent goes elsewhere: its arrival says nothing about a frontier."""
         self._last = None
 
-    def is_free(self, point_m: Point2) -> bool:
-        """Return whether the map knows the cell of a point to be free."""
-        frame = self.map.map_frame
-        row = math.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m)
-        col = math.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m)
-        return 0 <= row < frame.rows and 0 <= col < frame.cols and bool(self.map.cells[row, col] == FREE)
-
 
 def _eroded(cells: NDArray[np.bool_], margin_cells: int) -> NDArray[np.bool_]:
     """Return the cells whose neighbours up to `margin_cells` rows and columns away are all set, too."""
-    for _ in range(margin_cells):
-        padded = np.pad(cells, 1)
-        shifts = range(3)
-        rows, cols = cells.shape
-        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in shifts for c in shifts])
-    return cells
+    from scipy.ndimage import binary_erosion
+
+    width = 2 * margin_cells + 1
+    eroded: NDArray[np.bool_] = binary_erosion(cells, np.ones((width, width), np.bool_))
+    return eroded
 
 
 def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:

@@ -7,7 +7,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from evonav.agents.agent import NavigateTo
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
@@ -114,17 +113,6 @@ class Navigator:
         if math.dist(centre_m, target.centre_m) > self.config.aim_again_m:
             goal_m = self.observation_point(centre_m) or target.goal_m
             self.target = Target(entry.id, goal_m, centre_m)
-
-    def approach(self, target: Target) -> NavigateTo:
-        """Commit to a target and continue towards it."""
-        self.target = target
-        self.explorer.stop_exploring()
-        return NavigateTo(target.goal_m, face_m=target.centre_m)
-
-    def go_to_frontier(self, frontier: Frontier) -> NavigateTo:
-        """Continue towards a frontier, without a commitment."""
-        position_m, face_m = self.explorer.go_to(frontier)
-        return NavigateTo(position_m, face_m=face_m)
 
     def candidate(self, entry: ObjectEntry) -> ObjectCandidate:
         """Return an entry of the object memory as questions describe it, without images."""

@@ -6,7 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from evonav.agents.agent import AgentAction, Belief, EntryBelief, FrontierBelief, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import (
+    AgentAction,
+    Belief,
+    EntryBelief,
+    FrontierBelief,
+    NavigateTo,
+    RoundDiagnostics,
+    Sensing,
+    Stop,
+)
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import FrontierCandidate, Pixels, Point2
 from evonav.decision.query import QuerySession
@@ -69,12 +78,17 @@ class NavigatorAgent(ABC):
         return [navigator.frontier_candidate(f, here, with_images=with_images) for f in navigator.explorer.frontiers]
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:
+        """Commit to a target and continue towards it."""
         self._record_round(f"object {target.entry_id}", reason, target.entry_id)
-        return self._navigator.approach(target)
+        self._navigator.target = target
+        self._navigator.explorer.stop_exploring()
+        return NavigateTo(target.goal_m, face_m=target.centre_m)
 
     def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
+        """Continue towards a frontier, without a commitment."""
         self._record_round(f"frontier {frontier.id}", reason)
-        return self._navigator.go_to_frontier(frontier)
+        position_m, face_m = self._navigator.explorer.go_to(frontier)
+        return NavigateTo(position_m, face_m=face_m)
 
     def _stop(self, reason: str, entry_id: int | None = None) -> AgentAction:
         self._record_round("none" if entry_id is None else f"object {entry_id}", reason, entry_id)

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -79,7 +80,7 @@ def generate_controlled(
         "options": options.as_json(),
     }
     out = out.resolve()
-    with writing(out), Journal(out, run) as journal:
+    with writing(out), closing(Journal(out, run)) as journal:
         lost = [index for index, done in journal.outcomes.items() if not _is_whole(done, out, options)]
         journal.drop(lost)
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house

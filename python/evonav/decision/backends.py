@@ -6,12 +6,19 @@ how the model is reached are `decision_host_options`. A key is neither: it is re
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
+from evonav.decision.custom_model import CustomClient, load_custom_model
+from evonav.decision.noisy import NoiseRates, Noisy
 from evonav.decision.question import DecisionModel
-
-if TYPE_CHECKING:  # the text matcher loads none of this
-    from evonav.decision.vlm.client import VlmConfig
+from evonav.decision.text.matcher import TextMatch
+from evonav.decision.vlm.account import Account, Price
+from evonav.decision.vlm.client import VlmClient, VlmConfig
+from evonav.decision.vlm.counting import Counting
+from evonav.decision.vlm.decision import VlmDecision
+from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.response_cache import ResponseCache
+from evonav.errors import InvalidArgumentError
 
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
@@ -30,8 +37,6 @@ def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> Decisi
         seed: Seed of the agent.
         noise: Rates of mistakes, by the names of `NoiseRates`; all models accept them.
     """
-    from evonav.decision.text.matcher import TextMatch
-
     return _with_noise(TextMatch(), noise, seed)
 
 
@@ -74,12 +79,6 @@ def vlm(
         InvalidArgumentError: An option makes no sense.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.vlm.account import Account, Price
-    from evonav.decision.vlm.client import VlmClient
-    from evonav.decision.vlm.decision import VlmDecision
-    from evonav.decision.vlm.ledger import Ledger
-    from evonav.decision.vlm.response_cache import ResponseCache
-
     store = None if cache is None else ResponseCache(Path(cache))
     config = vlm_config(model, request, server)
     booked = Account(
@@ -119,12 +118,6 @@ def own(
         InvalidArgumentError: It cannot be imported or made, or is none such.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.custom_model import CustomClient, load_custom_model
-    from evonav.decision.vlm.account import Account
-    from evonav.decision.vlm.decision import VlmDecision
-    from evonav.decision.vlm.ledger import Ledger
-    from evonav.decision.vlm.response_cache import ResponseCache
-
     model = load_custom_model(path, seed)
     if hasattr(model, "answer"):
         return _with_noise(cast("DecisionModel", model), noise, seed)
@@ -146,11 +139,6 @@ def counting(
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
-    from evonav.decision.text.matcher import TextMatch
-    from evonav.decision.vlm.client import VlmClient
-    from evonav.decision.vlm.counting import Counting
-    from evonav.decision.vlm.ledger import Ledger
-
     client = VlmClient(vlm_config(model, request))
     is_json = structured != "off"
     counted = Counting(TextMatch(), client, Ledger(ledger), str(seed), needs_images=images, is_json=is_json)
@@ -160,22 +148,17 @@ def counting(
 def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: int) -> DecisionModel:
     if not noise:
         return model
-    from evonav.decision.noisy import NoiseRates, Noisy
-
     return Noisy(model, NoiseRates.read(noise), seed)
 
 
 def vlm_config(
     model: str, request: Mapping[str, Any] | None = None, server: Mapping[str, Any] | None = None
-) -> "VlmConfig":
+) -> VlmConfig:
     """Return the configuration of a client, with `SAMPLING` for missing fields.
 
     Raises:
         InvalidArgumentError: A name is unknown, or a value makes no sense.
     """
-    from evonav.decision.vlm.client import VlmConfig
-    from evonav.errors import InvalidArgumentError
-
     try:
         return VlmConfig(model, **{**SAMPLING, **(request or {}), **(server or {})})
     except TypeError as error:

@@ -68,9 +68,9 @@ class Question(ABC, Generic[A]):
             AnswerError: `invalid`: against the grammar, or it names no candidate.
         """
 
-    @abstractmethod
     def answer_text(self, answer: A) -> str:
-        """Return an answer as a model should give it: `parse(answer_text(answer)) == answer`."""
+        """Return an answer as a model should give it: `parse(answer_text(answer)) == answer`; by default its `str`."""
+        return str(answer)
 
     def answer_schema(self) -> Mapping[str, Any]:
         """Return the JSON Schema of an answer: one line, or an array of lines."""

@@ -11,6 +11,7 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Set
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -120,7 +121,7 @@ def generate_dataset(
         "options": options.model_dump(mode="json"),
     }
     out = out.resolve()  # workers of a cluster have other working directories
-    with writing(out), Journal(out, identity) as journal:
+    with writing(out), closing(Journal(out, identity)) as journal:
         journal.drop(_lost_houses(journal, out, retry_failed))
         run = _Run(journal, texts, limit, on_progress)
         run.report_progress()

@@ -8,7 +8,6 @@ the only record of progress: `dataset.json` is derived from it.
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, get_args
 
 from pydantic import NonNegativeInt, ValidationError
@@ -126,16 +125,6 @@ class Journal:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> "Journal":
-        """Return the journal."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the file."""
-        self.close()
 
     def _read(self, folder: Path) -> None:
         num_bytes = 0

@@ -246,22 +246,22 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
         return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
     from evonav.perception.models import transformers_models
 
-    masker = transformers_models.load_sam(paths["sam"], on)
+    masker = transformers_models.Sam.load(paths["sam"], on)
     if stack == "transformers":
         min_confidence = _either(config.min_confidence, 0.3)
         detector = PromptedDetector(
-            transformers_models.load_owlv2(paths["detector"], on),
+            transformers_models.Owlv2.load(paths["detector"], on),
             masker,
             phrases,
             min_confidence,
             _either(min_score, -math.inf),
         )
-        embedder = transformers_models.load_clip(paths["clip"], on)
+        embedder = transformers_models.Clip.load(paths["clip"], on)
         return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
     from evonav.perception.models.torchvision_models import load_mask_rcnn
 
     grounded = PromptedDetector(
-        transformers_models.load_grounding_dino(paths["detector"], on),
+        transformers_models.GroundingDino.load(paths["detector"], on),
         masker,
         DINO_UNIGOAL,
         _either(config.min_confidence, 0.3),

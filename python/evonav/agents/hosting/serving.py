@@ -18,6 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Literal
 
 from evonav.agents.agent import Agent, ExplainingAgent
@@ -199,7 +200,10 @@ class _Server:
     def do_costs(self) -> dict[str, bytes]:
         """Return the decision model's costs since it was made, and this process's peak memory."""
         assert self._decision is not None, "`make` comes first"
-        return {"costs": wire.COSTS.write({**self._decision.costs(), **_peak_rss()})}
+        costs, peak_mb = self._decision.costs(), peak_memory_mb()
+        if peak_mb is not None:
+            costs["agent_peak_rss_mb"] = peak_mb
+        return {"costs": wire.COSTS.write(costs)}
 
     def _sensing(self) -> dict[str, bytes]:
         return {"sensing": wire.SENSING.write(self.agent.sensing)}
@@ -209,14 +213,14 @@ def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) 
     return wire.FAILURE.write(wire.Failure(kind, message, traceback_of(error)))
 
 
-def _peak_rss() -> dict[str, float]:
-    """Return the peak of the resident memory; empty where the system does not report it."""
+def peak_memory_mb(process: int | str = "self") -> float | None:
+    """Return the peak of a process's resident memory; `None` where the system does not report it."""
     try:
-        with open("/proc/self/status") as status:  # noqa: PTH123 - a system file, read often
-            found = next((line.split()[1] for line in status if line.startswith("VmHWM")), None)
+        status = Path(f"/proc/{process}/status").read_text()
     except OSError:
-        found = None
-    return {} if found is None else {"agent_peak_rss_mb": int(found) / 1024}
+        return None
+    found = next((line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")), None)
+    return None if found is None else int(found) / 1024
 
 
 def _limit_memory(memory_mb: int) -> None:

@@ -155,8 +155,10 @@ class UniGoal:
 
     def _somewhere(self, bev: BevMap, planner: UniGoalPlanner, pose: Pose) -> Point2 | None:
         """Return a random place to go to when nothing is left to explore; `None` if ten draws give no reachable one."""
-        open_cells = bev.explored
-        blocked = bev.grown(np.ascontiguousarray(np.argwhere(bev.obstacles), np.int32), planner.config.obstacle_radius)
+        open_cells = bev.core.explored
+        blocked = bev.core.grown(
+            np.ascontiguousarray(np.argwhere(bev.core.obstacles), np.int32), planner.config.obstacle_radius
+        )
         open_cells[blocked[:, 0], blocked[:, 1]] = False
         rows, cols = np.nonzero(open_cells)
         for _ in range(_NUM_DRAWS if len(rows) else 0):

@@ -62,7 +62,7 @@ class BevMap:
             num_categories=num_categories,
             **asdict(config),
         )
-        """The map in Rust, on which the planner works."""
+        """The map in Rust: what was seen, where the agent has been and collided, and paths."""
         rows, cols = self.core.shape
         self.map_frame = MapFrame(rows, cols, config.cell_m, self.core.corner_m)
 
@@ -108,34 +108,10 @@ class BevMap:
         (x_m, z_m), cell_m = self.map_frame.corner_m, self.map_frame.cell_m
         return (x_m + (cell[1] + 0.5) * cell_m, z_m + (cell[0] + 0.5) * cell_m)
 
-    def grown(self, cells: Cells, radius: int) -> Cells:
-        """Return the cells within `radius` cells of some, sorted, each once; those off the map are left out."""
-        return self.core.grown(cells, radius)
-
-    @property
-    def obstacles(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: True where an obstacle was ever seen."""
-        return self.core.obstacles
-
-    @property
-    def explored(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: True where anything was seen, at any height."""
-        return self.core.explored
-
-    @property
-    def visited(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: True where the agent has been."""
-        return self.core.visited
-
-    @property
-    def collisions(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: True where moves have failed."""
-        return self.core.collisions
-
     @property
     def cells(self) -> NDArray[np.uint8]:
         """`(R, C)`: `UNKNOWN`, `FREE` or `BLOCKED`, as in other maps."""
         cells = np.full(self.core.shape, UNKNOWN, np.uint8)
-        cells[self.explored | self.visited] = FREE
-        cells[self.obstacles | self.collisions] = BLOCKED
+        cells[self.core.explored | self.core.visited] = FREE
+        cells[self.core.obstacles | self.core.collisions] = BLOCKED
         return cells

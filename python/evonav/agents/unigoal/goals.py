@@ -8,6 +8,7 @@ import numpy as np
 from evonav.agents.unigoal.bev import BevMap, Cells
 from evonav.agents.unigoal.planner import UniGoalPlanner
 from evonav.decision.candidates import Point2
+from evonav.memory.views import boxes_of
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE
 from evonav.world.pose import Pose
@@ -78,7 +79,7 @@ class GoalWatch:
         present = self.temporary
         if present is None or present.source == "graph" or not self._has_way:
             return True
-        around = self._bev.grown(present.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
+        around = self._bev.core.grown(present.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
         cols = self._bev.map_frame.cols
         return bool(np.isin(found.cells @ (cols, 1), around @ (cols, 1)).any())
 
@@ -138,14 +139,10 @@ def largest_detection(view: View, category: str) -> np.ndarray[tuple[int, int], 
     """
     found = view.detections
     best: tuple[int, int] | None = None
-    for index, label in enumerate(found.labels):
-        if CATEGORY_OF_TYPE.get(label) != category:
+    for index, (label, (_, (left, top, right, bottom))) in enumerate(zip(found.labels, boxes_of(found), strict=True)):
+        box_px = (right - left) * (bottom - top)
+        if CATEGORY_OF_TYPE.get(label) != category or box_px <= (0 if best is None else best[0]):
             continue
-        mask = found.masks == index
-        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if not len(rows) or not np.isfinite(view.depth_m[mask]).any():
-            continue
-        box_px = int((rows[-1] - rows[0] + 1) * (cols[-1] - cols[0] + 1))
-        if best is None or box_px > best[0]:
+        if np.isfinite(view.depth_m[found.masks == index]).any():
             best = (box_px, index)
     return None if best is None else found.masks == best[1]

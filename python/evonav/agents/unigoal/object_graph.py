@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+import numpy as np
+
 from evonav.decision.candidates import ObjectCandidate, Point2, Point3
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
 from evonav.sensors.observation import View
@@ -193,22 +195,15 @@ class ObjectGraph:
         return {room: self._clusters(nodes) for room, nodes in rooms.items()}
 
     def _clusters(self, nodes: Sequence[SceneNode]) -> list[Group]:
+        from scipy.sparse.csgraph import connected_components
+
         cell_m = self.config.group_cell_m
-        reach = round(self.config.group_eps_m / cell_m)
-        cells = [tuple(math.floor(value / cell_m) for value in node.ground_m) for node in nodes]
-        left = set(range(len(nodes)))
-        groups = []
-        while left:
-            member, queue = [], [min(left)]
-            left.discard(queue[0])
-            while queue:
-                here = queue.pop()
-                member.append(here)
-                near = [i for i in left if math.dist(cells[here], cells[i]) <= reach]
-                left.difference_update(near)
-                queue.extend(near)
-            groups.append(Group(tuple(nodes[i] for i in sorted(member))))
-        return groups
+        cells = np.floor(np.array([node.ground_m for node in nodes]) / cell_m)
+        apart = np.linalg.norm(cells[:, None] - cells, axis=2)
+        num_groups, group_of = connected_components(apart <= round(self.config.group_eps_m / cell_m), directed=False)
+        return [
+            Group(tuple(nodes[i] for i in np.flatnonzero(group_of == group).tolist())) for group in range(num_groups)
+        ]
 
     def neighbourhood(self, node_ids: Sequence[int], num_hops: int, reach_m: float) -> list[SceneNode]:
         """Return the nodes within some hops of others, along edges no longer than `reach_m`, by ascending id.

@@ -155,7 +155,7 @@ class UniGoalPlanner:
 
     def blacklist(self, cells: Cells) -> None:
         """Reject goal cells, grown by `blacklist_radius`, for the rest of the stage."""
-        grown = self.bev.grown(cells, self.config.blacklist_radius)
+        grown = self.bev.core.grown(cells, self.config.blacklist_radius)
         self._blacklist.update((int(row), int(col)) for row, col in grown)
 
     @property
@@ -208,12 +208,6 @@ class UniGoalPlanner:
             self.counters["targets"] += 1
             self.target_m = bev.centre_of(chosen[0])
         return self.target_m
-
-    def frontiers(self) -> Cells:
-        """Return the frontier cells of the present map."""
-        return self.bev.core.frontiers(
-            obstacle_radius=self.config.frontier_obstacle_radius, min_cells=self.config.min_frontier_cells
-        )
 
     def distance_m(self, pose: Pose, goal: Cells) -> float | None:
         """Return the path length from the agent to goal cells grown by `object_radius`.
@@ -317,7 +311,7 @@ class UniGoalPlanner:
 
     def _visited_place(self, pose: Pose) -> Point2 | None:
         """Return a random place where the agent has been, farther than `stuck_cells` away if there is one."""
-        cells = np.argwhere(self.bev.visited)
+        cells = np.argwhere(self.bev.core.visited)
         here = self.bev.cell_of((pose.x_m, pose.z_m))
         if here is None or not len(cells):
             return None

@@ -70,10 +70,6 @@ class DescribeQuestion(Question[str]):
             raise AnswerError("invalid", "no description", text)
         return line
 
-    def answer_text(self, answer: str) -> str:
-        """Return the sentence."""
-        return answer
-
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
         """Return the category alone: rules do not see images."""
         return f"the {canonical(self.goal.category)}", "images are not looked at"
@@ -276,10 +272,6 @@ class CategoryQuestion(ClosedQuestion[str]):
         if line not in self.choices():
             raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
         return line
-
-    def answer_text(self, answer: str) -> str:
-        """Return the category."""
-        return answer
 
     def choices(self) -> Sequence[str]:
         """Return the categories, and `none`."""

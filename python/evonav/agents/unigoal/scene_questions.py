@@ -133,10 +133,6 @@ class RoomQuestion(ClosedQuestion[str]):
             raise AnswerError("invalid", f"names {len(named)} of the rooms: {line[:80]!r}", text)
         return named[0]
 
-    def answer_text(self, answer: str) -> str:
-        """Return the room."""
-        return answer
-
     def choices(self) -> Sequence[str]:
         """Return the rooms."""
         return self.rooms

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean
-from evonav.agents.hosting.serving import LENGTH
+from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
@@ -119,12 +119,7 @@ class AgentProcess:
     @property
     def memory_mb(self) -> float | None:
         """Peak resident memory; `None` if the process has ended or the system does not report it."""
-        try:
-            status = Path(f"/proc/{self._process.pid}/status").read_text()
-        except OSError:
-            return None
-        found = next((line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")), None)
-        return None if found is None else int(found) / 1024
+        return peak_memory_mb(self._process.pid)
 
     def describe(self, label: str) -> None:
         """Set the label of the agent's output in the log."""

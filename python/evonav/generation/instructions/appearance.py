@@ -71,7 +71,7 @@ def adjectives_of(category: str, size_m: Point3, appearance: Appearance) -> list
 
 def size_word(category: str, size_m: Point3) -> str | None:
     """Return `small` or `large`, relative to the catalogue's assets of the category; `None` in between."""
-    edges_m = _edges_m().get(category, [])
+    edges_m = [_edge_m(asset_m) for asset_m in _sizes_m().get(category, ())]
     if len(edges_m) < 3:
         return None
     ratio = _edge_m(size_m) / float(np.median(edges_m))
@@ -87,9 +87,10 @@ def shape_word(category: str, size_m: Point3, form: str | None) -> str | None:
     if category in _TOPS:
         ratio = short_m / long_m
         return "square" if ratio > SQUARE_RATIO else "long" if ratio < LONG_RATIO else "rectangular"
-    if category in _UPRIGHT and (heights := _height_ratios().get(category)):
+    ratios = [asset_m[1] / max(asset_m[0], asset_m[2]) for asset_m in _sizes_m().get(category, ())]
+    if category in _UPRIGHT and ratios:
         # Both the object itself and its ratio to its category must be extreme.
-        ratio, usual = height_m / long_m, float(np.median(heights))
+        ratio, usual = height_m / long_m, float(np.median(ratios))
         if ratio > 1.3 and ratio > 1.3 * usual:
             return "tall"
         if category in _BROAD and ratio < 0.9 and ratio < usual / 1.3:
@@ -162,18 +163,9 @@ def _edge_m(size_m: Point3) -> float:
 
 
 @lru_cache(maxsize=1)
-def _edges_m() -> dict[str, list[float]]:
+def _sizes_m() -> dict[str, list[Point3]]:
     """Return the sizes of the catalogue's assets by category."""
-    edges_m: dict[str, list[float]] = defaultdict(list)
+    sizes_m: dict[str, list[Point3]] = defaultdict(list)
     for _, category, size_m in _core.assets():
-        edges_m[category].append(_edge_m(size_m))
-    return dict(edges_m)
-
-
-@lru_cache(maxsize=1)
-def _height_ratios() -> dict[str, list[float]]:
-    """Return the ratio of height to longer side of each asset, by category."""
-    ratios: dict[str, list[float]] = defaultdict(list)
-    for _, category, (width_m, height_m, depth_m) in _core.assets():
-        ratios[category].append(height_m / max(width_m, depth_m))
-    return dict(ratios)
+        sizes_m[category].append(size_m)
+    return dict(sizes_m)

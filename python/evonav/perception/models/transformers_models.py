@@ -1,10 +1,9 @@
 """Transformers (Apache-2.0): boxes by Grounding DINO or OWLv2, masks by SAM, features by CLIP."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,9 @@ from evonav.perception.models.crops import CropEmbedder, unit
 from evonav.perception.models.libraries import imported, loading, make_repeatable
 from evonav.perception.models.prompted import Boxes, Masks, box_masks
 
-_Model = TypeVar("_Model")
+_Model = TypeVar("_Model", bound="_OnDevice")
+_LOADED: dict[tuple[type, str, str], object] = {}
+"""Models by class, folder and device."""
 _MAX_BOXES = 100
 _NMS_IOU = 0.7
 """Largest number of boxes, as in YOLO-World: OWLv2 has a box for every patch of the image and drops none."""
@@ -23,15 +24,38 @@ _NMS_IOU = 0.7
 class _OnDevice:
     """A model of the library with its processor, and the device to compute on."""
 
+    name: ClassVar[str]
+    parts: ClassVar[tuple[str, ...]]
+    """The library's classes of the model, of its processor, and of what else it needs."""
     _model: Any
     _processor: Any
     _device: str
+
+    @classmethod
+    def load(cls: type[_Model], path: str, device: str) -> _Model:
+        """Return the model of a folder, loaded once a process.
+
+        Raises:
+            PerceptionError: The library is not installed, or the folder holds no such model.
+        """
+        if (cls, path, device) not in _LOADED:
+            transformers = imported("transformers")
+            make_repeatable()
+            transformers.utils.logging.disable_progress_bar()
+            with loading(path, cls.name, "its files"):
+                model, processor, *more = (
+                    getattr(transformers, part).from_pretrained(path, local_files_only=True) for part in cls.parts
+                )
+                _LOADED[cls, path, device] = cls(model.eval().to(device), processor, device, *more)
+        return cast("_Model", _LOADED[cls, path, device])
 
 
 @dataclass(eq=False)
 class GroundingDino(_OnDevice):
     """Boxes for phrases by a `GroundingDinoForObjectDetection`. All phrases go into one text: it is for short lists."""
 
+    name = "Grounding DINO"
+    parts = ("GroundingDinoForObjectDetection", "AutoProcessor")
     min_text: float = 0.25
     """Score from which a word of the text belongs to a box."""
 
@@ -59,6 +83,8 @@ class GroundingDino(_OnDevice):
 class Owlv2(_OnDevice):
     """Boxes for any number of words, by an `Owlv2ForObjectDetection`."""
 
+    name = "OWLv2"
+    parts = ("Owlv2ForObjectDetection", "Owlv2Processor")
     _queries: dict[tuple[str, ...], Any] = field(default_factory=dict)
 
     def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
@@ -103,6 +129,9 @@ class Owlv2(_OnDevice):
 class Sam(_OnDevice):
     """Masks from boxes, by a `SamModel`."""
 
+    name = "SAM"
+    parts = ("SamModel", "AutoImageProcessor")
+
     def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
         """Images with boxes are encoded as one batch, then masks are made; an empty one is the box itself."""
         torch = imported("torch")
@@ -138,6 +167,8 @@ class Sam(_OnDevice):
 class Clip(_OnDevice, CropEmbedder):
     """An `Embedder`, by a `CLIPModel`."""
 
+    name = "CLIP"
+    parts = ("CLIPModel", "AutoImageProcessor", "AutoTokenizer")
     _tokenizer: Any
 
     def __post_init__(self) -> None:
@@ -159,58 +190,6 @@ class Clip(_OnDevice, CropEmbedder):
             features = _pooled(self._model.get_text_features(tokens["input_ids"], tokens["attention_mask"]))
         feature: NDArray[np.float32] = unit(features.float().cpu().numpy())[0]
         return feature
-
-
-@cache
-def load_grounding_dino(path: str, device: str) -> GroundingDino:
-    """Return the detector of a folder, loaded once a process.
-
-    Raises:
-        PerceptionError: The library is not installed, or the folder holds no such model.
-    """
-    return _loaded(GroundingDino, path, device, "Grounding DINO", "GroundingDinoForObjectDetection", "AutoProcessor")
-
-
-@cache
-def load_owlv2(path: str, device: str) -> Owlv2:
-    """Return the detector of a folder, loaded once a process.
-
-    Raises:
-        PerceptionError: The library is not installed, or the folder holds no such model.
-    """
-    return _loaded(Owlv2, path, device, "OWLv2", "Owlv2ForObjectDetection", "Owlv2Processor")
-
-
-@cache
-def load_sam(path: str, device: str) -> Sam:
-    """Return the segmenter of a folder, loaded once a process.
-
-    Raises:
-        PerceptionError: The library is not installed, or the folder holds no such model.
-    """
-    return _loaded(Sam, path, device, "SAM", "SamModel", "AutoImageProcessor")
-
-
-@cache
-def load_clip(path: str, device: str) -> Clip:
-    """Return the embedder of a folder, loaded once a process.
-
-    Raises:
-        PerceptionError: The library is not installed, or the folder holds no such model.
-    """
-    return _loaded(Clip, path, device, "CLIP", "CLIPModel", "AutoImageProcessor", "AutoTokenizer")
-
-
-def _loaded(make: Callable[..., _Model], path: str, device: str, kind: str, model: str, *others: str) -> _Model:
-    """Make an object of a model, its processors and the device; `model` and `others` are classes of the library."""
-    transformers = imported("transformers")
-    make_repeatable()
-    transformers.utils.logging.disable_progress_bar()
-    with loading(path, kind, "its files"):
-        network, processor, *more = (
-            getattr(transformers, name).from_pretrained(path, local_files_only=True) for name in (model, *others)
-        )
-        return make(network.eval().to(device), processor, device, *more)
 
 
 def _pooled(features: Any) -> Any:  # noqa: ANN401 - a tensor, which the library wraps since version 5
