@@ -21,7 +21,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel import folders
-from evonav.parallel.folders import write_atomically, writing
+from evonav.parallel.folders import replacing, write_atomically, writing
 from evonav.tasks.listing import task_files
 
 HERE = Path(__file__).parent
@@ -243,6 +243,20 @@ def test_an_agent_of_the_running_script_is_refused_at_once(tmp_path):
     with pytest.raises(InvalidArgumentError, match="a module of its own, or use num_workers=0"):
         evaluate(["__main__:Mine"], task_files(tmp_path / "tasks"), tmp_path / "run", config=CONFIG, num_workers=1)
     assert not (tmp_path / "run").exists()
+
+
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "table.csv"
+    assert write_atomically(path, "old") == path
+
+    def write_half() -> None:
+        with replacing(path) as beside:
+            beside.write_text("half", encoding="utf-8")
+            raise ValueError("in the middle")
+
+    with pytest.raises(ValueError, match="in the middle"):
+        write_half()
+    assert [(one.name, one.read_text("utf-8")) for one in path.parent.iterdir()] == [("table.csv", "old")]
 
 
 def test_a_file_that_cannot_be_replaced_stays(tmp_path, monkeypatch):

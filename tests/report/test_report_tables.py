@@ -131,3 +131,8 @@ def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> Non
     assert row["SR difference [95% CI]"].startswith("+41.7 [")
     # The interval leaves 0 out, p does not suffice: six houses against half a house.
     assert (row["p"], row["SR says"]) == ("0.062", "a tie at this n")
+
+
+def test_no_name_of_an_agent_is_a_formula_in_a_spreadsheet() -> None:
+    summary = summarise("=cmd()", [], 2)
+    assert tables.summary_csv([summary]).splitlines()[1].startswith("'=cmd(),all,0,")

@@ -1,13 +1,12 @@
 """The summary of a sweep as tables and files, from its records alone."""
 
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from evonav.parallel.folders import write_atomically
+from evonav.report.export import csv_text
 from evonav.report.tables.numbers import percent
 from evonav.report.tables.table import INTERVALS, Table, markdown_tables
 from evonav.sweeps.row import AXES, STATES, SweepRow
@@ -43,26 +42,15 @@ def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
 
 def sweep_csv(rows: Sequence[SweepRow]) -> str:
     """Return CSV with a line per row; rates are fractions."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     ends = [f"{measure}_{end}" for measure in ("sr", "spl") for end in ("mean", "low95", "high95")]
-    writer.writerow(["cell", *AXES, "agent", "n", "num_stages", *ends, *STATES, "is_incomplete"])
+    columns = ["cell", *AXES, "agent", "n", "num_stages", *ends, *STATES, "is_incomplete"]
+    lines: list[list[object]] = []
     for row in rows:
         axes = ["all" if axis == "seed" and row.seed is None else getattr(row, axis) for axis in AXES]
         rates = [row.sr, *(row.sr_ci95 or (None, None)), row.spl, *(row.spl_ci95 or (None, None))]
-        writer.writerow(
-            [
-                row.cell,
-                *axes,
-                _csv_text(row.agent),
-                row.n,
-                row.num_stages,
-                *("" if value is None else repr(value) for value in rates),
-                *(row.counts[state] for state in STATES),
-                str(row.is_incomplete).lower(),
-            ]
-        )
-    return text.getvalue()
+        counts = [row.counts[state] for state in STATES]
+        lines.append([row.cell, *axes, row.agent, row.n, row.num_stages, *rates, *counts, row.is_incomplete])
+    return csv_text(columns, lines)
 
 
 def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
@@ -89,8 +77,3 @@ def _missing(row: SweepRow) -> str:
     not_run = row.num_stages - row.n - errored
     parts = [f"{count} {state}" for count, state in ((errored, "errored"), (not_run, "not run")) if count]
     return f"{row.n} of {row.num_stages} ({', '.join(parts)})"
-
-
-def _csv_text(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
