@@ -1,4 +1,4 @@
-"""A controlled analysis read back: outcomes by arm, and what the arms differ in (docs/controlled.md)."""
+"""Read a controlled analysis: outcomes by arm, and how the arms differ (docs/controlled.md)."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -60,7 +60,7 @@ class Analysis:
         return tuple(agent for agent in self.agents if self.keys(agent))
 
     def keys(self, *agents: str) -> list[Key]:
-        """Stages that all of some agents have scored in every arm."""
+        """Return the stages that all of some agents have scored in every arm."""
         scored = [set(self.outcomes[arm, agent]) for agent in agents for arm in self.arms]
         return sorted(set.intersection(*scored)) if scored else []
 
@@ -75,7 +75,7 @@ class Analysis:
     def effect(
         self, a: tuple[str, str], b: tuple[str, str], measure: Measure, keys: Sequence[Key] | None = None
     ) -> PairedEffect | None:
-        """`b` less `a`, each an arm and an agent, over the stages that both scored in every arm.
+        """Compare `b` with `a`, each an arm and an agent, over the stages that both scored in every arm.
 
         Returns:
             `None` without a stage.
@@ -126,7 +126,7 @@ def load_analysis(directory: Path) -> Analysis:
 
 
 def moved_keys(analysis: Analysis, *agents: str) -> list[Key]:
-    """Pairs of agents whose target moved."""
+    """Return the pairs of agents whose target moved."""
     last = analysis.arms[-1]
     keys = analysis.keys(*agents)
     return [key for key in keys if split_of(analysis.outcomes[last, agents[0]][key]) == "target"]
@@ -257,7 +257,7 @@ def _ends_table(analysis: Analysis) -> Table:
 
 
 def effect_cells(effect: PairedEffect | None) -> list[str]:
-    """Mean of a, mean of b, difference with interval, and p."""
+    """Return the mean of a, the mean of b, their difference with interval, and p."""
     if effect is None:
         return [NONE] * 4
     return [
@@ -269,7 +269,7 @@ def effect_cells(effect: PairedEffect | None) -> list[str]:
 
 
 def signed(value: float, interval: Interval | None) -> str:
-    """`-6.3 (-13.9 to +1.2)` in points, from differences of -1 to 1."""
+    """Return a difference in points with its interval: `-6.3 (-13.9 to +1.2)`."""
     ends = "" if interval is None else f" ({_point(interval[0])} to {_point(interval[1])})"
     return f"{_point(value)}{ends}"
 

@@ -1,4 +1,4 @@
-"""Controlled analyses from houses into a folder: parallel, resumable, the same bytes for any number of workers."""
+"""Generate controlled analyses into a folder: in parallel, resumable, the same bytes for any number of workers."""
 
 import json
 import shutil
@@ -206,7 +206,7 @@ def _is_tasks(source: Path | str) -> bool:
 
 
 def _houses(source: Path | str) -> Iterator[HouseText]:
-    """Houses of files, or the first ones of a folder's tasks."""
+    """Yield the houses of files, or the first houses of a folder's tasks."""
     if not _is_tasks(source):
         yield from HouseTexts(source)
         return

@@ -1,4 +1,4 @@
-"""Runs every arm of a controlled analysis (`evonav.controlled.layout`), each into an ordinary run folder."""
+"""Run every arm of a controlled analysis (`evonav.controlled.layout`), each into an ordinary run folder."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

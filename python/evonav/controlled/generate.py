@@ -1,4 +1,4 @@
-"""Tasks in several arms that differ in one thing alone (paper, Sec. 4.3; docs/controlled.md).
+"""Generate tasks in several arms that differ in one thing alone (paper, Sec. 4.3; docs/controlled.md).
 
 `pairs`: two goals are drawn in the house as it is. The reference trajectory goes to the second stage's goal, then to
 the first stage's; there the house stays as it was (`fixed`) or evolves for certain (`evolved`), and the second stage's
@@ -101,7 +101,7 @@ def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dic
 
 
 def _draw_goals(house: House, options: ControlledOptions, seed: int, attempt: int) -> tuple[str, ...]:
-    """Goals of a house that does not evolve."""
+    """Draw the goals of a house that does not evolve."""
     parameters = options.parameters.model_copy(update={"evolve_probability": 0.0})
     given: tuple[GivenStage, ...] = ()
     if options.kind == "pairs":

@@ -1,4 +1,4 @@
-"""A controlled analysis on disk: the same tasks in several arms that differ in one thing alone (paper, Sec. 4.3).
+"""Define a controlled analysis on disk: the same tasks in several arms that differ in one thing (paper, Sec. 4.3).
 
 `controlled.json` says what the arms are. Each arm is an ordinary folder of tasks, `tasks/<arm>`, and what agents did in
 it an ordinary run, `runs/<arm>`; a task has the same id in every arm.

@@ -92,7 +92,7 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
 
 
 def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
-    """Pictures of the pairs that tell most, and where they are."""
+    """Draw the most instructive pairs, and return their lines of the page."""
     others = [agent for agent in analysis.agents if agent != BASELINE]
     agent = HIGHLIGHTED_AGENT if HIGHLIGHTED_AGENT in others else next(iter(others), analysis.agents[0])
     found = []

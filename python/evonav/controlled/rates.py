@@ -1,4 +1,4 @@
-"""A sweep of the evolution rate: SR and SPL by rate, and where searching from scratch overtakes memory."""
+"""Compute SR and SPL by evolution rate, and the rate at which searching from scratch overtakes memory."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Crossover:
         return 0.0 <= self.rate <= 1.0
 
     def text(self) -> str:
-        """`0.62 (0.31 to >1)`, that there is none, or that these houses cannot tell."""
+        """Return the rate with its interval, `0.62 (0.31 to >1)`, or that there is none, or that it is undetermined."""
         low, high = self.ci95
         interval = f"({_rate_words(low)} to {_rate_words(high)})"
         if low > 1.0:
@@ -39,7 +39,7 @@ class Crossover:
 
 
 def rate_keys(analysis: Analysis, *agents: str) -> list[Key]:
-    """Stages that count: before the first one nothing can evolve."""
+    """Return the stages that count: before the first one nothing can evolve."""
     return [key for key in analysis.keys(*agents) if key[1] > 1]
 
 
@@ -81,7 +81,7 @@ def _crossing(rates: NDArray[np.float64], leads: NDArray[np.float64]) -> float:
 
 
 def rate_tables(analysis: Analysis) -> list[Table]:
-    """SR and SPL by rate, leads over the baseline, and crossovers."""
+    """Build the tables of SR and SPL by rate, of leads over the baseline, and of crossovers."""
     tables = []
     for name, measure in MEASURES.items():
         rows = []

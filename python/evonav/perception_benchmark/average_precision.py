@@ -12,7 +12,7 @@ _MAX_CELLS = 4_000_000
 
 
 def interpolated(confidences: NDArray[np.float64], is_right: NDArray[np.bool_], num_true: int) -> NDArray[np.float64]:
-    """`(101,)` interpolated precision at `RECALLS`.
+    """Return the interpolated precision at `RECALLS`, `(101,)`.
 
     Args:
         confidences: `(D,)`; of equal ones the first comes first.
@@ -34,7 +34,7 @@ def resampled(
     num_true: NDArray[np.float64],
     draws: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """AP in resamples of units.
+    """Return AP in resamples of units.
 
     Args:
         confidences: `(D,)`.

@@ -1,6 +1,6 @@
-"""Perceptions against the truth: every one sees the same views of the same houses; what it tells is written down.
+"""Measure perceptions against the truth: each sees the same views of the same houses, and its percepts are recorded.
 
-One job is one perception on one task; what it leaves does not depend on the others, nor on the number of workers.
+One job is one perception on one task. Its record does not depend on other jobs, nor on the number of workers.
 """
 
 import json
@@ -301,6 +301,6 @@ def _houses(case: EpisodeSpec, count: int) -> list[int]:
 
 
 def _checkpoints(num_places: int) -> dict[int, float]:
-    """Places after which the memory is looked at, with the share of the tour; each share belongs to one place."""
+    """Return the places after which the memory is judged, with the share of the tour that is done there."""
     shares = [i / NUM_CHECKPOINTS for i in range(1, NUM_CHECKPOINTS + 1)]
     return {max(1, round(share * num_places)): share for share in shares}

@@ -1,4 +1,4 @@
-"""Detections of one view against the objects in it: which detection is which object, by the overlap of masks.
+"""Match the detections of one view with the objects in it, by the overlap of masks.
 
 Objects that ground-truth perception would report are *wanted*. Smaller ones, doors and windows are *ignored* as in
 COCO: finding one is neither required nor counted as an error. Matching is COCO's: detections by falling confidence
@@ -94,7 +94,7 @@ def true_objects(frame: Frame, objects: Sequence[SceneObject]) -> TrueObjects:
 
 
 def median_depths_m(depth_m: NDArray[np.float32], masks: NDArray[np.int32], num_masks: int) -> NDArray[np.float64]:
-    """`(num_masks,)` median of the finite depths in each mask; `inf` where there is none."""
+    """Return the median of the finite depths in each mask, `(num_masks,)`; `inf` where there is none."""
     inside = (masks >= 0) & np.isfinite(depth_m)
     ids, depths = masks[inside], depth_m[inside]
     order = np.lexsort((depths, ids))
@@ -108,7 +108,7 @@ def median_depths_m(depth_m: NDArray[np.float32], masks: NDArray[np.int32], num_
 
 
 def own_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], num_masks: int) -> NDArray[np.float64]:
-    """`(num_masks,)` part of each mask's outline that is cut by nothing nearer, nor by the image's border.
+    """Return the part of each mask's outline that is cut by nothing nearer, nor by the image's border, `(num_masks,)`.
 
     A sign of occlusion that needs no second rendering. Nearer is what is so by more than 5 cm and 5%: an object's foot
     on the floor is its own. 1 of a mask without pixels.
@@ -118,14 +118,14 @@ def own_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], num_mas
 
 
 def overlaps_px(a: NDArray[np.int32], num_a: int, b: NDArray[np.int32], num_b: int) -> NDArray[np.int64]:
-    """`(num_a, num_b)` pixels that masks of two label images (-1: none) have in common."""
+    """Return the pixels that masks of two label images (-1: none) have in common, `(num_a, num_b)`."""
     both = (a >= 0) & (b >= 0)
     pairs = a[both].astype(np.int64) * num_b + b[both]
     return np.bincount(pairs, minlength=num_a * num_b).reshape(num_a, num_b)
 
 
 def intersections_over_union(truth: TrueObjects, found: Detections) -> NDArray[np.float64]:
-    """`(T, D)` IoU of every object with every detection."""
+    """Return the IoU of every object with every detection, `(T, D)`."""
     num = len(found.labels)
     common = overlaps_px(truth.masks, len(truth.labels), found.masks, num)
     areas = np.bincount(found.masks[found.masks >= 0], minlength=num)
@@ -141,7 +141,7 @@ def match(
     is_allowed: NDArray[np.bool_] | None = None,
     limit: float = IOU_LIMIT,
 ) -> Matches:
-    """Pairs objects and detections.
+    """Pair objects and detections.
 
     A detection takes a wanted object before an ignored one, whatever their overlaps; an ignored one is never used up.
 
@@ -175,14 +175,14 @@ def match(
 
 
 def same_labels(truth: TrueObjects, found: Detections) -> NDArray[np.bool_]:
-    """`(T, D)` whether a detection has an object's label."""
+    """Return whether a detection has an object's label, `(T, D)`."""
     rows = np.array(truth.labels, dtype=object).reshape(-1, 1)
     columns = np.array(found.labels, dtype=object).reshape(1, -1)
     return np.asarray(rows == columns, np.bool_).reshape(len(truth.labels), len(found.labels))
 
 
 def main_objects(truth: TrueObjects, found: Detections) -> NDArray[np.int64]:
-    """`(D,)` object that most of a detection's pixels are of, as index in the simulator's table, or `NONE`."""
+    """Return the object of most pixels of each detection, `(D,)`, as index in the simulator's table, or `NONE`."""
     num = len(found.labels)
     if not truth.labels or not num:
         return np.full(num, NONE, np.int64)

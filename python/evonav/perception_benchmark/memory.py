@@ -1,4 +1,4 @@
-"""Measure how good a memory of objects a perception makes: the paper's object map, fed with a tour, against the house.
+"""Measure the memory of objects that a perception makes: the paper's object map after a tour, against the house.
 
 What an entry was made of is counted from its detections' pixels, which only the evaluator can see through to objects:
 so an entry in the wrong place, or with the wrong label, still has the object that it came from.
@@ -126,7 +126,7 @@ class JudgedMemory:
         ]
 
     def _right(self) -> list[EntryBelief]:
-        """Entries that an object of their label stands by."""
+        """Return the entries that have an object of their label in their place."""
         beliefs = self._beliefs()
         matched = matched_objects(beliefs, self._bodies())
         return [belief for belief, body in zip(beliefs, matched, strict=True) if body is not None]

@@ -1,4 +1,4 @@
-"""Figures of a perception beside its detections: confidence, depth, pose, features, and the memory made from it."""
+"""Score a perception beyond its detections: confidence, depth, pose, features, and the memory made from it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> lis
 
 
 def pose(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
-    """Mean errors of the believed pose."""
+    """Return the mean errors of the believed pose."""
     nums = houses.sums([len(record.pose.offset_m) for record in records])
     offsets = houses.sums([sum(record.pose.offset_m) for record in records])
     turns = houses.sums([float(np.degrees(sum(record.pose.turn_rad))) for record in records])
@@ -84,7 +84,7 @@ def pose(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, E
 def cosines(
     houses: ClusterBootstrap, records: Sequence[TaskRecord]
 ) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
-    """Histograms of cosines, and their means; nothing without features."""
+    """Return histograms of cosines, and their means; nothing without features."""
     counts: dict[str, list[int]] = {}
     estimates: dict[str, Estimate] = {}
     for name in COSINES:
@@ -162,5 +162,5 @@ def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
 
 
 def measure_values(measures: Mapping[str, Estimate]) -> dict[str, dict[str, object]]:
-    """Estimates as JSON."""
+    """Return estimates as JSON."""
     return {name: {"value": found.value, "interval": found.ci95, "n": found.n} for name, found in measures.items()}

@@ -1,4 +1,4 @@
-"""The files of a perception report: `report.html`, `summary.json`, `summary.csv`, `summary.md`."""
+"""Write the files of a perception report: `report.html`, `summary.json`, `summary.csv`, `summary.md`."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A view as it is and as it was perceived, side by side, for people to look at."""
+"""Draw a view as it is and as it was perceived, side by side."""
 
 import base64
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Plots of perceptions: precision and recall, by distance and size, calibration, confusions, features, memory."""
+"""Plot perceptions: precision and recall, by distance and size, calibration, confusions, features, memory."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -186,7 +186,7 @@ class Rows:
 
 
 def _shifted(partners: NDArray[np.int64], first: int) -> list[int]:
-    """Partners in a view as rows of all views."""
+    """Return partners in a view as rows of all views."""
     return [value if value in (NONE, IGNORED) else value + first for value in partners.tolist()]
 
 

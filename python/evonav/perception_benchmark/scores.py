@@ -178,7 +178,7 @@ class _Scorer:
         )
 
     def _measures(self, truths: NDArray[np.bool_], found: NDArray[np.bool_] | None) -> dict[str, Estimate]:
-        """Rates among some objects and some detections.
+        """Compute rates among some objects and some detections.
 
         Args:
             truths: `(T,)` which objects.

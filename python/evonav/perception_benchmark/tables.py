@@ -1,4 +1,4 @@
-"""Tables of perceptions: what they find, what they take it for, and the memory that comes of it."""
+"""Build tables of perceptions: what they find, what they take it for, and the memory that results."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

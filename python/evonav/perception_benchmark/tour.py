@@ -1,4 +1,4 @@
-"""A tour of a house: the same views for every perception, in the order of somebody who walks through."""
+"""Choose a tour of a house: the same views for every perception, in the order of a walk."""
 
 import hashlib
 import math
@@ -16,7 +16,7 @@ VIEWS_PER_PLACE = 6
 
 
 def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room: int, seed: int) -> list[list[Pose]]:
-    """Poses by place, from the task's start on, each next place the nearest of those left.
+    """Return poses by place, from the task's start on, each next place the nearest of those left.
 
     Places of a room lie as far apart as they can, the first one drawn; so is the heading that a place begins with.
 

@@ -1,4 +1,4 @@
-"""Build the JSON of a viewer's page, made small: images once, maps and entries as what changed in them.
+"""Build the JSON of a viewer's page, kept small: images are stored once, maps and entries as their changes.
 
 Coordinates are page coordinates (`svg.cm`). A round's `cells` are runs `LENGTH VALUE` over the map's cells row by row:
 the length in base 36, the value a letter, `A` to `D` for the values of `ReplayedMap.cells`, `E` for as in the round
@@ -108,7 +108,7 @@ class PageData:
 
 
 class _Rounds:
-    """Rounds of a stage one after another, each as what is new in it."""
+    """Encode the rounds of a stage one after another, each as its changes."""
 
     def __init__(self, page: PageData, record: StageRecord) -> None:
         self._page = page
@@ -332,7 +332,7 @@ def _lost_words(record: StageRecord) -> str:
 
 
 def _facts(record: StageRecord) -> list[list[str]]:
-    """Names and values that tell how a stage went."""
+    """Return names and values that describe how a stage went."""
     facts: list[tuple[str, str]] = [("rounds", str(record.num_rounds))]
     if record.path_length_m is not None:
         facts.append(("walked", f"{record.path_length_m:.1f} m"))

@@ -1,4 +1,4 @@
-"""The pages of `evonav view`: an episode round by round, one self-contained HTML file each, and their index.
+"""Write the pages of `evonav view`: an episode round by round, one self-contained HTML file each, and their index.
 
 What is drawn comes from `evonav.replay.types`; no agent, model or task is read here.
 """

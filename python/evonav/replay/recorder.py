@@ -1,4 +1,4 @@
-"""Looks on as an agent runs, and keeps of every round what records leave out: views in colours, beliefs, questions."""
+"""Record, as an agent runs, what records leave out of every round: colour views, beliefs and questions."""
 
 import hashlib
 import math
@@ -226,7 +226,7 @@ def _map_of(belief: Belief) -> ReplayedMap:
 
 
 def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:
-    """Entries and frontiers by the names that the prompt gives them, where a question has lists of them."""
+    """Yield entries and frontiers with their names in the prompt, where a question has lists of them."""
 
     def objects(candidates: Any, before: str) -> Iterator[tuple[str, str, int]]:  # noqa: ANN401
         for index, candidate in enumerate(candidates):

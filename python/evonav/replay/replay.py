@@ -33,7 +33,7 @@ from evonav.replay.types import ReplayedRound, ReplayedStage
 
 
 def _near(run_dir: Path, task_id: str) -> str:
-    """Names a task of a run that may have been meant."""
+    """Return a hint at the task of a run with the most similar name."""
     with RunStore(run_dir) as store:
         names = sorted(store.meta("num_stages") or {})
     near = get_close_matches(task_id, names, 1, cutoff=0.0)

@@ -1,4 +1,4 @@
-"""An episode as a recording for rerun's viewer (extra `rerun`): views, map, memory, house and way in one scene.
+"""Write an episode as a recording for rerun's viewer (extra `rerun`): views, map, memory, house and way in one scene.
 
 The scene's axes are x, z and y of the records: right-handed, z up, where AI2-THOR's are left-handed, y up.
 """
@@ -79,7 +79,7 @@ def write_recording(
 
 
 class _Recorder:
-    """Writes one stage."""
+    """Write one stage."""
 
     def __init__(
         self,

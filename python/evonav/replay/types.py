@@ -1,4 +1,4 @@
-"""A replayed episode as plain data: what `evonav.replay.recorder` records and pages show.
+"""Describe a replayed episode as plain data, which `evonav.replay.recorder` records and pages show.
 
 What the agent believes and what only the evaluator knows are separate fields: `ReplayedEntry.truth`,
 `StageRecord.target`, `StageRecord.transition` and every `is_stale` are the evaluator's.

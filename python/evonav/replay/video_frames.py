@@ -52,7 +52,7 @@ def episode_frame(stages: Sequence[ReplayedStage], maps: Mapping[int, FloorPlan]
 
 
 class _StageFilm:
-    """Draws what the pictures of a stage share once, and each round's own over it."""
+    """Draw what all pictures of a stage share once, and each round over it."""
 
     def __init__(
         self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float

@@ -1,4 +1,4 @@
-"""Stages as rows for other programs: CSV, JSON lines, Parquet, and columns for a notebook."""
+"""Export stages and rounds as rows for other programs: CSV, JSON lines, Parquet, and columns for a notebook."""
 
 import ast
 import csv

@@ -1,4 +1,4 @@
-"""A run in a notebook: `evonav.load("out/run").stages`."""
+"""Load a run in a notebook: `evonav.load("out/run").stages`."""
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -45,7 +45,7 @@ class LoadedRun:
         return _columns(round_table(self.run_dir), ROUND_COLUMNS)
 
     def to_pandas(self, table: str = "stages") -> Any:  # noqa: ANN401 - pandas may not be there
-        """`stages` or `rounds` as a DataFrame.
+        """Return `stages` or `rounds` as a DataFrame.
 
         Raises:
             StoreError: pandas is not installed.

@@ -35,7 +35,7 @@ from evonav.world.simulator import Action, Frame, Simulator
 
 
 class RecordedAgent:
-    """Answers with the recorded actions of an episode."""
+    """Answer with the recorded actions of an episode."""
 
     def __init__(self, records: Mapping[int, StageRecord]) -> None:
         """Replay an episode, given its stages by number."""
@@ -68,7 +68,7 @@ class RecordedAgent:
 
 
 class ExplainingRecordedAgent(RecordedAgent):
-    """Also answers with the recorded diagnostics and entries."""
+    """Answer also with the recorded diagnostics and entries."""
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return the recorded diagnostics of the round."""

@@ -1,4 +1,4 @@
-"""Rates of agents by kind of stage: a field of its row, bins of a length, the size of the house, the success radius."""
+"""Compute rates of agents by kind of stage: by a field of its row, path length, rooms, or success radius."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -239,7 +239,7 @@ def breakdown_csv(found: Sequence[Breakdown]) -> str:
 
 
 def breakdown_plot(found: Breakdown) -> Plot:
-    """Dots with whiskers; lines for the radius sweep."""
+    """Plot a breakdown as dots with whiskers, or as lines along the success radius."""
     scale = scale_of(found.measure)
     name = f"{measure_name(found.measure)}, %" if scale == 100 else measure_name(found.measure)
     if found.by == RADIUS:

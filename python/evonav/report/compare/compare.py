@@ -1,4 +1,4 @@
-"""Agents against each other on the same stages: differences with interval and p, in parts, and the stages that flipped.
+"""Compare agents on the same stages: differences with interval and p, in parts, and the stages that differ.
 
 The statistics are those of `evonav.statistics`; what they mean and how they were calibrated is in docs/statistics.md.
 """

@@ -1,4 +1,4 @@
-"""A comparison as one self-contained page: sentences, tables, plots, and the stages that flipped."""
+"""Write a comparison as one self-contained page: sentences, tables, plots, and the stages that differ."""
 
 import os
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from evonav.statistics import PairedEffect
 
 
 def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
-    """SR differences: of one pair by parts, of several pairs on all stages."""
+    """Plot SR differences: of one pair by parts, or of several pairs on all stages."""
     if len(comparisons) == 1:
         (one,) = comparisons
         gaps = tuple(_gap(part.effects["success"], part.label) for part in one.parts)

@@ -1,4 +1,4 @@
-"""A comparison as tables and sentences."""
+"""Write a comparison as tables and sentences."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The page of a run: one file with its tables, every stage's map, and episodes round by round."""
+"""Write the page of a run: one file with its tables, every stage's map, and episodes round by round."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -173,7 +173,7 @@ def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
 
 
 def _bars(summary: AgentSummary) -> list[Markup]:
-    """SR and SPL with their interval on a scale of 0 to 100%."""
+    """Draw SR and SPL with their intervals on a scale of 0 to 100%."""
     return [_bar(summary.sr, summary.sr_ci95), _bar(summary.spl, summary.spl_ci95)]
 
 

@@ -1,4 +1,4 @@
-"""A task as the page shows it: what was asked, and a map with its outcome for every agent and stage."""
+"""Show a task on a run's page: its goals, and a map with the outcome of every agent and stage."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""The paper's Tables 1 and 2 with a run's figures in them: LaTeX in the paper's layout, the paper's own in grey."""
+"""Write the paper's Tables 1 and 2 with a run's numbers as LaTeX in the paper's layout, the paper's numbers in grey."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

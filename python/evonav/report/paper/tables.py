@@ -1,4 +1,4 @@
-"""The paper's Tables 1 and 2, and its stage-1 results, beside those of a run.
+"""Compare a run with the paper's Tables 1 and 2, and with its stage-1 results.
 
 Counts are decoded from the paper's percentages: all twelve overall rates lie on k/365, the strata on k/109 and k/166,
 and what is left of the sums is stage 1. SPL is as printed.
@@ -64,7 +64,7 @@ _OURS_NOTE = f"Ours: {INTERVALS}"
 
 
 def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
-    """Tables 1 and 2 and stage 1, the order of agents, and differences, the paper's beside the run's.
+    """Return Tables 1 and 2, stage 1, the order of agents, and differences: the paper's beside the run's.
 
     Args:
         run: Agents that the paper does not have stand without its figures.
@@ -181,7 +181,7 @@ def _order_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult
 
 
 def order(values: Mapping[str, float | None]) -> str:
-    """Names from the largest value to the smallest, `a > b = c`; those without a value are left out."""
+    """Return names from the largest value to the smallest, `a > b = c`; those without a value are left out."""
     known = {agent: value for agent, value in values.items() if value is not None}
     ranked = sorted(known, key=lambda agent: (-known[agent], PAPER_ORDER.index(agent)))
     text = ""

@@ -1,4 +1,4 @@
-"""Tables of what explains the rates: see docs/measures.md."""
+"""Build the tables of metrics that explain the rates (docs/measures.md)."""
 
 from collections.abc import Sequence
 from functools import partial

@@ -43,7 +43,7 @@ def failure_groups(run: Run) -> list[dict[str, Any]]:
 
 
 def reproduction(run: Run) -> list[str]:
-    """Commands that run it again, as they were given; worked out from its config where they were not kept."""
+    """Return the commands that repeat the run: those that were given, or where none is stored, one from its config."""
     given = [session["command"] for session in _sessions(run) if session.get("command")]
     if given:
         return list(dict.fromkeys(given))

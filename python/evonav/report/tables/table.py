@@ -1,4 +1,4 @@
-"""Tables of a run, as Markdown, CSV, LaTeX (booktabs), HTML cells and for a terminal.
+"""Build tables of a run, as Markdown, CSV, LaTeX (booktabs), HTML cells and for a terminal.
 
 Rates are in percent with their 95% interval by house; a row with errored or not-run stages says
 *incomplete* in words, since its rates are not final.
@@ -38,7 +38,7 @@ class Table:
     """(row, column) of cells to stress."""
 
     def markdown(self) -> str:
-        """GitHub's table syntax, the notes below."""
+        """Return the table in GitHub's syntax, with its notes below."""
         lines = [
             _markdown_row(self.columns),
             _markdown_row(["---"] + ["---:"] * (len(self.columns) - 1)),
@@ -140,19 +140,19 @@ SPLIT_TITLES = {
 
 
 def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
-    """SR on stage 1 and on the paper's two strata of the later stages."""
+    """Build the table of SR on stage 1 and on the paper's two strata of the later stages."""
     names = ("stage_1", "relocated", "not_relocated")
     note = "Relocated: the target had ever moved since stage 1. Stages 2 and on; stage 1 is in neither."
     return _split_table("By relocation of the target", summaries, names, (note,))
 
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:
-    """SR by what happened in the transition before the stage."""
+    """Build the table of SR by the kind of the transition before the stage."""
     return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and on.",))
 
 
 def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
-    """SR by stage index."""
+    """Build the table of SR by stage index."""
     stages = sorted({record.stage for part in records.values() for record in part})
     cells = {
         agent: [rates([record for record in part if record.stage == stage]) for stage in stages]
@@ -170,7 +170,7 @@ def cause_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Tabl
 
 
 def paired_table(pairs: Sequence[AgentPair]) -> Table:
-    """Differences between agents on the stages that both scored, with a verdict in words."""
+    """Build the table of differences between agents on the stages that both scored, with a verdict in words."""
     p_name = p_heading(len(pairs))
     columns = (
         "Agents",

@@ -1,4 +1,4 @@
-"""The page of a set of tasks: its statistics beside the paper's, as HTML, SVG and JSON."""
+"""Write the statistics of a set of tasks beside the paper's, as HTML, SVG and JSON."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A task's stages as drawings: the house before and after the hidden change, the reference course, the target."""
+"""Draw a task's stages: the house before and after the hidden change, the reference course, and the target."""
 
 import math
 import re

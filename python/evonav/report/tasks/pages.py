@@ -1,4 +1,4 @@
-"""Pages of tasks: every stage before and after its hidden change, and a gallery of a data set. They show the oracle."""
+"""Write pages of tasks, which show the oracle: every stage before and after its hidden change, and a gallery."""
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A stage of a task in words: what changed before it, what is asked, what was refused."""
+"""Describe a stage of a task in words: the change before it, its goal, and the goals that were refused."""
 
 from collections import Counter
 from collections.abc import Callable
