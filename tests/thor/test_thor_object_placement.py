@@ -228,7 +228,7 @@ def test_the_object_at_a_pixel_is_the_one_of_the_instance_image(number: int) -> 
                 total += 1
                 agreed += do(engine, "GetObjectInFrame", x=x, y=y) == body.id
                 point = do(engine, "GetCoordinateFromRaycast", x=x, y=y)
-                offset_m = np.subtract(list(point.values()), objects.eye_m(engine.agent))
+                offset_m = np.subtract(list(point.values()), engine.agent.camera.position_m)
                 depth_m = offset_m @ objects.camera_axes(engine.agent)[:, 2]
                 assert depth_m == pytest.approx(float(frame.depth_m[row, col]), rel=2e-3, abs=2e-3)
     assert total > 100

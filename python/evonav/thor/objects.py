@@ -329,11 +329,6 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     return {by_body[body] for body in seen}
 
 
-def eye_m(agent: Agent) -> Vec3:
-    """Return the position of the agent's camera."""
-    return agent.camera.position_m
-
-
 def camera_axes(agent: Agent) -> NDArray[np.float64]:
     """Return `world_from_camera`, `(3, 3)`: right, up and ahead as columns."""
     return rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})

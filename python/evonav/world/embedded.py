@@ -95,24 +95,6 @@ class EmbeddedSimulator:
         delta_json = delta if isinstance(delta, str) else json.dumps(delta)
         return self._enter(self._world.apply(delta_json), pose or self._pose)
 
-    def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
-        """Draw random places for objects by AI2-THOR's `InitialRandomSpawn`, without a change of the house.
-
-        Args:
-            request_json: A `SpawnRequest` of the core.
-
-        Returns:
-            The `HouseDelta` to `apply`, as JSON, and the ids of the objects that found no place.
-
-        Raises:
-            InvalidArgumentError: The request is malformed, or names objects that the house does not contain.
-        """
-        return self._world.random_spawn(request_json)
-
-    def settled(self) -> str:
-        """Return the `HouseDelta` (JSON) that lets unsupported objects fall; it is empty if there are none."""
-        return self._world.settled()
-
     def enter(self, pose: Pose | None = None) -> Pose:
         """Put the agent at `pose`, as `reset` does, in the current house."""
         return self._enter(self._world, pose)

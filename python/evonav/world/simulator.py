@@ -90,7 +90,6 @@ class Frame:
     """`(H, W, 3)` colours; `None` if not requested."""
     instances: NDArray[np.int32] | None = None
     """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the `SceneObject`; `None` if not requested."""
-    is_action_success: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,7 @@ def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
     """Return whether the sphere around the object's box touches the cone around the image."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     radius_m = 0.5 * math.hypot(*box["size"].values()) + 1e-6
-    to_box_m = [at - eye for at, eye in zip(box["center"].values(), objects.eye_m(agent), strict=True)]
+    to_box_m = [at - eye for at, eye in zip(box["center"].values(), agent.camera.position_m, strict=True)]
     distance_m = math.hypot(*to_box_m)
     if distance_m <= radius_m:
         return True
@@ -147,7 +147,7 @@ def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
 
 def _is_reached(engine: Engine, point_m: Vec3, body: int) -> bool:
     """Return whether a point is in the image, within the visibility distance, and not occluded."""
-    eye_m, intrinsics = objects.eye_m(engine.agent), engine.scene.simulator.intrinsics
+    eye_m, intrinsics = engine.agent.camera.position_m, engine.scene.simulator.intrinsics
     right_m, up_m, ahead_m = (np.subtract(point_m, eye_m) @ objects.camera_axes(engine.agent)).tolist()
     half = math.tan(0.5 * intrinsics.vertical_fov_rad) * ahead_m
     is_framed = ahead_m > 0 and abs(up_m) < half and abs(right_m) < half * intrinsics.width_px / intrinsics.height_px

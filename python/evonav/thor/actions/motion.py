@@ -26,12 +26,6 @@ def invalid_operation(message: str) -> ActionError:
     return ActionError(f"InvalidOperationException: {message}")
 
 
-def missing_arguments(name: str, *arguments: str) -> ActionError:
-    """Return the error that AI2-THOR reports for an action that lacks arguments."""
-    message = f"action: {name} is missing the following arguments: {','.join(arguments)}"
-    return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
-
-
 @action("Pass", "Done", "NoOp", "Stop")
 def pass_(engine: Engine) -> None:
     """Do nothing."""

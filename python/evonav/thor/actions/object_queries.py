@@ -101,7 +101,7 @@ def get_visible_objects(
             "Must be 'distance' or 'collider'."
         )
     seen = _visible(engine, maxDistance)
-    eye_m = objects.eye_m(engine.agent)
+    eye_m = engine.agent.camera.position_m
     near = [
         (math.dist(eye_m, record["position"].values()), record["objectId"])
         for record in objects.static_records(engine.scene)
@@ -130,7 +130,7 @@ def contains(engine: Engine, *, objectId: str) -> list[str]:
 def world_to_viewport_point(engine: Engine, *, position: Vector3) -> dict[str, float]:
     """Return a world point's place in the image, from its upper left corner, with its depth as z."""
     half_width, half_height = _half_extents(engine)
-    offset_m = np.subtract((position.x, position.y, position.z), objects.eye_m(engine.agent))
+    offset_m = np.subtract((position.x, position.y, position.z), engine.agent.camera.position_m)
     right_m, up_m, ahead_m = (offset_m @ objects.camera_axes(engine.agent)).tolist()
     if ahead_m == 0:
         raise invalid_operation("Point not in viewport.")
@@ -162,7 +162,7 @@ def _ray(engine: Engine, x: float, y: float) -> tuple[Vec3, Vec3]:
     half_width, half_height = _half_extents(engine)
     own = np.array([(2 * x - 1) * half_width, (1 - 2 * y) * half_height, 1.0])
     right, up, ahead = (objects.camera_axes(engine.agent) @ own).tolist()
-    return objects.eye_m(engine.agent), (right, up, ahead)
+    return engine.agent.camera.position_m, (right, up, ahead)
 
 
 def _half_extents(engine: Engine) -> tuple[float, float]:

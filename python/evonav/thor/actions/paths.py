@@ -13,7 +13,7 @@ import numpy as np
 
 from evonav.thor import objects
 from evonav.thor.actions import motion
-from evonav.thor.actions.registry import ActionError, Vector3, action
+from evonav.thor.actions.registry import ActionError, Vector3, action, missing_arguments
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import Point, ground_gap_m, vector
@@ -100,7 +100,7 @@ def get_shortest_path_to_point(
     """Return the path from `position` (default: the agent) to `target`, or to `x, y, z` in the client helper's form."""
     if target is None:
         if x is None or z is None:
-            raise motion.missing_arguments("GetShortestPathToPoint", "target")
+            raise missing_arguments("GetShortestPathToPoint", "target")
         target = Vector3(x=x, y=y, z=z)
     return _path_record(_path(engine, _start(engine, position), (target.x, target.z), allowedError))
 
@@ -161,7 +161,7 @@ def object_nav_expert_action(
     elif position is not None:
         corners_m = _path(engine, here_m, (position.x, position.z), _ALLOWED_ERROR_M)
     else:
-        raise motion.missing_arguments("ObjectNavExpertAction", "position")
+        raise missing_arguments("ObjectNavExpertAction", "position")
     num_turns = round(360.0 / step_deg)
     if abs(num_turns - 360.0 / step_deg) > 1e-5:
         raise ActionError("Invalid rotate step degrees for agent, must divide 360 without a remainder.")

@@ -196,8 +196,7 @@ def _refusal(
     problems = error.errors(include_url=False, include_context=False)
     missing = [str(problem["loc"][0]) for problem in problems if problem["loc"][0] not in arguments]
     if len(missing) == len(problems):
-        message = f"action: {name} is missing the following arguments: {','.join(missing)}"
-        return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
+        return missing_arguments(name, *missing)
     wrong = {problem["loc"][0]: problem for problem in reversed(problems)}
     key = next(key for key in arguments if key in wrong)
     place = ".".join(str(part) for part in wrong[key]["loc"][1:])
@@ -206,6 +205,12 @@ def _refusal(
         f" Cannot convert to: {_type_name(types[key])}{place and f' ({place})'}: {wrong[key]['msg']}"
     )
     return ActionError(message, ErrorCode.INVALID_ARGUMENT)
+
+
+def missing_arguments(name: str, *arguments: str) -> ActionError:
+    """Return the error that AI2-THOR reports for an action that lacks arguments."""
+    message = f"action: {name} is missing the following arguments: {','.join(arguments)}"
+    return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
 
 
 def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) -> str:

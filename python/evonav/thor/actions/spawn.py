@@ -141,7 +141,7 @@ def initial_random_spawn(
     }
     dropped = set(copies)
     try:
-        delta_json, unplaced = scene.simulator.random_spawn(json.dumps(request))
+        delta_json, unplaced = scene.simulator.core.random_spawn(json.dumps(request))
         scene.apply(delta_json)
         dropped.intersection_update(unplaced)
     finally:
@@ -227,7 +227,7 @@ def advance_physics_step(
         )
     if simSeconds is not None and simSeconds < 0:
         raise ActionError(f"simSeconds must be non-negative (simSeconds=={simSeconds:g}).")
-    delta_json = engine.scene.simulator.settled()
+    delta_json = engine.scene.simulator.core.settled()
     if json.loads(delta_json)["moves"]:
         engine.scene.apply(delta_json)
 

@@ -5,8 +5,8 @@ Based on `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` a
 
 import math
 
-from evonav.thor.actions.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
-from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode, Vector3, action
+from evonav.thor.actions.motion import invalid_operation, is_within_bounds, snapped, vector_text
+from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode, Vector3, action, missing_arguments
 from evonav.thor.agent import BODY_Y_M
 from evonav.thor.engine import Engine
 from evonav.world.pose import canonical_deg, canonical_yaw_deg
