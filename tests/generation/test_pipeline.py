@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 from build_tasks import build_tasks
+from generated_tasks import generated_tasks
 
-from evonav.errors import InvalidArgumentError, TaskError
+from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.generation import (
     GenerationParameters,
-    Rejections,
     TaskRejectedError,
     generate_task,
-    generate_tasks,
     write_task,
 )
 from evonav.house import House, bundled_houses
@@ -30,7 +29,7 @@ def houses() -> list[House]:
 
 @pytest.fixture(scope="module")
 def tasks(houses: list[House]) -> list[Task]:
-    return list(generate_tasks(houses, seed=0))
+    return list(generated_tasks(houses, 0))
 
 
 def bytes_of(directory: Path) -> dict[str, bytes]:
@@ -53,21 +52,18 @@ def test_the_draws_follow_contents_and_seed_not_the_name(houses: list[House]) ->
     assert generate_task(one, seed=1).oracle_stages != generate_task(one, seed=2).oracle_stages
 
 
-def test_unusable_houses_are_counted_and_left_out(houses: list[House]) -> None:
+def test_a_house_without_a_task_says_why(houses: list[House]) -> None:
     document = json.loads(houses[0].to_json())
     without_start = {**document, "metadata": {}}
     unknown = json.loads(json.dumps(document))
     unknown["objects"][0]["assetId"] = "no_such_asset"
     broken = [House(json.dumps(wrong), name=name) for name, wrong in (("a", without_start), ("b", unknown))]
-    rejections = Rejections()
-    made = list(generate_tasks([*broken, houses[0]], seed=0, rejections=rejections))
-    assert [task.header.house.name for task in made] == [houses[0].name]
-    assert rejections.reasons == {"no_start": 1, "unusable_house": 1}
-    assert (rejections.num_houses, rejections.num_rejected) == (3, 2)
     with pytest.raises(TaskRejectedError, match=r"a: no_start at stage 0") as caught:
         generate_task(broken[0], seed=0)
     assert isinstance(caught.value, TaskError)
     assert caught.value.reason == "no_start"
+    with pytest.raises(HouseError, match="no_such_asset"):
+        generate_task(broken[1], seed=0)
 
 
 def test_a_bad_parameter_is_named(houses: list[House]) -> None:
@@ -140,7 +136,7 @@ def test_transitions_and_modes_are_drawn_as_the_paper_says(houses: list[House]) 
     lengths: Counter[int] = Counter()
     small = sorted(houses, key=lambda house: len(house.objects))[:9]
     for seed in range(20):
-        for task in generate_tasks(small, seed=seed):
+        for task in generated_tasks(small, seed):
             lengths[task.num_stages] += 1
             for stage in task.oracle_stages[1:]:
                 outcomes[stage.evolution.outcome] += 1

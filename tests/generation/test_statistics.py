@@ -5,12 +5,12 @@ from pathlib import Path
 from statistics import fmean, median
 
 import pytest
+from generated_tasks import generated_tasks
 from html_nesting import check_html
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.generation import generate_tasks
 from evonav.generation.dataset import generate_dataset
 from evonav.generation.statistics.compute import statistics_of, statistics_of_folders
 from evonav.generation.statistics.metrics import METRICS, PAPER_EVOLUTIONS
@@ -163,7 +163,7 @@ def test_reweighted_figures_are_weighted_means_by_hand(tasks: list[Task], found:
 
 def test_tasks_of_one_house_count_as_one_unit() -> None:
     """Ten copies of each task tell no more than one: the interval stays, and Wilson's no longer holds."""
-    summaries = [summary_of_task(task) for task in generate_tasks(bundled_houses(12), seed=1)]
+    summaries = [summary_of_task(task) for task in generated_tasks(bundled_houses(12), 1)]
     once, often = statistics_of(summaries), statistics_of(summaries * 10)
     assert (often.num_tasks, often.num_houses) == (10 * once.num_tasks, once.num_houses)
     assert once.metric("goal_relocated").raw == often.metric("goal_relocated").raw
@@ -174,7 +174,7 @@ def test_tasks_of_one_house_count_as_one_unit() -> None:
 def test_moved_now_is_told_from_moved_ever() -> None:
     """Many seeds of few houses: among the goals after a change are some that only an earlier change moved."""
     small = sorted(bundled_houses(16), key=lambda house: len(house.objects))[:4]
-    made = [task for seed in range(8) for task in generate_tasks(small, seed=seed)]
+    made = [task for seed in range(8) for task in generated_tasks(small, seed)]
     found = statistics_of(map(summary_of_task, made))
     evolved = [s for task in made for s in task.oracle_stages if s.evolution.outcome == "evolved"]
     moved_now = [any(c.id == s.target.id and c.is_relocated for c in s.evolution.changes) for s in evolved]

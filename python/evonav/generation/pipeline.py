@@ -1,9 +1,7 @@
 """Generate tasks from houses: the core runs Algorithm 1 of the paper, this module writes its result as a task."""
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,64 +101,6 @@ def generate_task(
         houses_json=tuple(houses),
     )
     return task.with_checksums()
-
-
-@dataclass
-class Rejections:
-    """Counts of houses without a task."""
-
-    num_houses: int = 0
-    """Number of houses tried."""
-    reasons: Counter[str] = field(default_factory=Counter)
-    messages: list[str] = field(default_factory=list)
-
-    @property
-    def num_rejected(self) -> int:
-        """Number of houses without a task."""
-        return sum(self.reasons.values())
-
-
-def generate_tasks(
-    houses: Iterable[House],
-    *,
-    seed: int,
-    config: GenerationParameters | None = None,
-    rejections: Rejections | None = None,
-    dataset: str = "evonav",
-    split: str = "none",
-    allow_unknown_assets: bool = False,
-) -> Iterator[Task]:
-    """Generate one task from each house, and skip houses that give none.
-
-    Args:
-        houses: Houses to try.
-        seed: Seed as for `generate_task`, the same for all houses.
-        config: Generation parameters; default the paper's.
-        rejections: Counts of skipped houses, updated for each of them.
-        dataset: Name of the data set, recorded in the headers.
-        split: Name of the split, recorded in the headers.
-        allow_unknown_assets: Accept unknown assets, see `generate_task`.
-    """
-    rejections = Rejections() if rejections is None else rejections
-    for house in houses:
-        rejections.num_houses += 1
-        try:
-            task = generate_task(
-                house,
-                seed=seed,
-                config=config,
-                dataset=dataset,
-                split=split,
-                allow_unknown_assets=allow_unknown_assets,
-            )
-        except TaskRejectedError as error:
-            rejections.reasons[error.reason] += 1
-            rejections.messages.append(str(error))
-        except (_core.HouseError, _core.SimulationError) as error:
-            rejections.reasons["unusable_house"] += 1
-            rejections.messages.append(str(error))
-        else:
-            yield task
 
 
 def house_source(house: House, sha256: str) -> HouseSource:

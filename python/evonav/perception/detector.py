@@ -41,7 +41,7 @@ class Found:
         return len(self.labels)
 
     def taken(self, indices: Sequence[int] | NDArray[np.int64]) -> "Found":
-        """Only some of it, in the order of `indices`."""
+        """Return some of the detections, in the order of `indices`."""
         chosen = np.asarray(indices, np.int64)
         return Found(
             masks=self.masks[chosen],

@@ -3,7 +3,7 @@
 Only colours and depth go in; instances and the scene's objects are not used.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +27,20 @@ class DetectorPerception:
         detector: Detector,
         filters: FilterConfig | None = None,
         embedder: Embedder | None = None,
-        types: Mapping[str, str] = TYPE_OF_WORD,
     ) -> None:
         """Make a perception over models that may be shared.
 
         Args:
-            detector: Finds.
+            detector: Detector that finds objects.
             filters: Filters on detections; default: 3D-Mem's values.
-            embedder: Gives what is left features; without, they are the detector's, if it has some.
-            types: ProcTHOR's type by the detector's word; a word that is not in it stays as it is.
+            embedder: Computes the features of the remaining detections; default: the detector's own, if it has any.
         """
         self._detector = detector
         self._filters = filters or FilterConfig()
         self._embedder = embedder
-        self._types = types
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Do nothing: nothing of the scene is used."""
+        """Do nothing: the scene is not used."""
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Perceive the views of a round, as one batch.
@@ -83,7 +80,7 @@ class DetectorPerception:
         labels = [label for label, is_large in zip(found.labels, is_large_enough.tolist(), strict=True) if is_large]
         return Detections(
             masks=masks,
-            labels=tuple(self._types.get(label, label) for label in labels),
+            labels=tuple(TYPE_OF_WORD.get(label, label) for label in labels),
             confidences=found.confidences[is_large_enough],
             features=None if features is None else features[is_large_enough],
         )

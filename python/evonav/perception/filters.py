@@ -40,7 +40,7 @@ class FilterConfig:
     """
 
     def __post_init__(self) -> None:
-        """Refuses what makes no sense.
+        """Check all values.
 
         Raises:
             InvalidArgumentError: A parameter is outside its domain; the message names it.
@@ -212,7 +212,7 @@ def mask_ious(masks: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def _extent(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
-    """First row and column of a mask, and the ones after its last."""
+    """Return the first row and column of a mask, and the ones after its last."""
     rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return (int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1) if len(rows) else (0, 0, 0, 0)
 

@@ -31,7 +31,7 @@ class GroundTruthPerception:
 
     @property
     def needs_rgb(self) -> bool:
-        """No: instances say it all."""
+        """False: instances are enough."""
         return False
 
     def begin_stage(self, scene: StageScene) -> None:
@@ -43,10 +43,10 @@ class GroundTruthPerception:
         return [Percept(self.detect(frame, self._objects), frame.depth_m, frame.pose) for frame in frames]
 
     def text_feature(self, text: str) -> None:
-        """Ground truth has no features."""
+        """Return `None`: ground truth has no features."""
 
     def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
-        """Objects in the frame; walls, floors, ceilings, doors and windows are background.
+        """Return the objects in a frame; walls, floors, ceilings, doors and windows are background.
 
         Detections are numbered anew in every frame, in the order of their first pixel: neither numbers nor their
         order tell which instance a detection is.
@@ -85,5 +85,5 @@ class GroundTruthPerception:
         )
 
     def min_px(self, frame: Frame) -> int:
-        """Fewest pixels of a mask in a frame."""
+        """Return the fewest pixels of a mask in a frame."""
         return max(self.min_area_px, round(self.min_area_fraction * frame.depth_m.size))

@@ -24,7 +24,7 @@ WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
 
 @cache
 def _network(weights: Path) -> _core.MiniNetwork:
-    """Read once a process."""
+    """Return the network of a file of weights, read once a process."""
     try:
         return _core.MiniNetwork(weights.read_bytes())
     except (OSError, InvalidArgumentError) as error:

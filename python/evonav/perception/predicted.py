@@ -65,7 +65,7 @@ class StackConfig:
     """3d-mem: show detector and SAM red as blue and blue as red, as 3D-Mem's released code does."""
 
     def __post_init__(self) -> None:
-        """Refuses what makes no sense.
+        """Check all options.
 
         Raises:
             InvalidArgumentError: An option is outside its domain; the message names it.
@@ -86,7 +86,7 @@ class StackConfig:
 
     @classmethod
     def from_options(cls, options: Mapping[str, Any]) -> "StackConfig":
-        """Options as people write them.
+        """Return the configuration with some options.
 
         Raises:
             InvalidArgumentError: There is no such option, or it is outside its domain.
@@ -187,7 +187,7 @@ def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
 
 
 def modules_of(stack: StackName) -> tuple[str, ...]:
-    """Modules that a stack imports."""
+    """Return the modules that a stack imports."""
     return {
         "3d-mem": ("torch", "open_clip", "ultralytics"),
         "unigoal": ("torch", "torchvision", "transformers"),

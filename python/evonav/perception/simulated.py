@@ -37,7 +37,7 @@ _GROUND_TRUTH = GroundTruthPerception()
 
 
 def noisy_perception(preset: str = "yolo-world-like", **options: Any) -> "NoisyPerception":  # noqa: ANN401 - JSON
-    """Ground truth with the errors of a preset.
+    """Return ground truth with the errors of a preset.
 
     Args:
         preset: Name of a preset of `noise_presets`.
@@ -84,7 +84,7 @@ class NoisyPerception:
 
     @property
     def needs_rgb(self) -> bool:
-        """No: everything is made from instances and depth."""
+        """False: everything is made from instances and depth."""
         return False
 
     def begin_stage(self, scene: StageScene) -> None:
@@ -124,7 +124,7 @@ class NoisyPerception:
         return ["passing", scene.task_id, str(scene.goal.stage), str(self._round), *labels]
 
     def _draws(self, view: str, ids: Sequence[str]) -> F64:
-        """`(N, _NUM_DRAWS)` standard normals of objects in a view, those of an object correlated over views."""
+        """Return `(N, _NUM_DRAWS)` standard normals of objects in a view, correlated over the views of an object."""
         seed, share = self._stage().seed, self.config.persistence
         new = [one for one in dict.fromkeys(ids) if one not in self._lasting]
         drawn = _core.draw_normals(seed, [self._lasting_labels("object", one) for one in new], num_draws=_NUM_DRAWS)
@@ -201,7 +201,7 @@ class NoisyPerception:
         view: str,
         bodies: Sequence[SceneObject],
     ) -> NDArray[np.int32]:
-        """Masks with their errors; parts of split ones are added to `sources`, which tells whose each is."""
+        """Return masks with their errors; parts of split masks are added to `sources`, the object of each mask."""
         config = self.config
         numbers = np.where(found.is_reported, np.arange(len(bodies)), -1)
         shares = _shares(found.draws)
@@ -257,7 +257,7 @@ class NoisyPerception:
     def _phantoms(
         self, frame: Frame, masks: NDArray[np.int32], view: str, first: int
     ) -> list[tuple[str, float, tuple[str, str]]]:
-        """Paints detections of nothing into the masks: label, confidence, and names of what lasts and what does not."""
+        """Paint false detections into the masks; return label, confidence, and names of lasting and passing draws."""
         config, scene = self.config, self._stage()
         if config.false_positives_per_view == 0.0 or frame.instances is None:
             return []
@@ -306,7 +306,7 @@ class NoisyPerception:
         places: Sequence[tuple[str, str]],
         labels: Sequence[str],
     ) -> NDArray[np.float32]:
-        """`(N, D)` features: of objects, parts of objects and what is not there."""
+        """Return the `(N, D)` features of objects, parts of objects and false detections."""
         label_sets = [tuple(dict.fromkeys((found.true_labels[n], found.labels[n]))) for n in sources]
         label_sets += [(label,) for label in labels[len(sources) :]]
         task_id = self._stage().task_id
@@ -345,21 +345,21 @@ def _shares(normals: F64) -> F64:
 
 
 def _rising(values: F64, half: float, slope: float) -> F64:
-    """1 where a value is large, half at `half`; 1 everywhere if that is 0."""
+    """Return values near 1 where `values` are large, and 0.5 at `half`; 1 everywhere if `half` is 0."""
     if half == 0.0:
         return np.ones(len(values))
     return 1.0 / (1.0 + (half / np.maximum(values, 1e-9)) ** slope)
 
 
 def _falling(values: F64, half: float, slope: float) -> F64:
-    """1 where a value is small, half at `half`; 1 everywhere if that is 0."""
+    """Return values near 1 where `values` are small, and 0.5 at `half`; 1 everywhere if `half` is 0."""
     if half == 0.0:
         return np.ones(len(values))
     return 1.0 / (1.0 + (values / half) ** slope)
 
 
 def _confidences(medians: F64, quality: F64, normals: F64, config: NoiseConfig) -> F64:
-    """Log-odds about those of the median, lower the harder an object is to see; a median of 1 stays 1."""
+    """Draw confidences around the medians, lower for objects that are hard to see; a median of 1 stays 1."""
     with np.errstate(divide="ignore"):
         odds = np.log(medians) - np.log1p(-medians) + np.log(np.maximum(quality, _SMALLEST_QUALITY))
     values = 1.0 / (1.0 + np.exp(-(odds + config.confidence_spread * normals)))
@@ -367,7 +367,7 @@ def _confidences(medians: F64, quality: F64, normals: F64, config: NoiseConfig) 
 
 
 def _beside(masks: NDArray[np.int32]) -> list[tuple[int, int]]:
-    """Pairs of masks with pixels side by side, each once, the lower number first."""
+    """Return the pairs of masks with adjacent pixels, each once, the lower number first."""
     count = int(masks.max()) + 1
     keys = []
     for here, there in ((masks[:, :-1], masks[:, 1:]), (masks[:-1], masks[1:])):

@@ -32,7 +32,7 @@ F64 = NDArray[np.float64]
 
 
 def image_feature(labels: tuple[str, ...], confusion: Confusion, thing: F64, view: F64, noise: float) -> F64:
-    """`(64,)` unit feature of a detection.
+    """Return the `(64,)` unit feature of a detection.
 
     Args:
         labels: The true category and, where it is another, the label that it was given: it looks like both.
@@ -48,7 +48,7 @@ def image_feature(labels: tuple[str, ...], confusion: Confusion, thing: F64, vie
 
 
 def text_feature(text: str, confusion: Confusion) -> NDArray[np.float32]:
-    """`(64,)` unit feature of a text: of the categories it names, the first of them before the others."""
+    """Return the `(64,)` unit feature of a text, made from the categories that it names; the first weighs most."""
     found = nouns_of(text, confusion.categories)
     named = np.zeros(DIMENSIONS - 2)
     for place, label in enumerate(found):
@@ -61,7 +61,7 @@ def text_feature(text: str, confusion: Confusion) -> NDArray[np.float32]:
 
 
 def nouns_of(text: str, categories: tuple[str, ...]) -> list[str]:
-    """Categories that a text names, each once, in its order."""
+    """Return the categories that a text names, each once, in order."""
     pattern, by_noun = _nouns(categories)
     return list(dict.fromkeys(by_noun[match.lower()] for match in pattern.findall(text)))
 

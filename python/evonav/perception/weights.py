@@ -1,4 +1,4 @@
-"""Files that models need: where they come from, where they are, and whether they are what they were.
+"""Locate, download and verify the files of models' weights.
 
 A file is looked for in the folder of `--models` (or `EVONAV_MODELS`), under the hub's own name. Without a folder it is
 looked for where its library keeps such files, and fetched from the library's hub if it is not there. Either way its
@@ -121,7 +121,7 @@ def models_folder(models: str | None) -> Path | None:
 
 
 def known(name: str) -> Weights:
-    """Weights by their name.
+    """Return the weights with a name.
 
     Raises:
         PerceptionError: There are none of this name.
@@ -149,7 +149,7 @@ def located(weights: Weights, folder: Path | None) -> Path:
 
 
 def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
-    """SHA-256 of each file, checked.
+    """Return the checked SHA-256 of each file.
 
     Args:
         weights: Weights of a model.
@@ -225,7 +225,7 @@ def _located(file: WeightFile, folder: Path | None) -> Path:
 
 
 def _probe(file: WeightFile, about: str) -> None:
-    """Fails at once where the hub's client would try again and again."""
+    """Raise at once if the hub cannot be reached; its own client would retry for half a minute."""
     host = urlsplit(file.source).hostname or ""
     is_off = os.environ.get("HF_HUB_OFFLINE", "").lower() in ("1", "true", "yes", "on")
     try:
@@ -262,7 +262,7 @@ def _fetched(file: WeightFile, path: Path) -> Path:
 
 
 def _checked(file: WeightFile, path: Path, folder: Path | None) -> str:
-    """SHA-256 of a file; it is computed again only when the file has changed."""
+    """Return the checked SHA-256 of a file; it is computed again only when the file has changed."""
     lock = (folder or own_folder()) / LOCK_NAME
     entries = _read_lock(lock)
     entry = entries.get(file.name, {})

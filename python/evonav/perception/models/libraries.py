@@ -1,4 +1,4 @@
-"""Libraries that come with extras, and the device that they compute on."""
+"""Import the libraries of extras, and choose the device that they compute on."""
 
 import os
 from collections.abc import Iterator
@@ -44,7 +44,7 @@ def imported(module: str) -> Any:  # noqa: ANN401 - a module
 
 
 def versions_of(modules: tuple[str, ...], extra: str) -> dict[str, str]:
-    """Version by package, without importing any.
+    """Return versions by package, without importing any.
 
     Args:
         modules: Modules of `EXTRA_OF`.
