@@ -11,7 +11,7 @@ from PIL import Image
 from evonav.component import optional_module
 from evonav.errors import InvalidArgumentError
 from evonav.parallel.folders import replacing
-from evonav.report.maps.files import check_png, check_suffix
+from evonav.report.maps.files import check_suffix, resvg
 
 SUFFIX = ".mp4"
 MIN_WIDTH_PX = 320
@@ -32,7 +32,7 @@ def check_video(path: Path, fps: float, width_px: int) -> None:
     if width_px < MIN_WIDTH_PX or width_px % 2:
         raise InvalidArgumentError(f"argument `width_px` is {width_px}, expected an even number from {MIN_WIDTH_PX}")
     _imageio()
-    check_png()
+    resvg()
 
 
 def write_video(stages: Iterable[Iterable[Image.Image]], path: Path, *, fps: float = 2.0, width_px: int = 1280) -> int:

@@ -29,7 +29,7 @@ def check_picture(path: Path) -> None:
     """
     suffix = check_suffix(path, *SUFFIXES)
     if suffix == ".png":
-        _resvg()
+        resvg()
     elif suffix == ".pdf":
         _typst()
 
@@ -80,17 +80,8 @@ def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff", h
     fonts: dict[str, Any] = {"font_dirs": folders, **families} if folders else {}
     # Without a folder of our own, the machine's fonts are the only ones.
     skips_system = bool(folders) and not has_system_fonts
-    draw = _resvg().svg_to_bytes
+    draw = resvg().svg_to_bytes
     return bytes(draw(svg_string=svg, zoom=zoom, background=background, skip_system_fonts=skips_system, **fonts))
-
-
-def check_png() -> None:
-    """Check that drawings can be converted to PNG.
-
-    Raises:
-        StoreError: resvg is not installed.
-    """
-    _resvg()
 
 
 def _pdf(svg: str) -> bytes:
@@ -106,7 +97,12 @@ def _font_folders() -> list[str]:
     return [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")]
 
 
-def _resvg() -> Any:  # noqa: ANN401 - a module
+def resvg() -> Any:  # noqa: ANN401 - a module
+    """Return the library that converts drawings to PNG.
+
+    Raises:
+        StoreError: It is not installed.
+    """
     return optional_module("resvg_py", "pictures as PNG need resvg", "'evonav[viz]'")
 
 
