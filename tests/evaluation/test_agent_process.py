@@ -18,10 +18,10 @@ from toy_house import write_tasks
 from evonav.agents.registry import BUILT_IN
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
+    AgentFailedError,
     AgentHosting,
     AgentProcesses,
     check_importable,

@@ -13,7 +13,7 @@ LINE_EVERY_S = 60.0
 """Seconds between two lines of progress where there is no terminal."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from rich.table import Table
 
@@ -87,6 +87,25 @@ def _percent_interval(interval: tuple[float, float] | None) -> str:
     return "" if interval is None else f"{100 * interval[0]:.0f}-{100 * interval[1]:.0f}"
 
 
+def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> None:
+    """Print a table of checks.
+
+    Args:
+        title: Title of the table.
+        checks: Name, result, style of the result, and finding of each check.
+    """
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=title)
+    for column in ("check", "", "what was found"):
+        table.add_column(column, no_wrap=column != "what was found")
+    for name, result, style, finding in checks:
+        table.add_row(name, Text(result, style=style), Text(finding))
+    Console().print(table)
+
+
 @contextmanager
 def status(text: str) -> "Iterator[Callable[[str], None]]":
     """Show a moving line; the yielded function adds a text to it."""
@@ -98,8 +117,8 @@ def status(text: str) -> "Iterator[Callable[[str], None]]":
 
 
 @contextmanager
-def progress() -> "Iterator[Callable[[Progress], None]]":
-    """Show a progress bar over stages; the yielded function updates it."""
+def progress_bar(description: str) -> "Iterator[Callable[..., None]]":
+    """Show a progress bar; the yielded function takes the numbers of done and of all, and may take a description."""
     from rich import progress as bars
     from rich.console import Console
 
@@ -111,14 +130,19 @@ def progress() -> "Iterator[Callable[[Progress], None]]":
         bars.TimeRemainingColumn(),
     )
     with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-        stages = bar.add_task("stages")
+        line = bar.add_task(description, total=None)
 
-        def show(state: "Progress") -> None:
-            latest = state.latest
-            described = "stages" if latest is None else f"{latest.agent} {latest.task_id}/{latest.stage}"
-            bar.update(stages, completed=state.num_done, total=state.num_stages, description=described)
+        def show(num_done: int, num_all: int, latest: str = "") -> None:
+            bar.update(line, completed=num_done, total=num_all, description=latest or description)
 
         yield show
+
+
+@contextmanager
+def progress() -> "Iterator[Callable[[Progress], None]]":
+    """Show a progress bar over stages; the yielded function updates it."""
+    with progress_bar("stages") as show:
+        yield lambda state: show(state.num_done, state.num_stages, "" if state.latest is None else state.latest.label)
 
 
 @contextmanager

@@ -16,9 +16,9 @@ from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
-from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.staleness import entry_record, matched_object
+from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord
 from evonav.replay.types import (

@@ -5,12 +5,11 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
+
 
 def breakdown(
-    runs: Annotated[
-        list[str],
-        typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
-    ],
+    runs: ComparedRuns,
     by: Annotated[
         list[str] | None,
         typer.Option(
@@ -19,9 +18,9 @@ def breakdown(
         ),
     ] = None,
     measure: Annotated[str, typer.Option(help="Numeric field of a stage's row (docs/measures.md).")] = "success",
-    md: Annotated[Path | None, typer.Option(help="Write a Markdown file.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="Write a LaTeX file (booktabs, graphicx).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="Write a CSV file with unrounded numbers.")] = None,
+    md: MarkdownFile = None,
+    latex: LatexFile = None,
+    csv: CsvFile = None,
     plot: Annotated[Path | None, typer.Option(help="Write plots to a .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
     """Show rates by kind of stage, each with n and a 95% interval over houses."""

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -12,10 +14,7 @@ if TYPE_CHECKING:
 
 
 def compare(
-    runs: Annotated[
-        list[str],
-        typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
-    ],
+    runs: ComparedRuns,
     measure: Annotated[
         list[str] | None,
         typer.Option(help="Compare another numeric field of a stage's row. Repeat the option for more."),
@@ -27,9 +26,9 @@ def compare(
             "--allow-differences", help="Compare runs of different tasks or protocols on the stages that they share."
         ),
     ] = False,
-    md: Annotated[Path | None, typer.Option(help="Write a Markdown file.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="Write a LaTeX file (booktabs, graphicx).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="Write a CSV file with unrounded numbers.")] = None,
+    md: MarkdownFile = None,
+    latex: LatexFile = None,
+    csv: CsvFile = None,
     json: Annotated[Path | None, typer.Option(help="Write a JSON file, with the stages whose outcome differs.")] = None,
     html: Annotated[Path | None, typer.Option(help="Write an HTML page with links to replays.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Write a plot to a .svg, .png or .pdf file (extra `viz`).")] = None,

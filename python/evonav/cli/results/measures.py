@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import RunFolder, listed
 
 
 def measures(
@@ -22,7 +22,7 @@ def measures(
     from evonav.report.tables.metric_tables import measures_tables
     from evonav.report.tables.table import markdown_tables
 
-    names = None if agents is None else [name.strip() for name in agents.split(",") if name.strip()]
+    names = None if agents is None else listed(agents)
     tables = [table for table in measures_tables(run, names) if table.rows]
     console = Console()
     for table in tables:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import interruptible, show
+from evonav.cli.display import interruptible, progress_bar, show
 from evonav.cli.options import completion
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
@@ -14,6 +14,7 @@ from evonav.cli.options.shared import (
     Limit,
     Seed,
     Subset,
+    chosen_tasks,
 )
 
 if TYPE_CHECKING:  # the command must start fast
@@ -57,18 +58,11 @@ def perception(
 
     Every perception sees the same views. Run again to resume. Writes OUT/report.html, summary.json, .csv and .md.
     """
-    from rich import progress as bars
-    from rich.console import Console
-
     from evonav.evaluation.run.settings import PerceptionSettings
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
     from evonav.perception_benchmark.tables import perception_tables
-    from evonav.tasks.bundled import bundled_tasks
-    from evonav.tasks.listing import task_files
 
-    if limit is not None and subset is not None:
-        raise typer.BadParameter("give --limit or --subset, not both")
     names = perceptions or ["gt"]
     if models.model_fields_set and not any(word.startswith("predicted") for word in names):
         raise typer.BadParameter("--models and --device are for --perception predicted")
@@ -77,26 +71,16 @@ def perception(
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    with interruptible(out), bundled_tasks() as bundled:
-        with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-            line = bar.add_task("tours", total=None)
+    with interruptible(out), chosen_tasks(tasks, limit, subset) as task_files:
+        with progress_bar("tours") as on_progress:
             measured = measure(
                 specs,
-                task_files(tasks or bundled, limit, subset),
+                task_files,
                 out,
                 config=TourConfig(views_per_room, houses, seed),
                 simulator=f"evonav.evaluation.run.components:{name}",
                 num_workers=workers.num_workers,
-                on_progress=lambda done, num, latest: bar.update(
-                    line, completed=done, total=num, description=latest or "tours"
-                ),
+                on_progress=on_progress,
             )
         for word, task_id, why in measured.failures:
             typer.echo(f"failed: {word} {task_id}: {why}", err=True)

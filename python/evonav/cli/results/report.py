@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import print_table
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, numbers_of
 from evonav.cli.results.view import replay_pages
 from evonav.cli.run.sweep import write_sweep_summary
 
@@ -26,10 +26,8 @@ def report(
             help=f"Number of episodes to replay, all or none. Default: {NUM_REPLAYS} highlights, none for sweeps.",
         ),
     ] = None,
-    tasks: Annotated[
-        Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")
-    ] = None,
-    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")] = None,
+    tasks: RunTasks = None,
+    exchanges: Exchanges = None,
     maps: Annotated[bool, typer.Option("--maps", help="Also write the map of every stage to maps/*.svg.")] = False,
 ) -> None:
     """Write an HTML report of a run or sweep, with tables, maps and replays (docs/report.md)."""
@@ -85,10 +83,7 @@ def strip(
     """Draw one task of a run as a picture, with a column per stage and a row per agent."""
     from evonav.report import write_strip
 
-    try:
-        numbers = [int(stage) for stage in stages.split(",")] if stages else None
-    except ValueError:
-        raise typer.BadParameter(f"--stages {stages}: numbers, comma-separated") from None
+    numbers = numbers_of("--stages", stages) or None
     typer.echo(f"picture: {write_strip(run, task, agents.split(','), out, stages=numbers)}")
 
 

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.display import print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import Limit, Subset, Tasks
+from evonav.cli.options.shared import Limit, Subset, Tasks, chosen_tasks, listed
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.settings import RunSettings
@@ -33,7 +34,7 @@ def pack(
     run = run.absolute()
     target = out or run.with_name(run.name + SUFFIX)
     about = About(title=title, authors=authors, contact=contact, url=url, description=description)
-    names = None if agents is None else [name.strip() for name in agents.split(",") if name.strip()]
+    names = None if agents is None else listed(agents)
     header = pack(run, target, agents=names, about=about)
     typer.echo(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
@@ -60,23 +61,15 @@ def verify(
     """Score a packed run again by carrying out its actions; exit code 1 if anything was altered or is missing."""
     import json
 
-    from rich.console import Console
-    from rich.progress import Progress
-
     from evonav.submission.verify import verdict_json, verify
-    from evonav.tasks.bundled import bundled_tasks
-    from evonav.tasks.listing import task_files
 
-    if limit is not None and subset is not None:
-        raise typer.BadParameter("give --limit or --subset, not both")
-    with bundled_tasks() as bundled, Progress(console=Console(stderr=True), transient=True) as bar:
-        line = bar.add_task("carrying actions out again", total=None)
+    with chosen_tasks(tasks, limit, subset) as task_files, progress_bar("carrying actions out again") as on_progress:
         verdict = verify(
             file,
-            task_files(tasks or bundled, limit, subset),
+            task_files,
             scores_only=scores_only,
             num_workers=workers.num_workers,
-            on_progress=lambda done, total: bar.update(line, completed=done, total=total),
+            on_progress=on_progress,
         )
     if as_json:
         typer.echo(json.dumps(verdict_json(verdict), indent=2, sort_keys=True))
@@ -87,24 +80,19 @@ def verify(
 
 
 def _print(file: Path, verdict: "Verdict") -> None:
-    from rich.console import Console
     from rich.table import Table
-    from rich.text import Text
 
-    console = Console()
-    table = Table(title=f"{file.name}: {'accepted' if verdict.is_accepted else 'REJECTED'}")
-    for column in ("check", "", "what was found"):
-        table.add_column(column, no_wrap=column != "what was found")
-    for check in verdict.checks:
-        mark = Text("ok", style="green") if check.is_passed else Text("fail", style="bold red")
-        table.add_row(check.name, mark, Text(check.detail))
-    console.print(table)
+    marks = {True: ("ok", "green"), False: ("fail", "bold red")}
+    print_checks(
+        f"{file.name}: {'accepted' if verdict.is_accepted else 'REJECTED'}",
+        ((check.name, *marks[check.is_passed], check.detail) for check in verdict.checks),
+    )
     if verdict.is_accepted and verdict.submission is not None:
         scores = Table(title="SR and SPL in %, of the records")
         for column in ("agent", "n", "SR", "SPL"):
             scores.add_column(column, justify="left" if column == "agent" else "right")
         for agent, row in verdict.submission.summary["agents"].items():
             scores.add_row(agent, str(row["n"]), f"{100 * row['sr']:.1f}", f"{100 * row['spl']:.1f}")
-        console.print(scores)
+        show(scores)
         if not verdict.is_rescored:
-            console.print("The actions were not carried out again: the recorded paths were taken as they are.")
+            typer.echo("The actions were not carried out again: the recorded paths were taken as they are.")

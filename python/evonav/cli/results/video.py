@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, numbers_of
 from evonav.cli.results.view import task_path
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 Task = Annotated[str | None, typer.Argument(help="Id of a task of the run. Default: the best highlight.")]
 Agent = Annotated[str | None, typer.Option(help="Agent of the run. Default: that of the best highlight.")]
 Stages = Annotated[str, typer.Option("--stage", help="Stages, separated by commas. Default: all.")]
-Tasks = Annotated[Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")]
-Exchanges = Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")]
 Out = Annotated[Path, typer.Option(help="File to write.")]
 
 ACTIONS_FPS, ROUNDS_FPS = 12.0, 2.0
@@ -39,7 +37,7 @@ def video(
         float | None, typer.Option(help="Rounds per second. Default: 2, or 12 where each round is a single action.")
     ] = None,
     width: Annotated[int, typer.Option(help="Width of the video, in pixels.")] = 1280,
-    tasks: Tasks = None,
+    tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
     """Write a video of an episode: views, the agent's map and memory, and the truth (docs/video.md)."""
@@ -70,7 +68,7 @@ def rerun(
     task: Task = None,
     agent: Agent = None,
     stage: Stages = "",
-    tasks: Tasks = None,
+    tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
     """Write an episode as a recording for the rerun viewer, with views, map, memory and truth (.rrd)."""
@@ -102,10 +100,7 @@ def _replayed(
     from evonav.report.pages.highlights import highlights_first
     from evonav.report.run import load_run
 
-    try:
-        wanted = {int(number) for number in stage.split(",")} if stage else None
-    except ValueError:
-        raise typer.BadParameter(f"--stage {stage}: numbers, comma-separated") from None
+    wanted = set(numbers_of("--stage", stage)) or None
     found = load_run(run)
     episodes = highlights_first(found)
     fitting = (one for one in episodes if one[0] == (agent or one[0]) and one[1] == (task or one[1]))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,16 +20,13 @@ def view(
     task: Annotated[str | None, typer.Option(help="Id of a task of the run. Default: the best highlight.")] = None,
     agent: Annotated[str, typer.Option(help="Agents of the run, separated by commas. Default: all.")] = "",
     stage: Annotated[int | None, typer.Option(min=1, help="Show only this stage.")] = None,
-    tasks: Annotated[
-        Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")
-    ] = None,
-    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")] = None,
+    tasks: RunTasks = None,
+    exchanges: Exchanges = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write. Default: RUN/view.")] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Show episodes round by round as HTML pages: views, map, memory, questions and answers (docs/viewer.md)."""
-    agents = [name.strip() for name in agent.split(",") if name.strip()]
-    pages, index = make_pages(run, task, agents, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
+    pages, index = make_pages(run, task, listed(agent), stage=stage, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:
         typer.echo(
             f"page: {index.parent / page.href}{' (the replay differs from the records)' if page.differs else ''}"

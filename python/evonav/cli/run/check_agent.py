@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.display import print_checks, status
 from evonav.cli.options.decisions import decision_component
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Seed
@@ -27,11 +28,6 @@ def check_agent(
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for an answer of the agent.")] = 60.0,
 ) -> None:
     """Check that an agent keeps the contract, in a bundled house that changes; exit code 1 if it does not."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    from evonav.cli.display import status
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
@@ -42,11 +38,9 @@ def check_agent(
             decision=decision_component(decisions, spending, Path(folder), seed, 1),
         )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
-    table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")
-    for column in ("check", "", "what was found"):
-        table.add_column(column, no_wrap=column != "what was found")
-    for check in report.checks:
-        table.add_row(check.name, Text(check.verdict, style=_STYLES[check.verdict]), Text(check.finding))
-    Console().print(table)
+    print_checks(
+        f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}",
+        ((check.name, check.verdict, _STYLES[check.verdict], check.finding) for check in report.checks),
+    )
     if not report.is_ok:
         raise typer.Exit(EXIT_BROKEN)

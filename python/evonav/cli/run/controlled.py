@@ -118,11 +118,7 @@ def evaluate(
     names = names_of(agents, agent)
 
     def tell(arm: str, progress: "Progress") -> None:
-        latest = (
-            ""
-            if progress.latest is None
-            else f" {progress.latest.agent} {progress.latest.task_id}/{progress.latest.stage}"
-        )
+        latest = "" if progress.latest is None else f" {progress.latest.label}"
         show(f"{arm} {progress.num_done} of {progress.num_stages}{latest}")
 
     with interruptible(directory), status("Running") as show:

@@ -1,6 +1,6 @@
 """`evonav evaluate`: run agents on tasks."""
 
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from evonav.cli.options.shared import (
     Seed,
     Subset,
     Tasks,
+    chosen_tasks,
     names_of,
 )
 
@@ -65,8 +66,6 @@ def evaluate(
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
-    if limit is not None and subset is not None:
-        raise typer.BadParameter("give --limit or --subset, not both")
     workforce = run.workforce()
     backend = Backend(
         simulator=simulation.component(),
@@ -108,30 +107,26 @@ def run_tasks(
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
     from evonav.parallel.worker import Workforce
-    from evonav.tasks.bundled import bundled_tasks
-    from evonav.tasks.listing import task_file, task_files
+    from evonav.tasks.listing import task_file
 
-    with ExitStack() as stack:
-        if houses is not None:
-            texts = HouseTexts(houses)
-            dataset, split = inherited_names(texts)
-            options = GenerationOptions(
-                seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets
-            )
-            with interruptible(out / "tasks"), generation_progress() as show:
-                generated = generate_dataset(
-                    texts,
-                    out / "tasks",
-                    options=options,
-                    limit=limit,
-                    subset=subset,
-                    workforce=Workforce(num_workers),
-                    on_progress=show,
-                )
-            yield [task_file(root) for root in generated.roots]
-        else:
-            directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
-            yield task_files(directory, limit, subset)
+    if houses is None:
+        with chosen_tasks(tasks, limit, subset) as found:
+            yield found
+        return
+    texts = HouseTexts(houses)
+    dataset, split = inherited_names(texts)
+    options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
+    with interruptible(out / "tasks"), generation_progress() as show:
+        generated = generate_dataset(
+            texts,
+            out / "tasks",
+            options=options,
+            limit=limit,
+            subset=subset,
+            workforce=Workforce(num_workers),
+            on_progress=show,
+        )
+    yield [task_file(root) for root in generated.roots]
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.display import progress_bar
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import AnyAsset, Limit
 
@@ -26,20 +27,15 @@ def validate(
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Check tasks: files, records, physics, reference views, trajectories, and that no oracle data is public."""
-    from rich import progress as bars
-    from rich.console import Console
-
     from evonav.generation.validation import validate_folder
 
-    columns = (bars.TextColumn("tasks"), bars.BarColumn(), bars.MofNCompleteColumn(), bars.TimeRemainingColumn())
-    with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-        tasks = bar.add_task("tasks")
+    with progress_bar("tasks") as on_progress:
         report = validate_folder(
             folder,
             limit=limit,
             num_workers=workers.num_workers,
             allow_unknown_assets=allow_unknown_assets,
-            on_progress=lambda done, total: bar.update(tasks, completed=done, total=total),
+            on_progress=on_progress,
         )
     if json_file is not None:
         write_json(report, json_file)

@@ -1,17 +1,15 @@
 """`evonav tasks write`: let a model rewrite the instructions of tasks."""
 
-from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.display import progress_bar
 from evonav.cli.options.shared import Limit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from evonav.generation.instructions.writer import Writing
 
 EXIT_INCOMPLETE = 3
@@ -91,8 +89,8 @@ def write(
         typer.echo(f"{estimate.num_questions} questions, {counts}:")
         typer.echo(f"at most {estimate.usage.input_tokens} tokens in, {estimate.usage.output_tokens} out{cost}")
         return
-    with _bar() as on_task:
-        writing = write_texts(folder, client, limit=limit, on_task=on_task)
+    with progress_bar("tasks") as show:
+        writing = write_texts(folder, client, limit=limit, on_task=lambda state: show(state.num_done, state.num_tasks))
     _tell(writing)
     cost = "" if account.cost_usd is None else f", ${account.cost_usd:.4f}"
     counts = f"{account.num_asked} questions asked, {account.num_replayed} answered from exchanges"
@@ -100,18 +98,6 @@ def write(
     if writing.stopped is not None:
         typer.echo(f"stopped: {writing.stopped}; run again to resume", err=True)
         raise typer.Exit(EXIT_INCOMPLETE)
-
-
-@contextmanager
-def _bar() -> "Iterator[Callable[[Writing], None]]":
-    """Show a progress bar over tasks; the yielded function updates it."""
-    from rich import progress as bars
-    from rich.console import Console
-
-    columns = (bars.TextColumn("tasks"), bars.BarColumn(), bars.MofNCompleteColumn(), bars.TimeRemainingColumn())
-    with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-        tasks = bar.add_task("tasks")
-        yield lambda state: bar.update(tasks, completed=state.num_done, total=state.num_tasks)
 
 
 def _tell(writing: "Writing") -> None:

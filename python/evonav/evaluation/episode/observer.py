@@ -6,7 +6,7 @@ from typing import Protocol
 
 from evonav.agents.hosting import error_text
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
-from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator

@@ -8,8 +8,7 @@ from evonav.agents.hosting import wire
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.errors import AgentFailedError
-from evonav.evaluation.hosting.process import AgentProcess, AgentProcesses, failure_of
+from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, AgentProcesses, failure_of
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo

@@ -24,8 +24,7 @@ from pathlib import Path
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
-from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
@@ -47,6 +46,22 @@ _START = (
     "import sys; sys.path[:] = sys.argv[4:]; "
     "from evonav.agents.hosting.serving import main; main(*map(int, sys.argv[1:4]))"
 )
+
+
+class AgentFailedError(EvonavError):
+    """An agent in its own process has failed: it raised an exception, died, or did not answer in time."""
+
+    def __init__(self, kind: ErrorKind, message: str, traceback: str = "") -> None:
+        """Create an error of one of the agent's own kinds (`ErrorKind.is_agents`).
+
+        Args:
+            kind: The kind of failure.
+            message: A description in one or a few lines.
+            traceback: The traceback of the agent's process.
+        """
+        super().__init__(message)
+        self.kind = kind
+        self.traceback = traceback
 
 
 @dataclass(frozen=True, slots=True)

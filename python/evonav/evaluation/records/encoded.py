@@ -35,6 +35,11 @@ class EncodedStage:
         return self.agent, self.task_id, self.stage
 
     @property
+    def label(self) -> str:
+        """Agent, task and stage, for people."""
+        return f"{self.agent} {self.task_id}/{self.stage}"
+
+    @property
     def is_scored(self) -> bool:
         """True if the stage counts in rates."""
         return self.state.is_scored
