@@ -5,17 +5,18 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
-from evonav.parallel.work import Heartbeat, end_work, load_work, steps
+from evonav.parallel.work import serve
 from evonav.parallel.worker import Worker, WorkerLostError
 
 END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""
+THREAD_VARIABLES = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""Environment variables that limit the threads of a process."""
 
 
 def num_cores() -> int:
@@ -74,25 +75,11 @@ class WorkerProcess:
 
 
 def _serve(connection: Connection, name: str, settings: str) -> None:
-    """Receive jobs and send their messages, until the parent closes the connection."""
+    """Run the jobs that arrive, until the parent closes the connection."""
     end_with_parent()
-
-    def say(kind: str, text: str = "") -> None:
-        connection.send_bytes(f"{kind} {text}".encode())
-
+    jobs = iter(lambda: connection.recv_bytes().decode(), None)
     with suppress(EOFError, OSError):  # the parent closed the connection
-        try:
-            work = load_work(name, settings, Heartbeat(lambda: say("alive")))
-        except Exception:
-            say("broken", traceback.format_exc())
-            return
-        try:
-            say("ready")
-            while True:
-                for kind, text in steps(work, connection.recv_bytes().decode()):
-                    say(kind, text)
-        finally:
-            end_work(work)
+        serve(name, settings, jobs, lambda kind, text: connection.send_bytes(f"{kind} {text}".encode()))
 
 
 @contextmanager
@@ -147,8 +134,7 @@ def end_process(process: multiprocessing.process.BaseProcess, connection: Connec
 @contextmanager
 def one_thread_each() -> Iterator[None]:
     """Give children that are started inside one thread each: the parallelism is over jobs."""
-    names = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    added = [name for name in names if name not in os.environ]
+    added = [name for name in THREAD_VARIABLES if name not in os.environ]
     os.environ.update(dict.fromkeys(added, "1"))
     try:
         yield

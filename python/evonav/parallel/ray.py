@@ -4,15 +4,13 @@ import math
 import os
 import queue
 import threading
-import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from evonav.parallel.work import Heartbeat, end_work, load_work, steps
+from evonav.parallel.local import END_TIMEOUT_S, THREAD_VARIABLES
+from evonav.parallel.work import serve
 from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Worker, WorkerLostError, Workforce
-
-_END_TIMEOUT_S = 5.0
 
 
 class RayHost:
@@ -106,7 +104,7 @@ class RayWorker:
         with suppress(self._ray.exceptions.RayError):
             if self._is_idle:
                 self._is_idle = False
-                self._ray.get(self._actor.end.remote(), timeout=_END_TIMEOUT_S)
+                self._ray.get(self._actor.end.remote(), timeout=END_TIMEOUT_S)
             self._ray.kill(self._actor)
 
 
@@ -114,7 +112,7 @@ class _Actor:
     """An actor that runs jobs in a thread of its own, while calls fetch their messages."""
 
     def __init__(self, work: str, settings: str) -> None:
-        for name in ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        for name in THREAD_VARIABLES:
             os.environ.setdefault(name, "1")
         self._jobs: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._messages: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
@@ -129,19 +127,10 @@ class _Actor:
 
     def end(self) -> None:
         self._jobs.put(None)
-        self._thread.join(_END_TIMEOUT_S)
+        self._thread.join(END_TIMEOUT_S)
 
     def _serve(self, name: str, settings: str) -> None:
         try:
-            work = load_work(name, settings, Heartbeat(lambda: self._messages.put(("alive", ""))))
-        except Exception:
-            self._messages.put(("broken", traceback.format_exc()))
-            return
-        try:
-            self._messages.put(("ready", ""))
-            while (text := self._jobs.get()) is not None:
-                for step in steps(work, text):
-                    self._messages.put(step)
-            end_work(work)
+            serve(name, settings, iter(self._jobs.get, None), lambda *message: self._messages.put(message))
         except BaseException:  # a job that ends its process also ends the actor
             os._exit(1)

@@ -1,8 +1,8 @@
-"""Run the jobs of a worker: load its work, yield the messages of a job, and send heartbeats."""
+"""Run the jobs of a worker: load its work, run its jobs, and send their messages and heartbeats."""
 
 import time
 import traceback
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 
@@ -59,3 +59,26 @@ class Heartbeat:
         if time.monotonic() - self.last_s >= HEARTBEAT_S:
             self.last_s = time.monotonic()
             self.send()
+
+
+def serve(work_name: str, settings: str, jobs: Iterator[str], send: Callable[[str, str], None]) -> None:
+    """Be a worker: load the work, run all jobs, and send the messages that `Worker.receive` describes.
+
+    Args:
+        work_name: `module:factory`.
+        settings: Text with which the factory is called.
+        jobs: The texts of the jobs; the next one is taken when the one before has ended.
+        send: Sends a message: its kind and its text.
+    """
+    try:
+        work = load_work(work_name, settings, Heartbeat(lambda: send("alive", "")))
+    except Exception:
+        send("broken", traceback.format_exc())
+        return
+    try:
+        send("ready", "")
+        for text in jobs:
+            for kind, message in steps(work, text):
+                send(kind, message)
+    finally:
+        end_work(work)

@@ -5,17 +5,49 @@ Rates and intervals are the runs' own; over seeds, stages of one house under sev
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from evonav.evaluation.metrics.navigation import Rates, rates
-from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.summary import SUMMARY_NAME, write_summary
 from evonav.statistics import Interval
-from evonav.sweeps.row import AXES, STATES, SweepRow
 from evonav.sweeps.run import RUNS_NAME, read_claim
+
+AXES = ("simulator", "perception", "decision", "tasks", "seed")
+STATES = ("success", "failure", "errored", "not_run")
+"""End states of a stage, in the order of tables."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepRow:
+    """An agent in a cell, or over the seeds of cells."""
+
+    cell: str
+    """Empty over seeds."""
+    simulator: str
+    perception: str
+    decision: str
+    tasks: str
+    seed: int | None
+    """`None`: over all of them."""
+    agent: str
+    n: int
+    """Scored stages."""
+    num_stages: int
+    sr: float | None
+    sr_ci95: Interval | None
+    spl: float | None
+    spl_ci95: Interval | None
+    counts: Mapping[str, int]
+    """Stages by end state; one that was not begun is not run."""
+
+    @property
+    def is_incomplete(self) -> bool:
+        """Some stage is errored or not run: no rate may be quoted as final."""
+        return self.n + self.counts.get(EndState.GUIDED.value, 0) != self.num_stages
 
 
 def sweep_rows(out: Path) -> list[SweepRow]:

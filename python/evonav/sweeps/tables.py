@@ -9,7 +9,7 @@ from evonav.parallel.folders import write_atomically
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import percent
 from evonav.report.tables.table import INTERVALS, Table, markdown_tables
-from evonav.sweeps.row import AXES, STATES, SweepRow
+from evonav.sweeps.summary import AXES, STATES, SweepRow
 
 
 def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str, Any]) -> None:

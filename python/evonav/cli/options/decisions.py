@@ -75,8 +75,7 @@ def print_estimate(
 
     from evonav.cli.display import progress
     from evonav.decision.vlm.counting import OUTPUT_TOKENS
-    from evonav.decision.vlm.ledger import Usage
-    from evonav.evaluation.run.cost_estimate import estimate_run
+    from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
 
     options = dict(config.backend.decision.options)
     price = spending.price(options["model"])
@@ -90,8 +89,7 @@ def print_estimate(
     for found in estimates:
         kinds = ", ".join(f"{kind} {count:.0f}" for kind, count in found.kinds.items())
         error = "?" if found.relative_error == float("inf") else f"+-{100 * found.relative_error:.0f}%"
-        usage = Usage(int(found.input_tokens), int(found.output_tokens))
-        cost = "?" if price is None else f"{price.of(usage):.2f}"
+        cost = "?" if price is None else f"{price.of(total_usage([found])):.2f}"
         counts = (f"{found.num_requests:.0f}", kinds, f"{found.input_tokens:.0f}", error, f"{found.output_tokens:.0f}")
         table.add_row(found.agent, *counts, cost)
     Console().print(table)

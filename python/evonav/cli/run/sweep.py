@@ -1,6 +1,5 @@
 """`evonav sweep`: run many evaluations from one file."""
 
-import shlex
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,8 +15,8 @@ if TYPE_CHECKING:
 
     from evonav.evaluation.run.settings import RunSettings
     from evonav.sweeps.file import SweepFile
-    from evonav.sweeps.row import SweepRow
     from evonav.sweeps.run import Cell, CellRun
+    from evonav.sweeps.summary import SweepRow
     from evonav.tasks.listing import TaskFile
 
 
@@ -59,6 +58,7 @@ def sweep(
         return
     if file is None:
         raise typer.BadParameter("name a sweep file, such as examples/sweeps/noise.toml")
+    from evonav.evaluation.run.provenance import typed_command
     from evonav.sweeps.file import read_sweep
     from evonav.sweeps.run import cell_runs, cells_of, chosen, task_sets
 
@@ -73,7 +73,7 @@ def sweep(
             _print_plan(settings, selected, tasks, folder)
             return
         runs = cell_runs(settings, cells, tasks, folder)
-        again = _command(file, out, set_ or (), only or (), flags)
+        again = typed_command().replace(" --retry-errored", "")
         _run(settings, folder, runs, selected, retry_errored, again)
     is_incomplete = _print_summary(folder, {cell.name for cell in selected}, again)
     if is_incomplete:
@@ -164,7 +164,7 @@ def _print_plan(
 
     from evonav.cli.display import status
     from evonav.evaluation.run.components import check_agent_name
-    from evonav.sweeps.cost import cell_estimate
+    from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
     from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
@@ -182,10 +182,14 @@ def _print_plan(
             cost = [""] * 3 if has_models else []
             if settings.decisions[cell.decision].kind == "vlm":
                 tell(cell.name)
-                found = cell_estimate(settings, run)
-                total_usd += found.dollars or 0.0
-                dollars = "?" if found.dollars is None else f"{found.dollars:.2f}"
-                cost = [f"{found.num_requests:.0f}", f"{found.input_tokens:.0f}", dollars]
+                config = run.request.config
+                options = dict(config.backend.decision.options)
+                found = estimate_run(cell.agents, run.request.tasks, config, options, num_workers=settings.num_workers)
+                usage, price = total_usage(found), settings.price(options["model"])
+                total_usd += 0.0 if price is None else price.of(usage)
+                dollars = "?" if price is None else f"{price.of(usage):.2f}"
+                num_requests = sum(estimate.num_requests for estimate in found)
+                cost = [f"{num_requests:.0f}", str(usage.input_tokens), dollars]
             total += run.num_stages
             table.add_row(cell.name, ", ".join(cell.agents), str(len(run.request.tasks)), str(run.num_stages), *cost)
     show(table)
@@ -202,16 +206,3 @@ def _print_schema() -> None:
     from evonav.sweeps.file import sweep_schema
 
     typer.echo(json.dumps(sweep_schema(), indent=2))
-
-
-def _command(
-    file: Path, out: Path | None, changes: "Sequence[str]", only: "Sequence[str]", flags: "Mapping[str, object]"
-) -> str:
-    """Return the command that resumes the sweep."""
-    arguments = ["evonav", "sweep", str(file)]
-    arguments += [] if out is None else ["--out", str(out)]
-    arguments += [word for change in changes for word in ("--set", change)]
-    arguments += [word for pattern in only for word in ("--only", pattern)]
-    for key, value in flags.items():
-        arguments += [f"--{key.replace('_', '-')}", str(value)]
-    return shlex.join(arguments)

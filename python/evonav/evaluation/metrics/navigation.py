@@ -41,6 +41,7 @@ class Rates:
     """SR and SPL over a set of scored stages; `None` where there are none."""
 
     n: int
+    """Scored stages: success or failure."""
     sr: float | None
     spl: float | None
     sr_ci95: Interval | None = None
@@ -51,18 +52,11 @@ class Rates:
     """Wilson's score interval, as if stages were independent: for comparison with tables that give `n` alone."""
 
 
-@dataclass(frozen=True, slots=True)
-class AgentSummary:
-    """One row of a table."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgentSummary(Rates):
+    """One row of a table: an agent's rates over all scored stages, and what lies behind them."""
 
     agent: str
-    n: int
-    """Scored stages: success or failure."""
-    sr: float | None
-    spl: float | None
-    sr_ci95: Interval | None
-    spl_ci95: Interval | None
-    sr_wilson95: Interval | None
     soft_spl: float | None
     counts: dict[str, int]
     """Stages by end state; every stage of the run is in exactly one."""
@@ -78,9 +72,7 @@ class AgentSummary:
 
     def rates(self, split: str = "all") -> Rates:
         """Return the rates over a split of the scored stages, by default over all of them."""
-        if split == "all":
-            return Rates(self.n, self.sr, self.spl, self.sr_ci95, self.spl_ci95, self.sr_wilson95)
-        return self.splits.get(split, Rates(n=0, sr=None, spl=None))
+        return self if split == "all" else self.splits.get(split, Rates(n=0, sr=None, spl=None))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,13 +125,8 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
     scored = [record for record in records if record.is_scored]
     overall = rates(scored)
     return AgentSummary(
+        **asdict(overall),
         agent=agent,
-        n=overall.n,
-        sr=overall.sr,
-        spl=overall.spl,
-        sr_ci95=overall.sr_ci95,
-        spl_ci95=overall.spl_ci95,
-        sr_wilson95=overall.sr_wilson95,
         soft_spl=_mean(record.soft_spl for record in scored),
         counts={state.value: counts[state] for state in EndState if state is not EndState.GUIDED or counts[state]},
         is_incomplete=overall.n + counts[EndState.GUIDED] != num_stages,

@@ -138,6 +138,10 @@ class RecordMetrics:
     recall_at_start: float | None
 
 
+_COPIED = tuple(field.name for field in fields(RecordMetrics) if field.name in {*StageRecord.model_fields} - {"state"})
+"""The metrics that are fields of the record."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class StageMetrics(StageCosts, RecordMetrics):
     """A stage as one row: the metrics of its record, changes since the stage before, and costs."""
@@ -211,7 +215,7 @@ def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -
             follows = before is not None and before.metrics.stage == one.metrics.stage - 1
             wall_s, cpu_s = timings.get(key, (None, None))
             values: dict[str, Any] = {
-                **_values(one.metrics),
+                **vars(one.metrics),
                 "wall_s": wall_s,
                 "cpu_s": cpu_s,
                 **costs.get(key, {}),
@@ -245,12 +249,8 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
     has_entries = has_memory or bool(record.entries)
     num_stale = sum(entry.is_stale for entry in record.entries)
     return RecordMetrics(
-        agent=record.agent,
+        **{name: getattr(record, name) for name in _COPIED},
         is_baseline=record.agent in BASELINES,
-        task_id=record.task_id,
-        house=record.house,
-        stage=record.stage,
-        num_stages=record.num_stages,
         state=record.state.value,
         cause=None if cause is None else cause.value,
         error_kind=None if record.error is None else record.error.kind.value,
@@ -264,22 +264,7 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         has_lost_memory=record.memory_lost_at is not None,
         success=is_success,
         is_strict_success=_is_strict_success(record),
-        is_geodesic_success=record.is_geodesic_success,
-        spl=record.spl,
-        soft_spl=record.soft_spl,
         ring_spl=_ring_spl(record),
-        start_distance_m=record.start_distance_m,
-        terminal_distance_m=record.terminal_distance_m,
-        terminal_box_distance_m=record.terminal_box_distance_m,
-        terminal_geodesic_m=record.terminal_geodesic_m,
-        path_length_m=record.path_length_m,
-        reference_length_m=record.reference_length_m,
-        reference_ring_m=record.reference_ring_m,
-        num_rounds=record.num_rounds,
-        has_stopped=record.has_stopped,
-        stop_reason=record.stop_reason,
-        is_snapped=record.is_snapped,
-        num_target_visible_rounds=record.num_target_visible_rounds,
         first_target_visible_round=next((r.round for r in record.trace if r.is_target_visible), None),
         num_failed_actions=sum(not taken.is_action_success for taken in record.trace),
         num_stale_visits=len(visits),
@@ -295,7 +280,6 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         num_moved_found=sum(there is not None for _, there in found) if has_memory else None,
         rounds_to_find=_mean(b - a for a, b in _whole(found)),
         metres_to_find=_mean(travelled_m[b] - travelled_m[a] for a, b in _whole(found)),
-        num_forgotten=record.num_forgotten,
         num_entries=len(record.entries) if has_entries else None,
         num_stale_entries=num_stale if has_entries else None,
         precision=1.0 - num_stale / len(record.entries) if record.entries else None,
@@ -314,13 +298,6 @@ def stratum_of(record: StageRecord) -> str:
     if record.stage == 1:
         return "stage_1"
     return "relocated" if record.target.is_relocated else "not_relocated"
-
-
-_METRIC_FIELDS = tuple(field.name for field in fields(RecordMetrics))
-
-
-def _values(metrics: RecordMetrics) -> dict[str, Any]:
-    return {name: getattr(metrics, name) for name in _METRIC_FIELDS}
 
 
 def _stored_metrics(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_StoredMetrics]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.component import Component
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
 from evonav.statistics import student_quantile
 from evonav.tasks.listing import TaskFile
@@ -35,6 +35,14 @@ class RunEstimate:
     """Half width of a 95% interval of `input_tokens` over tasks, as a share of it; 0 if all were run, `inf` if one."""
     kinds: dict[str, float]
     """Requests by kind of question."""
+
+
+def total_usage(estimates: Sequence[RunEstimate]) -> Usage:
+    """Return the tokens of several estimates together."""
+    return Usage(
+        int(sum(estimate.input_tokens for estimate in estimates)),
+        int(sum(estimate.output_tokens for estimate in estimates)),
+    )
 
 
 def estimate_run(

@@ -33,7 +33,7 @@ def note_session(store: RunStore, num_workers: int) -> None:
 def session_facts() -> dict[str, Any]:
     """Return the command of this process, its machine and versions, without names of users or machines."""
     return {
-        "command": _command(),
+        "command": typed_command(),
         "began": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "evonav": __version__,
         "git": _revision(Path(__file__).parent),
@@ -43,7 +43,7 @@ def session_facts() -> dict[str, Any]:
     }
 
 
-def _command() -> str:
+def typed_command() -> str:
     """Return the command as typed if it is evonav's, else an empty string."""
     name = Path(sys.argv[0]).name if sys.argv else ""
     is_ours = name in ("evonav", "__main__.py")
