@@ -89,7 +89,7 @@ def _run(
     again: str,
 ) -> None:
     """Run the stages without a record; an interrupt still writes the summary."""
-    from evonav.cli.run.sweep_display import ProgressLines, SweepProgress, showing
+    from evonav.cli.run.sweep_display import SweepProgress, showing
     from evonav.sweeps.run import run_sweep
 
     def interrupt(*_: object) -> None:
@@ -98,17 +98,9 @@ def _run(
     signal.signal(signal.SIGTERM, interrupt)
     names = {cell.name for cell in selected}
     progress = SweepProgress.of(out, [run for run in runs if run.cell.name in names])
-    lines = ProgressLines(progress)
     try:
-        with showing(progress):
-            run_sweep(
-                settings,
-                out,
-                runs,
-                only=sorted(names),
-                retry_errored=retry_errored,
-                on_progress=lines.take,
-            )
+        with showing(progress) as on_progress:
+            run_sweep(settings, out, runs, only=sorted(names), retry_errored=retry_errored, on_progress=on_progress)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: {progress.line()}; finished stages are in {out}", err=True)
         typer.echo(f"to resume: {again}", err=True)

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ import typer
 from evonav.cli.display import LINE_EVERY_S
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from rich.console import RenderableType
 
@@ -181,40 +181,32 @@ class SweepProgress:
 
 
 @contextmanager
-def showing(progress: SweepProgress) -> "Iterator[None]":
-    """Show the live table on a terminal; without one, `ProgressLines` prints lines."""
+def showing(progress: SweepProgress) -> "Iterator[Callable[[Cell, Progress], None]]":
+    """Show the progress, which the yielded function updates.
+
+    A terminal shows a live table. Without one, a line is printed for each finished cell, and one for the whole sweep
+    every minute.
+    """
     from rich.console import Console
     from rich.live import Live
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield
-        return
-    with Live(get_renderable=progress.table, console=console, refresh_per_second=4, transient=True):
-        yield
+    table = Live(get_renderable=progress.table, console=console, refresh_per_second=4, transient=True)
+    printed_s = time.monotonic()
 
-
-class ProgressLines:
-    """Prints lines where there is no terminal: each finished cell, and the whole sweep once a minute."""
-
-    def __init__(self, progress: SweepProgress) -> None:
-        """Print nothing on a terminal."""
-        from rich.console import Console
-
-        self._progress = progress
-        self._is_quiet = Console(stderr=True).is_terminal
-        self._printed_s = time.monotonic()
-
-    def take(self, cell: "Cell", progress: "Progress") -> None:
-        """Update a cell, and print a line if one is due."""
-        is_finished = self._progress.take(cell, progress)
-        if self._is_quiet:
+    def take(cell: "Cell", state: "Progress") -> None:
+        nonlocal printed_s
+        is_finished = progress.take(cell, state)
+        if console.is_terminal:
             return
         if is_finished:
-            typer.echo(self._progress.cell_line(cell.name), err=True)
-        if time.monotonic() - self._printed_s >= LINE_EVERY_S:
-            self._printed_s = time.monotonic()
-            typer.echo(self._progress.line(), err=True)
+            typer.echo(progress.cell_line(cell.name), err=True)
+        if time.monotonic() - printed_s >= LINE_EVERY_S:
+            printed_s = time.monotonic()
+            typer.echo(progress.line(), err=True)
+
+    with table if console.is_terminal else nullcontext():
+        yield take
 
 
 def duration(seconds: float) -> str:
