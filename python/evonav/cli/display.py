@@ -37,6 +37,15 @@ def show(table: "Table") -> None:
     Console(width=max(console.width, width)).print(table)
 
 
+def write_texts(*texts: "tuple[Path | None, Callable[[], str]]", label: str = "written") -> None:
+    """Write the files whose paths are given, and print the paths after a label."""
+    from evonav.parallel.folders import write_atomically
+
+    for path, text in texts:
+        if path is not None:
+            typer.echo(f"{label}: {write_atomically(path, text())}")
+
+
 def print_table(summaries: "list[AgentSummary]") -> None:
     """Print the rates of agents, and how many stages are missing."""
     from rich.table import Table

@@ -70,30 +70,26 @@ def cells_of(sweep: SweepFile) -> list[Cell]:
         InvalidArgumentError: A pattern fits nothing, or nothing is left.
     """
     cells = []
-    used = {("include", i): False for i in range(len(sweep.include))}
-    used |= {("exclude", i): False for i in range(len(sweep.exclude))}
+    patterns = [(which, i, one) for which in ("include", "exclude") for i, one in enumerate(getattr(sweep, which))]
+    used = set()
     axes = (sweep.simulators, sweep.perceptions, sweep.decisions, sweep.tasks, sweep.seeds)
     for simulator, perception, decision, tasks, seed in product(*axes):
         parts = (*((simulator,) if simulator != "embedded" else ()), perception, decision, tasks, f"s{seed}")
         cell = Cell(SEPARATOR.join(parts), simulator, perception, decision, tasks, seed, ())
         agents = []
         for agent in sweep.agents:
-            fits = {
-                (which, i): _fits(pattern, agent, cell)
-                for which, patterns in (("include", sweep.include), ("exclude", sweep.exclude))
-                for i, pattern in enumerate(patterns)
-            }
-            used = {key: used[key] or fits[key] for key in used}
-            is_in = not sweep.include or any(fits[key] for key in fits if key[0] == "include")
-            if is_in and not any(fits[key] for key in fits if key[0] == "exclude"):
+            fitting = [(which, i) for which, i, pattern in patterns if _fits(pattern, agent, cell)]
+            used.update(fitting)
+            kinds = {which for which, _ in fitting}
+            if "exclude" not in kinds and ("include" in kinds or not sweep.include):
                 agents.append(agent)
         if agents:
-            cells.append(Cell(cell.name, simulator, perception, decision, tasks, seed, tuple(agents)))
-    for (which, i), is_used in used.items():
-        if not is_used:
-            pattern = getattr(sweep, which)[i].model_dump(exclude_defaults=True)
-            values_text = ", ".join(f"{axis} {' or '.join(map(str, values))}" for axis, values in pattern.items())
-            raise InvalidArgumentError(f"{which}.{i} fits no combination: there is none of {values_text}")
+            cells.append(replace(cell, agents=tuple(agents)))
+    for which, i, pattern in patterns:
+        if (which, i) not in used:
+            values = pattern.model_dump(exclude_defaults=True).items()
+            shown = ", ".join(f"{axis} {' or '.join(map(str, globs))}" for axis, globs in values)
+            raise InvalidArgumentError(f"{which}.{i} fits no combination: there is none of {shown}")
     if not cells:
         raise InvalidArgumentError("the sweep has no cell: `exclude` leaves nothing")
     return cells
@@ -271,18 +267,9 @@ def run_sweep(
 
 
 def _fits(pattern: Pattern, agent: str, cell: Cell) -> bool:
-    return (
-        _is_one(agent, pattern.agent)
-        and _is_one(cell.simulator, pattern.simulator)
-        and _is_one(cell.perception, pattern.perception)
-        and _is_one(cell.decision, pattern.decision)
-        and _is_one(cell.tasks, pattern.tasks)
-        and (not pattern.seed or cell.seed in pattern.seed)
-    )
-
-
-def _is_one(name: str, globs: Sequence[str]) -> bool:
-    return not globs or any(fnmatchcase(name, glob) for glob in globs)
+    """Return true if the agent and each axis of the cell match the pattern, which may leave axes open."""
+    values = {**asdict(cell), "agent": agent}
+    return all(not globs or any(fnmatchcase(str(values[axis]), str(glob)) for glob in globs) for axis, globs in pattern)
 
 
 def _content(run: CellRun) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.display import write_texts
 from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
 
 
@@ -26,7 +27,6 @@ def breakdown(
     """Show rates by kind of stage, each with n and a 95% interval over houses."""
     from rich.console import Console
 
-    from evonav.parallel.folders import write_atomically
     from evonav.report.compare import breakdown as made
     from evonav.report.compare.selection import read_compared_agents
     from evonav.report.plots.render import check_plot, write_plots
@@ -41,13 +41,10 @@ def breakdown(
     console = Console()
     for one in found:
         console.print(made.breakdown_table(one, is_brief=True).rich())
-    texts = (
-        (md, markdown_tables(tables)),
-        (latex, latex_tables(tables)),
-        (csv, made.breakdown_csv(found)),
+    write_texts(
+        (md, lambda: markdown_tables(tables)),
+        (latex, lambda: latex_tables(tables)),
+        (csv, lambda: made.breakdown_csv(found)),
     )
-    for path, text in texts:
-        if path is not None:
-            typer.echo(f"written: {write_atomically(path, text)}")
     if plot is not None:
         typer.echo(f"written: {write_plots([made.breakdown_plot(one) for one in found], plot)}")

@@ -1,16 +1,12 @@
 """`evonav compare`: compare agents on the same stages."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from evonav.cli.display import write_texts
 from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from evonav.report.compare.compare import Comparison
 
 
 def compare(
@@ -34,11 +30,16 @@ def compare(
     plot: Annotated[Path | None, typer.Option(help="Write a plot to a .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
     """Compare agents on the same stages: differences with 95% intervals and p-values, and the stages that differ."""
+    import json as json_text
+
     from rich.console import Console
 
     from evonav.report.compare import wording
     from evonav.report.compare.compare import compare as compare_agents
+    from evonav.report.compare.compare import comparison_json
+    from evonav.report.compare.page import comparison_page, comparison_plot
     from evonav.report.compare.selection import read_compared_agents
+    from evonav.report.plots.render import write_plots
 
     found = compare_agents(
         read_compared_agents(runs), measures=measure or [], baseline=baseline, allow_differences=allow_differences
@@ -49,40 +50,12 @@ def compare(
     for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
         console.print(line, markup=False, highlight=False)
     console.print(wording.METHOD, style="dim", highlight=False)
-    for path in _write(found, md=md, latex=latex, csv=csv, json=json, html=html, plot=plot):
-        typer.echo(f"written: {path}")
-
-
-def _write(
-    found: "Sequence[Comparison]",
-    *,
-    md: Path | None,
-    latex: Path | None,
-    csv: Path | None,
-    json: Path | None,
-    html: Path | None,
-    plot: Path | None,
-) -> list[Path]:
-    import json as json_text
-    from collections.abc import Callable
-
-    from evonav.parallel.folders import write_atomically
-    from evonav.report.compare import wording
-    from evonav.report.compare.compare import comparison_json
-    from evonav.report.compare.page import comparison_page, comparison_plot
-    from evonav.report.plots.render import write_plots
-
-    written = []
-    texts: list[tuple[Path | None, Callable[[], str]]] = [
+    write_texts(
         (md, lambda: wording.comparison_markdown(found)),
         (latex, lambda: wording.comparison_latex(found)),
         (csv, lambda: wording.comparison_csv(found)),
         (json, lambda: json_text.dumps(comparison_json(found), indent=1) + "\n"),
         (html, lambda: comparison_page(found, None if html is None else html.parent)),
-    ]
-    for path, text in texts:
-        if path is not None:
-            written.append(write_atomically(path, text()))
+    )
     if plot is not None:
-        written.append(write_plots([comparison_plot(found)], plot))
-    return written
+        typer.echo(f"written: {write_plots([comparison_plot(found)], plot)}")

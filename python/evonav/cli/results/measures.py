@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.display import write_texts
 from evonav.cli.options.shared import RunFolder, listed
 
 
@@ -18,7 +19,6 @@ def measures(
     """Show metrics that explain a run's rates: success by several definitions, stale entries, memory and costs."""
     from rich.console import Console
 
-    from evonav.parallel.folders import write_atomically
     from evonav.report.tables.metric_tables import measures_tables
     from evonav.report.tables.table import markdown_tables
 
@@ -27,6 +27,4 @@ def measures(
     console = Console()
     for table in tables:
         console.print(table.rich())
-    if out is not None:
-        write_atomically(out, markdown_tables(tables))
-        typer.echo(f"tables: {out}")
+    write_texts((out, lambda: markdown_tables(tables)), label="tables")

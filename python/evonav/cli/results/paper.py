@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.display import write_texts
 from evonav.cli.options.shared import RunFolder
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ def paper(
     from rich.console import Console
 
     from evonav.errors import StoreError
-    from evonav.parallel.folders import write_atomically
     from evonav.report.paper.latex import paper_latex
     from evonav.report.paper.tables import paper_tables, power_table
     from evonav.report.run import load_run
@@ -48,12 +48,8 @@ def paper(
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
     for table in tables:
         console.print(table.rich())
-    if out is not None:
-        write_atomically(out, markdown_tables(table for table in tables if table.rows))
-        typer.echo(f"tables: {out}")
-    if latex is not None:
-        runs: dict[Perception, Run] = {perception.value: loaded}
-        if prediction is not None:
-            runs["prediction"] = load_run(prediction)
-        write_atomically(latex, paper_latex(runs))
-        typer.echo(f"LaTeX: {latex}")
+    runs: dict[Perception, Run] = {perception.value: loaded}
+    if latex is not None and prediction is not None:
+        runs["prediction"] = load_run(prediction)
+    write_texts((out, lambda: markdown_tables(table for table in tables if table.rows)), label="tables")
+    write_texts((latex, lambda: paper_latex(runs)), label="LaTeX")

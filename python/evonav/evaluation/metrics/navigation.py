@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
+from evonav.evaluation.metrics.stage_metrics import stratum_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
@@ -204,11 +205,9 @@ def _effect_json(name: str, effect: PairedEffect) -> dict[str, Any]:
 def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
     splits: dict[str, list[StageRecord]] = defaultdict(list)
     for record in scored:
-        if record.stage == 1:
-            splits["stage_1"].append(record)
-            continue
-        splits["relocated" if record.target.is_relocated else "not_relocated"].append(record)
-        splits[record.transition.kind].append(record)
+        splits[stratum_of(record)].append(record)
+        if record.stage > 1:
+            splits[record.transition.kind].append(record)
     return dict(sorted(splits.items()))
 
 
