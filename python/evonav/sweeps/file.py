@@ -15,10 +15,10 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import (
     DecisionSettings,
     PerceptionSettings,
-    RunSettings,
     SettingError,
     Settings,
     SimulatorSettings,

@@ -114,6 +114,7 @@ class Options:
 def settings_options(name: str) -> Options:
     """Return the options that the argument of a command with this name has."""
     from evonav.evaluation.run import settings
+    from evonav.evaluation.run.run_settings import RunSettings
 
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
     pool = ("workers", "engine", "ray_address")
@@ -141,15 +142,15 @@ def settings_options(name: str) -> Options:
         ),
         "perception": Options(settings.PerceptionSettings, "Perception", {"make": "perception"}),
         "models": Options(settings.PerceptionSettings, "Perception", fields=("models", "device")),
-        "workers": Options(settings.RunSettings, fields=("workers",)),
-        "pool": Options(settings.RunSettings, fields=pool),
-        "local_run": Options(settings.RunSettings, names=run_names, fields=("workers", *agents)),
+        "workers": Options(RunSettings, fields=("workers",)),
+        "pool": Options(RunSettings, fields=pool),
+        "local_run": Options(RunSettings, names=run_names, fields=("workers", *agents)),
         "run": Options(
-            settings.RunSettings,
+            RunSettings,
             names=run_names,
             fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb"),
         ),
-        "changes": Options(settings.RunSettings, fields=(*pool, "worker_gpus"), overrides=True),
+        "changes": Options(RunSettings, fields=(*pool, "worker_gpus"), overrides=True),
     }[name]
 
 

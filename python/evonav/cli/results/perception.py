@@ -18,7 +18,8 @@ from evonav.cli.options.shared import (
 )
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.settings import PerceptionSettings, RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
+    from evonav.evaluation.run.settings import PerceptionSettings
 
 
 @with_settings("workers", "models")

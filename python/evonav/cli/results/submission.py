@@ -10,7 +10,7 @@ from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Limit, Subset, Tasks, chosen_tasks, listed
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.settings import RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.submission.verify import Verdict
 
 EXIT_REJECTED = 1

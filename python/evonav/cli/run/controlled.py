@@ -23,7 +23,8 @@ from evonav.cli.options.shared import (
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run import Progress
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, RunSettings, SpendingSettings
+    from evonav.evaluation.run.run_settings import RunSettings
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
 
 controlled_app = typer.Typer(
     name="controlled",

@@ -29,13 +29,8 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
 
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress, RunConfig
-    from evonav.evaluation.run.settings import (
-        DecisionSettings,
-        PerceptionSettings,
-        RunSettings,
-        SimulatorSettings,
-        SpendingSettings,
-    )
+    from evonav.evaluation.run.run_settings import RunSettings
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings, SpendingSettings
     from evonav.tasks.listing import TaskFile
 
 

@@ -13,7 +13,7 @@ from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from evonav.evaluation.run.settings import RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.sweeps.file import SweepFile
     from evonav.sweeps.run import Cell, CellRun
     from evonav.sweeps.summary import SweepRow

@@ -16,7 +16,7 @@ from evonav.cli.options.shared import (
 )
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.settings import RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.generation.dataset import GenerationSummary
 
 

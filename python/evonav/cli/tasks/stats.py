@@ -10,7 +10,7 @@ from evonav.cli.options.settings import with_settings
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from evonav.evaluation.run.settings import RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.tasks.statistics import Estimate, Metric, TaskStatistics, Test
 
 NUM_NAMES = 6

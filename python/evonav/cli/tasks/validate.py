@@ -11,7 +11,7 @@ from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import AnyAsset, Limit
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.settings import RunSettings
+    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.generation.validation import FolderReport
 
 NUM_EXAMPLES = 3

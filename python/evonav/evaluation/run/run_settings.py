@@ -1,0 +1,80 @@
+"""Declare the options of a run's workers, limits and retries, once for Python, sweep files and commands."""
+
+from typing import TYPE_CHECKING
+
+from pydantic import Field
+
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.settings import DecisionSettings, SettingError, Settings
+from evonav.parallel.local import num_cores
+from evonav.parallel.worker import EngineName, Workforce
+
+if TYPE_CHECKING:
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig
+
+NUM_RETRIES = 2
+"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
+
+
+class RunSettings(Settings):
+    """The workers of a run, the limits of its agents, and its retries. They do not decide records."""
+
+    workers: int | None = Field(default=None, ge=0)
+    """Number of worker processes; 0 runs in this process. Default: one per core."""
+    engine: EngineName = "local"
+    """Run workers as local processes or as Ray actors."""
+    ray_address: str | None = None
+    """Ray: address of a cluster that shares this file system. Default: start Ray on this machine."""
+    worker_gpus: float = Field(default=0.0, ge=0.0)
+    """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
+    num_retries: int = Field(default=NUM_RETRIES, ge=0)
+    """Number of retries of a stage that lost its worker, simulator or agent process."""
+    in_process: bool = False
+    """Run agents in the evaluator's process, for debuggers; a crash of an agent then ends the worker."""
+    stage_timeout_s: float | None = Field(default=None, gt=0.0)
+    """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
+    agent_timeout_s: float | None = Field(default=None, ge=0.1)
+    """Seconds to wait for an agent's answer before its stage is errored. Default: 600, with a VLM 3600."""
+    agent_memory_mb: int | None = Field(default=None, ge=256)
+    """Largest address space of an agent's process, in MB. Default: no limit."""
+
+    @property
+    def num_workers(self) -> int:
+        """The number of workers: the given one, or one per core."""
+        return num_cores() if self.workers is None else self.workers
+
+    def workforce(self) -> Workforce:
+        """Return the workers.
+
+        Raises:
+            SettingError: An option is of Ray, and the workers are not.
+            InvalidArgumentError: There are too few workers.
+        """
+        for key in ("ray_address", "worker_gpus"):
+            if getattr(self, key) and self.engine != "ray":
+                raise SettingError(type(self), key, "is for engine ray")
+        return Workforce(self.num_workers, self.engine, self.ray_address, num_gpus=self.worker_gpus)
+
+    def config(
+        self, seed: int, backend: "Backend", decisions: DecisionSettings, protocol: ProtocolConfig | None = None
+    ) -> "RunConfig":
+        """Return the configuration of a run with these limits.
+
+        Args:
+            seed: Seed of every random choice.
+            backend: The parts of the run.
+            decisions: Settings of the decision model, which have the default limits.
+            protocol: Default: the paper's.
+        """
+        from evonav.evaluation.hosting.process import AgentHosting
+        from evonav.evaluation.run.run import RunConfig
+
+        timeout_s = self.agent_timeout_s or decisions.answer_timeout_s
+        return RunConfig(
+            seed=seed,
+            protocol=protocol or ProtocolConfig(),
+            backend=backend,
+            stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
+            hosting=AgentHosting(self.in_process, timeout_s, self.agent_memory_mb),
+        )
