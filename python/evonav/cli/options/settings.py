@@ -126,6 +126,7 @@ def settings_options(name: str) -> Options:
             {"kind": "decision", "mode": "vlm_mode", "request_timeout_s": "request_timeout"},
             parse={"noise": _noise},
         ),
+        "endpoint": Options(settings.DecisionSettings, names={"base_url": "vlm_base_url"}, fields=("base_url",)),
         "spending": Options(settings.SpendingSettings, "Decisions"),
         "simulation": Options(
             settings.SimulatorSettings,

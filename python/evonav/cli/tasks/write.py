@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import progress_bar
-from evonav.cli.options.shared import Limit
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
 
 if TYPE_CHECKING:
+    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
     from evonav.generation.instructions.writer import Writing
-
-EXIT_INCOMPLETE = 3
 
 
 class VlmMode(str, Enum):
@@ -26,10 +26,6 @@ class VlmMode(str, Enum):
 
 Folder = Annotated[Path, typer.Argument(help="Folder of tasks, which are rewritten in place.")]
 VlmModel = Annotated[str, typer.Option(help="Name of the model on the server.")]
-VlmBaseUrl = Annotated[
-    str | None,
-    typer.Option(help="Address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's."),
-]
 VlmExchanges = Annotated[
     Path | None, typer.Option(help="SQLite file that stores questions and answers. Default: none.")
 ]
@@ -40,27 +36,17 @@ VlmModeOption = Annotated[
     ),
 ]
 VlmWorkers = Annotated[int, typer.Option(min=1, help="Number of questions asked at the same time.")]
-Prices = Annotated[
-    Path | None,
-    typer.Option(
-        help='JSON file of prices in dollars per million tokens: {"MODEL": {"input_usd": .., "output_usd": ..}}.'
-    ),
-]
-MaxCost = Annotated[
-    float | None,
-    typer.Option(help="Largest cost in dollars; then no more is asked. It needs --prices. Default: no limit."),
-]
 
 
+@with_settings("endpoint", "spending")
 def write(
     folder: Folder,
+    endpoint: "DecisionSettings",
+    spending: "SpendingSettings",
     vlm_model: VlmModel = "gpt-4o",
-    vlm_base_url: VlmBaseUrl = None,
     vlm_exchanges: VlmExchanges = None,
     vlm_mode: VlmModeOption = None,
     vlm_workers: VlmWorkers = 4,
-    prices: Prices = None,
-    max_cost: MaxCost = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Estimate the cost, and ask nothing.")] = False,
     limit: Limit = None,
 ) -> None:
@@ -68,17 +54,13 @@ def write(
 
     The key is read from OPENAI_API_KEY.
     """
-    from evonav.decision.vlm.account import Account, read_prices
+    from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.client import VlmClient, VlmConfig
     from evonav.decision.vlm.response_cache import ResponseCache
-    from evonav.errors import InvalidArgumentError
     from evonav.generation.instructions.writer import estimate_texts, write_texts
 
-    table = {} if prices is None else read_prices(prices)
-    if prices is not None and vlm_model not in table:
-        raise InvalidArgumentError(f"{prices}: has no prices of {vlm_model!r}")
-    account = Account(table.get(vlm_model), max_cost)
-    config = VlmConfig(vlm_model, base_url=vlm_base_url, max_concurrency=vlm_workers)
+    account = Account(spending.price(vlm_model), spending.max_cost)
+    config = VlmConfig(vlm_model, base_url=endpoint.base_url, max_concurrency=vlm_workers)
     store = None if vlm_exchanges is None else ResponseCache(vlm_exchanges)
     client = VlmClient(config, store=store, mode=None if vlm_mode is None else vlm_mode.value, account=account)
     if dry_run:
