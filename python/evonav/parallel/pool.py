@@ -8,12 +8,12 @@ killed.
 """
 
 import time
+from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
-from types import TracebackType
-from typing import Literal, Protocol
+from typing import Literal
 
 from evonav.parallel.work import end_work, load_work, steps
 from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Worker, WorkerLostError, Workforce
@@ -50,25 +50,29 @@ class Answer:
     """A traceback or one line, if the job failed."""
 
 
-class Pool(Protocol):
-    """Runs jobs in any order."""
+class Pool(ABC):
+    """Runs jobs in any order; used in a `with` statement, at whose end all workers end at once."""
 
     capacity: int
     """Number of jobs that may be open at once."""
 
+    @abstractmethod
     def submit(self, job: Job) -> None:
-        """Accept a job."""
+        """Accept a job, and start it if a worker is free."""
 
+    @abstractmethod
     def next_answer(self) -> Answer:
         """Wait for the next message of any job. Call only while a submitted job is open."""
 
-    def __enter__(self) -> "Pool":
-        """Return the pool."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None:
+    @abstractmethod
+    def close(self) -> None:
         """End all workers at once."""
+
+    def __enter__(self) -> "Pool":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def open_pool(
@@ -122,7 +126,7 @@ def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
         yield answer
 
 
-class InlinePool:
+class InlinePool(Pool):
     """Runs jobs in this process, one after the other: for debuggers and for short work."""
 
     capacity = 1
@@ -143,11 +147,7 @@ class InlinePool:
         kind, text = next(self._job)
         return _answer(self._key, kind, text)
 
-    def __enter__(self) -> "InlinePool":
-        """Return the pool."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """End the job that is running."""
         if self._job is not None:
             self._job.close()
@@ -168,7 +168,7 @@ class _Slot:
         return self.is_ready and self.job is None
 
 
-class WorkerPool:
+class WorkerPool(Pool):
     """Runs jobs on workers, one at a time on each."""
 
     def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int) -> None:
@@ -271,11 +271,7 @@ class WorkerPool:
         slot.worker.close()
         self._slots.remove(slot)
 
-    def __enter__(self) -> "WorkerPool":
-        """Return the pool."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
         """End all workers at once."""
         for slot in list(self._slots):
             self._close(slot)

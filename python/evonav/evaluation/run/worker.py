@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from evonav.agents.agent import Agent, AgentAction, Sensing
+from evonav.agents.agent import Agent, Sensing
 from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.episode.episode import Episode
@@ -25,14 +25,13 @@ from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.agent import HostedAgent, RemoteAgent
+from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator
 
 WORK = "evonav.evaluation.run.worker:EpisodeWork"
@@ -134,7 +133,7 @@ class WorkerContext:
             self._processes.close()
 
 
-class _FailedAgent:
+class _FailedAgent(LocalAgent):
     """An agent that could not be made: every stage of it is errored with the same error."""
 
     def __init__(self, error: Exception) -> None:
@@ -142,19 +141,7 @@ class _FailedAgent:
 
     @property
     def sensing(self) -> Sensing:
-        raise self._error
-
-    @sensing.setter
-    def sensing(self, _: Sensing) -> None:
-        raise self._error
-
-    def begin_task(self, task: TaskInfo) -> None:
-        raise self._error
-
-    def begin_stage(self, stage: StageInput) -> None:
-        raise self._error
-
-    def act(self, observation: Observation) -> AgentAction:
+        """The first thing that a stage reads of an agent."""
         raise self._error
 
 
