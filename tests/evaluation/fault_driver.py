@@ -43,7 +43,7 @@ class Canned(EpisodeWork):
         if text not in told:
             told[text] = list(super().__call__(text))
         yield from told[text]
-        return "{}"
+        return "null"
 
 
 engine.WORK = "fault_driver:Canned"
