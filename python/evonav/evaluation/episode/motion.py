@@ -213,6 +213,12 @@ def face(simulator: Simulator, point_m: Point2) -> None:
         simulator.teleport(replace(pose, yaw_rad=math.atan2(dx_m, dz_m)))
 
 
+def stay(simulator: Simulator) -> Motion:
+    """Stand still."""
+    pose = simulator.pose
+    return Motion(((pose.x_m, pose.z_m),), is_success=True)
+
+
 def move(simulator: Simulator, action: Move) -> Motion:
     """Carry out one discrete action."""
     start = simulator.pose

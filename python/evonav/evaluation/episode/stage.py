@@ -1,7 +1,7 @@
 """Run one stage of an episode: start, rounds, score."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, Sensing, Stop
@@ -109,7 +109,7 @@ class Stage:
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
                 progress = self._begin(self._protocol.budget(self._sensing), reference_m)
-                stop_reason = self._rounds(progress)
+                stop_reason = self._rounds(progress, self._carry_out)
                 return self._measured(progress, reference_m, stop_reason)
         except StageFailedError as failure:
             self.failure = failure.kind
@@ -201,7 +201,9 @@ class Stage:
             success_radius_m=self._protocol.success_radius_m,
         )
 
-    def _rounds(self, progress: StageProgress) -> str | None:
+    def _rounds(
+        self, progress: StageProgress, carry_out: Callable[[AgentAction], motion.Motion], *, is_guided: bool = False
+    ) -> str | None:
         """Run decision rounds until the agent stops (return why) or the budget ends (return `None`)."""
         sensors = self._sensors()
         last = motion.Motion((), is_success=True)
@@ -214,42 +216,37 @@ class Stage:
                     is_action_success=last.is_success,
                     has_arrived=last.has_arrived,
                     num_rounds_left=progress.budget - number,
+                    is_guided=is_guided,
                 )
             action = self._answer(observation)
             with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-                last = self._carry_out(action)
-            progress.advance(last.length_m, is_stop=isinstance(action, Stop))
+                last = carry_out(action)
+            is_stop = isinstance(action, Stop) and not is_guided
+            progress.advance(last.length_m, is_stop=is_stop)
             self._end_round(number, sensors.pose, action, last)
-            if isinstance(action, Stop):
+            if is_guided and not last.is_success:
+                message = f"the reference trajectory is blocked at {last.path_m[-1]}"
+                raise StageFailedError(ErrorKind.SIMULATION, message)
+            if isinstance(action, Stop) and is_stop:
                 return action.reason
         return None
 
     def _guided(self, walk: GuidedWalk) -> StageRecord:
         """Follow the reference path; the agent's actions are recorded but ignored."""
-        sensors = self._sensors()
         is_stepwise = self._sensing.motion == "actions"
         travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
         legs = motion.legs(walk.path_m, travel_m)
         progress = self._begin(len(legs) + 1, ())
-        while not progress.is_over:
+
+        def follow(_: AgentAction) -> motion.Motion:
+            """Walk the next leg; the agent observes once more at the end."""
             number = progress.num_steps
-            self._staleness.begin_round(number)
-            with attribute_errors(ErrorKind.SIMULATION):
-                num_left = progress.budget - number
-                observation = sensors.observe(is_first=number == 0, num_rounds_left=num_left, is_guided=True)
-            action = self._answer(observation)
-            pose = self._simulator.pose
-            done = motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
-            if number < len(legs):
-                is_last = number + 1 == len(legs)
-                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-                    done = motion.walk(self._simulator, legs[number], walk.end.yaw_rad if is_last else None)
-            progress.advance(done.length_m, is_stop=False)
-            self._end_round(number, sensors.pose, action, done)
-            if not done.is_success:
-                raise StageFailedError(
-                    ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}"
-                )
+            if number == len(legs):
+                return motion.stay(self._simulator)
+            is_last = number + 1 == len(legs)
+            return motion.walk(self._simulator, legs[number], walk.end.yaw_rad if is_last else None)
+
+        self._rounds(progress, follow, is_guided=True)
         end = self._simulator.pose
         return self._with_memory(self._with_trace(self._record)).model_copy(
             update={"state": EndState.GUIDED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
@@ -303,8 +300,7 @@ class Stage:
             )
         if isinstance(action, Move):
             return motion.move(self._simulator, action)
-        pose = self._simulator.pose
-        return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
+        return motion.stay(self._simulator)
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):
