@@ -10,8 +10,6 @@ from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, numbers_of
 from evonav.cli.results.view import task_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from evonav.replay.replay import RunReplay
     from evonav.replay.types import ReplayedStage
 
@@ -108,7 +106,11 @@ def _replayed(
     replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px, keeps_depth=keeps_depth)
     with status("Replaying") as tell:
         last = None if wanted is None else max(wanted)
-        stages = list(replay.episode(name, task_id, _teller(tell), last_stage=last))
+
+        def on_round(stage: int, number: int) -> None:
+            tell(f"stage {stage}, round {number + 1}")
+
+        stages = list(replay.episode(name, task_id, on_round, last_stage=last))
     shown = [one for one in stages if wanted is None or one.record.stage in wanted]
     if not shown:
         raise InvalidArgumentError(f"{run}: no stage {stage} of task {task_id!r} by agent {name!r}")
@@ -118,7 +120,3 @@ def _replayed(
             what = "is shown as recorded" if one.why_not else "differs from the record; the replay is shown"
             typer.echo(f"stage {one.record.stage} {what}: {reason}", err=True)
     return replay, name, (stages, shown), found.success_radius_m
-
-
-def _teller(tell: "Callable[[str], None]") -> "Callable[[int, int], None]":
-    return lambda stage, round_: tell(f"stage {stage}, round {round_ + 1}")
