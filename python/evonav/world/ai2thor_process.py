@@ -21,7 +21,7 @@ from ai2thor.controller import Controller
 from ai2thor.fifo_server import FifoServer
 
 from evonav.world import ai2thor_guard
-from evonav.world.ai2thor_startup import ProcessEndedError
+from evonav.world.ai2thor_errors import ProcessEndedError
 
 _POLL_S = 0.1
 """Time between two checks that the process is alive."""

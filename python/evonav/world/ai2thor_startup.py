@@ -4,7 +4,6 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import sys
 import sysconfig
 import time
@@ -15,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
+from evonav.world.ai2thor_errors import ProcessEndedError
 from evonav.world.simulator import SimulatorConfig
 
 if TYPE_CHECKING:
@@ -69,20 +69,6 @@ class Ai2ThorOptions:
             )
         if self.executable is not None and self.commit_id is not None:
             raise InvalidArgumentError("executable and commit_id: give one, an executable is a build already")
-
-
-class ProcessEndedError(Exception):
-    """The process ended, or broke the protocol; the message continues `AI2-THOR's process`."""
-
-    @staticmethod
-    def of(returncode: int | None) -> "ProcessEndedError":
-        """Return the error for an exit status; `None` if the process still runs without its pipe."""
-        if returncode is None:
-            return ProcessEndedError("hung up")
-        if returncode < 0:
-            with suppress(ValueError):
-                return ProcessEndedError(f"was killed by {signal.Signals(-returncode).name}")
-        return ProcessEndedError(f"ended with exit code {returncode}")
 
 
 class ProcessLog:
