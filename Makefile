@@ -25,7 +25,7 @@ demo: setup
 test: export PROPTEST_RNG_SEED ?= 20261121
 test: setup
 	cargo test --workspace
-	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --cov --cov-report=
 
 # Whole houses by the published generator, which has an environment of its own (docs/procthor.md).
 $(VENV)-procthor/.dependencies: pyproject.toml

@@ -48,7 +48,7 @@ PARSED_ONLY = {
 }
 """Commands with these words are not run here, only parsed."""
 LIMITED = ("evaluate", "generate", "perception")
-"""Commands that get one task and this process: the words are tested, not the machine."""
+"""Commands that get one task, one or two agents and this process: the words are tested, not the machine."""
 
 
 def blocks(page: Path) -> Iterator[tuple[str, str]]:
@@ -189,7 +189,9 @@ def made_small(words: list[str], place: Path) -> list[str]:
         names = words[at].split(",")
         for name in names:
             check_agent_name(name)
-        options["--agents"] = ",".join(names if len(names) <= 3 else names[-2:])
+        options["--agents"] = ",".join(names if len(names) == 1 else [names[0], names[-1]])
+    elif words[0] == "evaluate" and "--agent" not in words:
+        options["--agents"] = "ftu" if "--perception" in words else "fu,ftu"
     for option, value in options.items():
         if option in words:
             words[words.index(option) + 1] = value
