@@ -16,8 +16,8 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
-from evonav.evaluation.run.run_settings import NUM_RETRIES
 from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
+from evonav.evaluation.run.settings import NUM_RETRIES
 from evonav.evaluation.run.summary import MODELS_KEY
 from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing

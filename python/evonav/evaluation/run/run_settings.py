@@ -5,16 +5,13 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.settings import DecisionSettings, SettingError, Settings
+from evonav.evaluation.run.settings import NUM_RETRIES, DecisionSettings, SettingError, Settings
 from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
-
-NUM_RETRIES = 2
-"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 
 
 class RunSettings(Settings):

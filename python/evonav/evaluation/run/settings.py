@@ -24,6 +24,8 @@ from evonav.world.simulator import Simulator
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
 
+NUM_RETRIES = 2
+"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
