@@ -6,6 +6,14 @@ from typing import Any, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.unigoal.bev import BevConfig
+from evonav.memory.objects import ObjectMapConfig, SightConfig
+from evonav.memory.occupancy import FrontierConfig
+from evonav.sensors.observation import MapFrame, View
+from evonav.world.camera import CameraView
+from evonav.world.pose import Pose
+from evonav.world.simulator import Frame, Intrinsics
+
 __version__: str
 
 class EvonavError(Exception): ...
@@ -88,7 +96,6 @@ class Room:
     id: str
     room_type: str
     polygon_m: list[_Vec2]
-    floor_material: str
 
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
@@ -176,12 +183,8 @@ def distort_masks(
     """
 
 def surface_sites(
-    depth_m: NDArray[np.float32],
+    frame: Frame,
     *,
-    vertical_fov_rad: float,
-    position_m: tuple[float, float, float],
-    yaw_rad: float,
-    horizon_rad: float,
     cell_m: float,
     stride_px: int,
     persistence: float,
@@ -220,6 +223,11 @@ def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[
 def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int64]:
     """Return `(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
 
+# png
+
+def encode_png(rgb: NDArray[np.uint8]) -> bytes:
+    """Encode an `(H, W, 3)` image as PNG, without metadata."""
+
 # memory
 
 @final
@@ -244,20 +252,7 @@ class Frontier:
 
 @final
 class OccupancyMap:
-    def __new__(
-        cls,
-        *,
-        rows: int,
-        cols: int,
-        cell_m: float,
-        corner_m: tuple[float, float],
-        min_cells: int = 20,
-        min_border_cells: int = 3,
-        max_span_rad: float = ...,
-        clearance_m: float = 0.5,
-        push_step_m: float = 0.05,
-        max_push_m: float = 0.3,
-    ) -> OccupancyMap: ...
+    def __new__(cls, map_frame: MapFrame, config: FrontierConfig) -> OccupancyMap: ...
     def conflicts(
         self, free: NDArray[np.int32], blocked: NDArray[np.int32]
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]: ...
@@ -336,61 +331,11 @@ class ObjectEntry:
 
 @final
 class ObjectMap:
-    def __new__(
-        cls,
-        *,
-        min_points: int,
-        max_points: int,
-        min_box_m3: float,
-        voxel_m: float,
-        cluster_radius_m: float,
-        cluster_min_points: int,
-        max_distance_m: float,
-        overlap_radius_m: float,
-        visual_weight: float,
-        match_threshold: float,
-        views_per_cleanup: int,
-        min_detections: int,
-        merge_overlap: float,
-        merge_similarity: float,
-    ) -> ObjectMap: ...
-    def update(
-        self,
-        depth_m: NDArray[np.float32],
-        masks: NDArray[np.int32],
-        labels: list[str],
-        confidences: NDArray[np.float32],
-        features: NDArray[np.float32] | None,
-        *,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        vertical_fov_rad: float,
-    ) -> tuple[list[int | None], list[int], list[tuple[int, int]]]: ...
-    def compare(
-        self,
-        entry_id: int,
-        depth_m: NDArray[np.float32],
-        masks: NDArray[np.int32],
-        labels: list[str],
-        confidences: NDArray[np.float32],
-        features: NDArray[np.float32] | None,
-        *,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        vertical_fov_rad: float,
-    ) -> NDArray[np.float64]: ...
+    def __new__(cls, config: ObjectMapConfig) -> ObjectMap: ...
+    def update(self, view: View) -> tuple[list[int | None], list[int], list[tuple[int, int]]]: ...
+    def compare(self, entry_id: int, view: View) -> NDArray[np.float64]: ...
     def visible_shares(
-        self,
-        targets_m: NDArray[np.float32],
-        eyes_m: NDArray[np.float64],
-        *,
-        radius_m: float,
-        step_m: float,
-        margin_m: float,
-        max_samples: int,
-        max_targets: int,
+        self, targets_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig
     ) -> NDArray[np.float64]: ...
     def begin_stage(self, stage: int) -> None: ...
     def remove(self, entry_id: int) -> bool: ...
@@ -420,41 +365,9 @@ def update_snapshots(
 class BevMap:
     """UniGoal's map; `evonav.agents.unigoal.bev` has shapes and units."""
 
-    def __new__(
-        cls,
-        *,
-        centre_m: tuple[float, float],
-        num_categories: int,
-        size_m: float,
-        cell_m: float,
-        block_m: float,
-        heights_m: tuple[float, float],
-        obstacle_min_m: float,
-        obstacle_above_camera_m: float,
-        max_depth_m: float,
-        stride_px: int,
-        category_points: int,
-    ) -> BevMap: ...
-    def integrate(
-        self,
-        depth_m: NDArray[np.float32],
-        categories: NDArray[np.int32] | None,
-        *,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        vertical_fov_rad: float,
-    ) -> None: ...
-    def cells_of(
-        self,
-        depth_m: NDArray[np.float32],
-        mask: NDArray[np.bool_],
-        *,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        vertical_fov_rad: float,
-    ) -> NDArray[np.int32]: ...
+    def __new__(cls, centre_m: tuple[float, float], num_categories: int, config: BevConfig) -> BevMap: ...
+    def integrate(self, view: View, categories: NDArray[np.int32] | None) -> None: ...
+    def cells_of(self, view: View, mask: NDArray[np.bool_]) -> NDArray[np.int32]: ...
     def visit(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> None: ...
     def collide(
         self, position_m: tuple[float, float], yaw_rad: float, *, start: int, length: int, width: int
@@ -509,38 +422,15 @@ class BevMap:
 
 # camera
 
-def unproject_image(
-    depth_m: NDArray[np.float32],
-    *,
-    vertical_fov_rad: float,
-    position_m: tuple[float, float, float],
-    yaw_rad: float,
-    horizon_rad: float,
-) -> NDArray[np.float64]:
+def unproject_image(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
     """Return the world points `(H, W, 3)` of an `(H, W)` depth image."""
 
 def unproject_masks(
-    depth_m: NDArray[np.float32],
-    masks: NDArray[np.int32],
-    *,
-    num_detections: int,
-    max_points: int,
-    vertical_fov_rad: float,
-    position_m: tuple[float, float, float],
-    yaw_rad: float,
-    horizon_rad: float,
+    view: View, masks: NDArray[np.int32], *, num_detections: int, max_points: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return the world points `(N, 3)` behind all masks, mask by mask, and the index after each mask's last point."""
 
-def project_points(
-    points_m: NDArray[np.float64],
-    *,
-    image_px: tuple[int, int],
-    vertical_fov_rad: float,
-    position_m: tuple[float, float, float],
-    yaw_rad: float,
-    horizon_rad: float,
-) -> NDArray[np.float64]:
+def project_points(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
     """Return column, row and planar depth `(N, 3)` of `(N, 3)` world points; NaN behind the camera."""
 
 # nn
@@ -563,9 +453,6 @@ class MiniNetwork:
         *,
         min_cells: int,
         min_confidence: float,
-        colour: float = 0.02,
-        depth: float = 8.0,
-        place: float = 0.5,
     ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float32]]:
         """Return `(H, W)` instance of each pixel or -1; class and confidence of each instance."""
 
@@ -603,39 +490,16 @@ class EmbeddedSimulator:
         """Return position, yaw and horizon of the start pose."""
 
     def render(
-        self, position_m: tuple[float, float, float], yaw_rad: float, horizon_rad: float, *, rgb: bool, instances: bool
+        self, pose: Pose, *, rgb: bool, instances: bool
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
         """Render depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
 
     def render_camera(
-        self,
-        *,
-        image_px: tuple[int, int],
-        vertical_fov_rad: float,
-        clip_m: tuple[float, float],
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        roll_rad: float,
-        half_height_m: float | None,
-        rgb: bool,
-        instances: bool,
+        self, view: CameraView, *, rgb: bool, instances: bool
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
-        """Render any view as `render` does; orthographic if `half_height_m` is given."""
+        """Render any view as `render` does; orthographic if it has a half height."""
 
-    def visible_bodies(
-        self,
-        *,
-        image_px: tuple[int, int],
-        vertical_fov_rad: float,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
-        roll_rad: float,
-        half_height_m: float | None,
-        agent_m: tuple[float, float],
-        max_distance_m: float,
-    ) -> list[int]:
+    def visible_bodies(self, view: CameraView, *, agent_m: tuple[float, float], max_distance_m: float) -> list[int]:
         """Return the indices of the bodies that AI2-THOR calls visible, ascending."""
 
     def is_free(self, point_m: tuple[float, float]) -> bool: ...
@@ -687,10 +551,7 @@ class BatchSimulator:
         self,
         slot: int,
         simulator: EmbeddedSimulator,
-        *,
-        position_m: tuple[float, float, float],
-        yaw_rad: float,
-        horizon_rad: float,
+        pose: Pose,
         labels: NDArray[np.uint8],
     ) -> None:
         """Put an agent into a house; `labels` `(bodies,)` is the label of each body's pixels, 0 for none."""

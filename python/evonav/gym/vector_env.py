@@ -229,14 +229,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """Put an agent into a stage; `numbers` are those of this task and the next."""
         simulator = at.world.entered()
         start = simulator.enter(pose)
-        self._batch.place(
-            index,
-            simulator.core,
-            position_m=start.position_m,
-            yaw_rad=start.yaw_rad,
-            horizon_rad=start.horizon_rad,
-            labels=at.world.labels,
-        )
+        self._batch.place(index, simulator.core, start, at.world.labels)
         path_m = self._batch.plan_one(index, at.target_m)
         if path_m:
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))

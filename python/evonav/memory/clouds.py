@@ -48,14 +48,7 @@ def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
     """
     camera_m = view.pose.position_m
     points_m, ends = _core.unproject_masks(
-        view.depth_m,
-        view.detections.masks,
-        num_detections=len(view.detections.labels),
-        max_points=max_points,
-        vertical_fov_rad=view.intrinsics.vertical_fov_rad,
-        position_m=camera_m,
-        yaw_rad=view.pose.yaw_rad,
-        horizon_rad=view.pose.horizon_rad,
+        view, view.detections.masks, num_detections=len(view.detections.labels), max_points=max_points
     )
     limit = np.iinfo(np.int16).max
     offsets_mm = np.rint((points_m - np.array(camera_m, np.float32)) * np.float32(1e3))

@@ -1,6 +1,6 @@
 """Merge detections into lasting object entries: the object map."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +99,7 @@ class ObjectMap:
             InvalidArgumentError: A parameter is out of range; the message names it.
         """
         self.config = config or ObjectMapConfig()
-        self._map = _core.ObjectMap(**asdict(self.config))
+        self._map = _core.ObjectMap(self.config)
 
     def __len__(self) -> int:
         """Return the number of entries."""
@@ -147,18 +147,7 @@ class ObjectMap:
         Raises:
             InvalidArgumentError: An array has the wrong shape or contains NaN; the map does not change then.
         """
-        found = view.detections
-        entry_ids, removed, merged = self._map.update(
-            view.depth_m,
-            found.masks,
-            list(found.labels),
-            found.confidences,
-            found.features,
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
-        )
+        entry_ids, removed, merged = self._map.update(view)
         return ObjectUpdate(tuple(entry_ids), tuple(removed), tuple(merged))
 
     def compare(self, entry_id: int, view: View) -> Comparison:
@@ -167,19 +156,7 @@ class ObjectMap:
         Raises:
             InvalidArgumentError: The entry does not exist, or an array has the wrong shape.
         """
-        found = view.detections
-        compared = self._map.compare(
-            entry_id,
-            view.depth_m,
-            found.masks,
-            list(found.labels),
-            found.confidences,
-            found.features,
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
-        )
+        compared = self._map.compare(entry_id, view)
         return Comparison(overlap=compared[:, 0], distance_m=compared[:, 1])
 
     def visible_shares(
@@ -200,4 +177,4 @@ class ObjectMap:
         Raises:
             InvalidArgumentError: A position is not finite, or a parameter is out of range; the message names it.
         """
-        return self._map.visible_shares(target_m, eyes_m, **asdict(config or SightConfig()))
+        return self._map.visible_shares(target_m, eyes_m, config or SightConfig())

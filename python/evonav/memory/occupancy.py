@@ -33,6 +33,11 @@ class FrontierConfig:
     max_push_m: float = 0.3
     """Largest distance that the view position is moved away."""
 
+    @property
+    def max_span_rad(self) -> float:
+        """`max_span_deg` in radians."""
+        return math.radians(self.max_span_deg)
+
 
 @dataclass(frozen=True, slots=True)
 class Conflicts:
@@ -67,21 +72,9 @@ class OccupancyMap:
         Raises:
             InvalidArgumentError: A parameter is out of range; the message names it.
         """
-        frontiers = frontiers or FrontierConfig()
         self.map_frame = map_frame
         self.explored_range_m = explored_range_m
-        self._map = _core.OccupancyMap(
-            rows=map_frame.rows,
-            cols=map_frame.cols,
-            cell_m=map_frame.cell_m,
-            corner_m=map_frame.corner_m,
-            min_cells=frontiers.min_cells,
-            min_border_cells=frontiers.min_border_cells,
-            max_span_rad=math.radians(frontiers.max_span_deg),
-            clearance_m=frontiers.clearance_m,
-            push_step_m=frontiers.push_step_m,
-            max_push_m=frontiers.max_push_m,
-        )
+        self._map = _core.OccupancyMap(map_frame, frontiers or FrontierConfig())
 
     @property
     def cells(self) -> NDArray[np.uint8]:

@@ -262,11 +262,7 @@ class NoisyPerception:
         if config.false_positives_per_view == 0.0 or frame.instances is None:
             return []
         pixels, values = _core.surface_sites(
-            frame.depth_m,
-            vertical_fov_rad=frame.intrinsics.vertical_fov_rad,
-            position_m=frame.pose.position_m,
-            yaw_rad=frame.pose.yaw_rad,
-            horizon_rad=frame.pose.horizon_rad,
+            frame,
             cell_m=_CELL_M,
             stride_px=max(1, round(_STRIDE_PX * frame.intrinsics.height_px / _REFERENCE_HEIGHT_PX)),
             persistence=config.persistence,

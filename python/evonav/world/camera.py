@@ -56,13 +56,7 @@ def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) 
     Raises:
         InvalidArgumentError: The depth image is not C-contiguous, or pose or field of view are not finite.
     """
-    return _core.unproject_image(
-        depth_m,
-        vertical_fov_rad=intrinsics.vertical_fov_rad,
-        position_m=pose.position_m,
-        yaw_rad=pose.yaw_rad,
-        horizon_rad=pose.horizon_rad,
-    )
+    return _core.unproject_image(depth_m, pose, intrinsics)
 
 
 def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
@@ -80,11 +74,4 @@ def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -
     Raises:
         InvalidArgumentError: The points are not a C-contiguous `(N, 3)`, or pose or field of view are not finite.
     """
-    return _core.project_points(
-        points_m,
-        image_px=(intrinsics.width_px, intrinsics.height_px),
-        vertical_fov_rad=intrinsics.vertical_fov_rad,
-        position_m=pose.position_m,
-        yaw_rad=pose.yaw_rad,
-        horizon_rad=pose.horizon_rad,
-    )
+    return _core.project_points(points_m, pose, intrinsics)

@@ -147,9 +147,7 @@ class EmbeddedSimulator:
             InvalidArgumentError: The pose is not finite.
         """
         at = (pose or self._pose).canonical()
-        depth_m, colours, ids = self._world.render(
-            at.position_m, at.yaw_rad, at.horizon_rad, rgb=rgb, instances=instances
-        )
+        depth_m, colours, ids = self._world.render(at, rgb=rgb, instances=instances)
         return Frame(replace(at, y_m=self.config.camera_height_m), self.intrinsics, depth_m, colours, ids)
 
     def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
@@ -160,19 +158,7 @@ class EmbeddedSimulator:
         Raises:
             InvalidArgumentError: A number of the view is not finite or out of range.
         """
-        images = self._world.render_camera(
-            image_px=(view.width_px, view.height_px),
-            vertical_fov_rad=view.vertical_fov_rad,
-            clip_m=(view.near_m, view.far_m),
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            roll_rad=view.roll_rad,
-            half_height_m=view.orthographic_half_height_m,
-            rgb=rgb,
-            instances=instances,
-        )
-        return Images(*images)
+        return Images(*self._world.render_camera(view, rgb=rgb, instances=instances))
 
     def visible_objects(
         self, view: CameraView, *, max_distance_m: float = 1.5, agent_m: tuple[float, float] | None = None
@@ -193,17 +179,8 @@ class EmbeddedSimulator:
         Raises:
             InvalidArgumentError: A number is not finite or out of range.
         """
-        return self._world.visible_bodies(
-            image_px=(view.width_px, view.height_px),
-            vertical_fov_rad=view.vertical_fov_rad,
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            roll_rad=view.roll_rad,
-            half_height_m=view.orthographic_half_height_m,
-            agent_m=agent_m or _on_ground(view.pose),
-            max_distance_m=max_distance_m,
-        )
+        agent_m = agent_m or _on_ground(view.pose)
+        return self._world.visible_bodies(view, agent_m=agent_m, max_distance_m=max_distance_m)
 
     def reachable_positions(self) -> NDArray[np.float64]:
         """Return the `(N, 3)` positions of the square grid through the agent that it can reach there."""

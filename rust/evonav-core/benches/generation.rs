@@ -5,7 +5,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    generation::{Extensions, Occurrence, Parameters, Schedule, generate_task},
+    generation::{Extensions, Occurrence, Overrides, Parameters, Schedule, generate_task},
     house::House,
     world::{
         layout::{SpawnRequest, random_spawn},
@@ -45,13 +45,21 @@ fn bench_generation(c: &mut Criterion) {
         ("extensions", extended),
         ("schedule", lived_in),
     ] {
-        let mut seed = 0;
+        let (mut seed, nothing) = (0, Overrides::default());
         c.bench_function(&format!("generate_task/4_stages_{name}"), |b| {
             b.iter(|| {
                 seed += 1;
                 let catalogue = Catalogue::bundled();
                 let unknown = UnknownAssets::Error;
-                generate_task(black_box(&house), catalogue, unknown, seed, "bench", &parameters)
+                generate_task(
+                    black_box(&house),
+                    catalogue,
+                    unknown,
+                    seed,
+                    "bench",
+                    &parameters,
+                    &nothing,
+                )
             });
         });
     }

@@ -53,6 +53,24 @@ impl Error {
         Err(Self::invalid(name, value, expected))
     }
 
+    /// Check that numbers are finite.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the argument and the first value that is not.
+    pub fn require_finite(name: &str, values: &[f64]) -> Result<(), Self> {
+        values.iter().try_for_each(|&value| Self::require(name, value, "finite", f64::is_finite))
+    }
+
+    /// Check that an image has whole rows of pixels.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the argument and its number of pixels.
+    pub fn require_rows(name: &str, num_px: usize, width_px: usize) -> Result<(), Self> {
+        Self::require(name, num_px, "whole rows of pixels", |num_px| {
+            width_px > 0 && num_px.is_multiple_of(width_px)
+        })
+    }
+
     /// Create an [`Error::InvalidArgument`].
     pub fn invalid(name: &str, value: impl ToString, expected: &str) -> Self {
         Self::InvalidArgument {

@@ -2,25 +2,39 @@
 
 use evonav_core::Error;
 use numpy::{
-    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray,
-    PyUntypedArrayMethods,
+    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2,
+    PyReadwriteArray, PyUntypedArrayMethods,
     ndarray::{Dimension, IntoDimension},
 };
 use pyo3::prelude::*;
 
 use crate::error;
 
-/// Return the elements and shape of a C-contiguous array. rust-numpy's own `as_slice` also accepts
-/// Fortran order, which would arrive transposed.
+/// Read the fields of a struct from the attributes of the same names of a Python object.
+macro_rules! from_attributes {
+    ($object:expr, $name:ident { $($field:ident),* $(,)? }) => {
+        $name { $($field: $object.getattr(stringify!($field))?.extract()?),* }
+    };
+}
+pub(crate) use from_attributes;
+
+/// Return the elements of a C-contiguous array. rust-numpy's own `as_slice` also accepts Fortran
+/// order, which would arrive transposed.
+pub fn elements<'a, T: Element, D: Dimension>(
+    name: &str,
+    array: &'a PyReadonlyArray<'_, T, D>,
+) -> PyResult<&'a [T]> {
+    require_c_contiguous(name, array.is_c_contiguous())?;
+    Ok(array.as_slice()?)
+}
+
+/// Return the elements and shape of a C-contiguous array, as [`elements`].
 pub fn row_major<'a, T: Element>(
     name: &str,
     array: &'a PyReadonlyArray2<'_, T>,
 ) -> PyResult<(&'a [T], [usize; 2])> {
-    if !array.is_c_contiguous() {
-        return Err(error::to_py(Error::invalid(name, "not C-contiguous", "a C-contiguous array")));
-    }
     let shape = array.shape();
-    Ok((array.as_slice()?, [shape[0], shape[1]]))
+    Ok((elements(name, array)?, [shape[0], shape[1]]))
 }
 
 /// Return the elements of a C-contiguous array of any shape for writing.
@@ -28,10 +42,28 @@ pub fn whole_mut<'a, T: Element, D: Dimension>(
     name: &str,
     array: &'a mut PyReadwriteArray<'_, T, D>,
 ) -> PyResult<&'a mut [T]> {
-    if !array.is_c_contiguous() {
-        return Err(error::to_py(Error::invalid(name, "not C-contiguous", "a C-contiguous array")));
-    }
+    require_c_contiguous(name, array.is_c_contiguous())?;
     Ok(array.as_slice_mut()?)
+}
+
+fn require_c_contiguous(name: &str, is_c_contiguous: bool) -> PyResult<()> {
+    let found = || Error::invalid(name, "not C-contiguous", "a C-contiguous array");
+    if is_c_contiguous { Ok(()) } else { Err(error::to_py(found())) }
+}
+
+/// Return the elements of an image after checking its `[width, height]`.
+pub fn image<'a, T: Element>(
+    name: &str,
+    array: &'a PyReadonlyArray2<'_, T>,
+    [width_px, height_px]: [usize; 2],
+) -> PyResult<&'a [T]> {
+    let (pixels, shape) = row_major(name, array)?;
+    if shape != [height_px, width_px] {
+        let found = format!("of shape {shape:?}");
+        let expected = format!("an array of shape {:?}", [height_px, width_px]);
+        return Err(error::to_py(Error::invalid(name, found, &expected)));
+    }
+    Ok(pixels)
 }
 
 /// Return the `(N, 2)` `[row, col]` rows of an array.

@@ -25,15 +25,3 @@ pub fn to_py(error: Error) -> PyErr {
         Error::InvalidArgument { .. } => InvalidArgumentError::new_err(message),
     }
 }
-
-/// Add the exceptions to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    let py = module.py();
-    module.add("EvonavError", py.get_type::<EvonavError>())?;
-    module.add("HouseError", py.get_type::<HouseError>())?;
-    module.add("TaskError", py.get_type::<TaskError>())?;
-    module.add("SimulationError", py.get_type::<SimulationError>())?;
-    module.add("DecisionError", py.get_type::<DecisionError>())?;
-    module.add("StoreError", py.get_type::<StoreError>())?;
-    module.add("InvalidArgumentError", py.get_type::<InvalidArgumentError>())
-}

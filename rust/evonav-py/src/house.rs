@@ -28,7 +28,6 @@ pub struct Room {
     id: String,
     room_type: String,
     polygon_m: Vec<(f64, f64)>,
-    floor_material: String,
 }
 
 /// One side of a wall: see `evonav_core::house::Wall`.
@@ -90,12 +89,8 @@ impl House {
 
     fn __repr__(&self) -> String {
         let house = &self.inner;
-        format!(
-            "House({:?}, {} rooms, {} objects)",
-            house.name,
-            house.rooms.len(),
-            house.objects.len()
-        )
+        let (num_rooms, num_objects) = (house.rooms.len(), house.objects.len());
+        format!("House({:?}, {num_rooms} rooms, {num_objects} objects)", house.name)
     }
 
     #[getter]
@@ -122,10 +117,7 @@ impl House {
         py: Python<'_>,
         allow_unknown_assets: bool,
     ) -> PyResult<Vec<ObjectFootprints>> {
-        let unknown = match allow_unknown_assets {
-            true => UnknownAssets::CategoryDefault,
-            false => UnknownAssets::Error,
-        };
+        let unknown = unknown_assets(allow_unknown_assets);
         let found = py
             .detach(|| object_footprints(&self.inner, Catalogue::bundled(), unknown))
             .map_err(error::to_py)?;
@@ -171,12 +163,16 @@ impl House {
     }
 }
 
+/// Return the treatment of assets that the catalogue does not contain.
+pub fn unknown_assets(are_allowed: bool) -> UnknownAssets {
+    if are_allowed { UnknownAssets::CategoryDefault } else { UnknownAssets::Error }
+}
+
 fn room(room: &house::Room) -> Room {
     Room {
         id: room.id.clone(),
         room_type: room.room_type.clone(),
         polygon_m: room.polygon_m.iter().copied().map(Into::into).collect(),
-        floor_material: room.floor_material.clone(),
     }
 }
 
@@ -220,18 +216,8 @@ fn object(house: &house::House, object: &house::Object) -> HouseObject {
 
 /// Return the id, category and size of every asset of the catalogue, by id.
 #[pyfunction]
-fn assets() -> Vec<(String, String, Vec3)> {
+pub fn assets() -> Vec<(String, String, Vec3)> {
     let catalogue = Catalogue::bundled();
     let known = catalogue.asset_ids().into_iter().filter_map(|id| catalogue.get(id));
     known.map(|asset| (asset.id.clone(), asset.category.clone(), asset.size_m)).collect()
-}
-
-/// Add the classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<House>()?;
-    module.add_class::<Room>()?;
-    module.add_class::<Wall>()?;
-    module.add_class::<Opening>()?;
-    module.add_class::<HouseObject>()?;
-    module.add_function(wrap_pyfunction!(assets, module)?)
 }

@@ -9,6 +9,7 @@ mod house;
 mod inspection;
 mod memory;
 mod perception;
+mod png;
 mod sensors;
 mod simulator;
 mod unigoal;
@@ -16,18 +17,47 @@ mod unigoal;
 use pyo3::prelude::*;
 
 #[pymodule]
-fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    error::register(module)?;
-    house::register(module)?;
-    inspection::register(module)?;
-    sensors::register(module)?;
-    camera::register(module)?;
-    perception::register(module)?;
-    memory::register(module)?;
-    unigoal::register(module)?;
-    simulator::register(module)?;
-    generation::register(module)?;
-    // PyO3 lists every name in `__all__`, which the stub would have to repeat.
-    module.delattr("__all__")
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use super::{
+        camera::{project_points, unproject_image, unproject_masks},
+        error::{
+            DecisionError, EvonavError, HouseError, InvalidArgumentError, SimulationError,
+            StoreError, TaskError,
+        },
+        generation::{default_generation_parameters, generate_task},
+        house::{House, HouseObject, Opening, Room, Wall, assets},
+        inspection::inspect_house,
+        memory::{
+            objects::{ObjectEntry, ObjectMap},
+            occupancy::{Frontier, OccupancyMap},
+            snapshots::update_snapshots,
+        },
+        perception::{
+            mini::MiniNetwork,
+            noise::{
+                distort_masks, draw_normals, mask_outlines, noisy_depth, paint_blobs, surface_sites,
+            },
+        },
+        png::encode_png,
+        sensors::{instance_areas, mask_extents, number_instances, visible_cells},
+        simulator::{
+            batch::{PyBatchSimulator, PyGeodesicField},
+            embedded::{PyEmbeddedSimulator, map_spec},
+        },
+        unigoal::BevMap,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // Images are freed as often as they are created. After one block of this size was freed,
+        // glibc keeps that much memory instead of returning it to the system; getting it back takes
+        // a third of a frame.
+        drop(std::hint::black_box(vec![0_u8; 1 << 24]));
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        // PyO3 lists every name in `__all__`, which the stub would have to repeat.
+        module.delattr("__all__")
+    }
 }

@@ -2,7 +2,7 @@
 
 use evonav_core::{
     grid::GridSpec,
-    sensors::{self, instance_masks},
+    sensors::{instance_masks, visible_cells::visible_cells as cast_rays},
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use crate::{arrays, error};
 #[pyo3(signature = (blocked, *, cell_m, corner_m, origin_m, yaw_rad, horizontal_fov_rad, range_m))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
 #[expect(clippy::type_complexity, reason = "a pair of arrays")]
-fn visible_cells<'py>(
+pub fn visible_cells<'py>(
     py: Python<'py>,
     blocked: PyReadonlyArray2<'py, u8>,
     cell_m: f64,
@@ -27,16 +27,7 @@ fn visible_cells<'py>(
     let (cells, [rows, cols]) = arrays::row_major("blocked", &blocked)?;
     let spec = GridSpec { rows, cols, cell_m, corner_m };
     let seen = py
-        .detach(|| {
-            sensors::visible_cells::visible_cells(
-                cells,
-                &spec,
-                origin_m,
-                yaw_rad,
-                horizontal_fov_rad,
-                range_m,
-            )
-        })
+        .detach(|| cast_rays(cells, &spec, origin_m, yaw_rad, horizontal_fov_rad, range_m))
         .map_err(error::to_py)?;
     Ok((arrays::rows_of(py, seen.free)?, arrays::rows_of(py, seen.blocked)?))
 }
@@ -45,7 +36,7 @@ fn visible_cells<'py>(
 #[pyfunction]
 #[pyo3(signature = (instances, is_detectable, *, min_area_px, max_box_fraction))]
 #[expect(clippy::type_complexity, reason = "a pair of arrays")]
-fn number_instances<'py>(
+pub fn number_instances<'py>(
     py: Python<'py>,
     instances: PyReadonlyArray2<'py, i32>,
     is_detectable: PyReadonlyArray1<'py, bool>,
@@ -64,7 +55,7 @@ fn number_instances<'py>(
 
 /// Count the pixels of each instance.
 #[pyfunction]
-fn instance_areas<'py>(
+pub fn instance_areas<'py>(
     py: Python<'py>,
     instances: PyReadonlyArray2<'py, i32>,
     num_instances: usize,
@@ -78,7 +69,7 @@ fn instance_areas<'py>(
 /// Return one row per mask: area, left, top, right, bottom.
 #[pyfunction]
 #[pyo3(signature = (masks, *, num_masks))]
-fn mask_extents<'py>(
+pub fn mask_extents<'py>(
     py: Python<'py>,
     masks: PyReadonlyArray2<'py, i32>,
     num_masks: usize,
@@ -92,12 +83,4 @@ fn mask_extents<'py>(
         [extent.area_px, left, top, right, bottom].map(|px| px as i64)
     };
     arrays::rows_of(py, extents.into_iter().map(row).collect())
-}
-
-/// Add the functions to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(visible_cells, module)?)?;
-    module.add_function(wrap_pyfunction!(number_instances, module)?)?;
-    module.add_function(wrap_pyfunction!(instance_areas, module)?)?;
-    module.add_function(wrap_pyfunction!(mask_extents, module)?)
 }

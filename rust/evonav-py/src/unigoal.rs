@@ -2,12 +2,11 @@
 
 use evonav_core::{
     Error,
-    geometry::{Pose, Vec3},
+    geometry::Pose,
     grid::{bits::BitGrid, dilate::dilate_disk},
-    sensors::camera::Camera,
     unigoal::{
         bev_config::BevConfig,
-        bev_map::{self},
+        bev_map,
         collision_strip::{Strip, strip_cells},
         depth_view::DepthView,
         exploration::{ExploreConfig, choose_frontier, frontier_cells},
@@ -17,88 +16,60 @@ use evonav_core::{
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays, error};
+use crate::{arrays, camera::DepthImage, error};
 
 type Cells<'py> = Bound<'py, PyArray2<i32>>;
 type Mask<'py> = Bound<'py, PyArray2<bool>>;
 
 /// UniGoal's bird's-eye map.
 #[pyclass(module = "evonav._core")]
-struct BevMap(bev_map::BevMap);
+pub struct BevMap(bev_map::BevMap);
 
 #[pymethods]
 impl BevMap {
     #[new]
-    #[pyo3(signature = (
-        *, centre_m, num_categories, size_m, cell_m, block_m, heights_m, obstacle_min_m,
-        obstacle_above_camera_m, max_depth_m, stride_px, category_points,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
-    fn new(
-        centre_m: [f64; 2],
-        num_categories: usize,
-        size_m: f64,
-        cell_m: f64,
-        block_m: f64,
-        heights_m: [f64; 2],
-        obstacle_min_m: f64,
-        obstacle_above_camera_m: f64,
-        max_depth_m: f64,
-        stride_px: usize,
-        category_points: u8,
-    ) -> PyResult<Self> {
-        let config = BevConfig {
-            size_m,
-            cell_m,
-            block_m,
-            heights_m,
-            obstacle_min_m,
-            obstacle_above_camera_m,
-            max_depth_m,
-            stride_px,
-            category_points,
-        };
+    fn new(centre_m: [f64; 2], num_categories: usize, config: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let config = arrays::from_attributes!(
+            config,
+            BevConfig {
+                size_m,
+                cell_m,
+                block_m,
+                heights_m,
+                obstacle_min_m,
+                obstacle_above_camera_m,
+                max_depth_m,
+                stride_px,
+                category_points,
+            }
+        );
         bev_map::BevMap::new(centre_m, num_categories, config).map(Self).map_err(error::to_py)
     }
 
-    #[pyo3(signature = (depth_m, categories, *, position_m, yaw_rad, horizon_rad, vertical_fov_rad))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
     fn integrate(
         &mut self,
         py: Python<'_>,
-        depth_m: PyReadonlyArray2<'_, f32>,
+        view: DepthImage<'_>,
         categories: Option<PyReadonlyArray2<'_, i32>>,
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
-        vertical_fov_rad: f64,
     ) -> PyResult<()> {
-        let (depth_m, image_px) = arrays::row_major("depth_m", &depth_m)?;
-        let categories = match &categories {
-            Some(categories) => Some(image("categories", categories, image_px)?),
-            None => None,
-        };
-        let camera = camera(image_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad);
+        let (camera, depth_m) = view.borrow()?;
+        let image_px = [camera.width_px, camera.height_px];
+        let categories = categories.as_ref();
+        let categories =
+            categories.map(|array| arrays::image("categories", array, image_px)).transpose()?;
         let map = &mut self.0;
         py.detach(|| map.integrate(&DepthView { camera, depth_m, categories }))
             .map_err(error::to_py)
     }
 
-    #[pyo3(signature = (depth_m, mask, *, position_m, yaw_rad, horizon_rad, vertical_fov_rad))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
     fn cells_of<'py>(
         &self,
         py: Python<'py>,
-        depth_m: PyReadonlyArray2<'py, f32>,
+        view: DepthImage<'py>,
         mask: PyReadonlyArray2<'py, bool>,
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
-        vertical_fov_rad: f64,
     ) -> PyResult<Cells<'py>> {
-        let (depth_m, image_px) = arrays::row_major("depth_m", &depth_m)?;
-        let mask = image("mask", &mask, image_px)?;
-        let camera = camera(image_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad);
+        let (camera, depth_m) = view.borrow()?;
+        let mask = arrays::image("mask", &mask, [camera.width_px, camera.height_px])?;
         let view = DepthView { camera, depth_m, categories: None };
         let cells = py.detach(|| self.0.cells_of(&view, mask)).map_err(error::to_py)?;
         arrays::rows_of(py, cells)
@@ -253,31 +224,6 @@ impl BevMap {
     }
 }
 
-fn camera(
-    [height_px, width_px]: [usize; 2],
-    vertical_fov_rad: f64,
-    position_m: Vec3,
-    yaw_rad: f64,
-    horizon_rad: f64,
-) -> Camera {
-    Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad }
-}
-
-/// Return the pixels of an image after checking its size.
-fn image<'a, T: numpy::Element>(
-    name: &str,
-    array: &'a PyReadonlyArray2<'_, T>,
-    expected: [usize; 2],
-) -> PyResult<&'a [T]> {
-    let (pixels, shape) = arrays::row_major(name, array)?;
-    if shape != expected {
-        let found = format!("of shape {shape:?}");
-        let expected = format!("an array of shape {expected:?}");
-        return Err(error::to_py(Error::invalid(name, found, &expected)));
-    }
-    Ok(pixels)
-}
-
 fn listed<'py>(py: Python<'py>, grid: &BitGrid) -> PyResult<Cells<'py>> {
     arrays::rows_of(py, grid.cells().map(|cell| cell.map(|i| i as i32)).collect())
 }
@@ -288,9 +234,4 @@ fn mask<'py>(py: Python<'py>, grid: &BitGrid) -> PyResult<Mask<'py>> {
         cells[row * grid.cols() + col] = true;
     }
     arrays::image_of(py, cells, [grid.rows(), grid.cols()])
-}
-
-/// Add the class to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<BevMap>()
 }

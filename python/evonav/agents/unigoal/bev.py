@@ -3,7 +3,7 @@
 Specification: UniGoal (Yin et al., CVPR 2025), whose mapping is SemExp's; docs/memory.md says where ours differs.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +57,7 @@ class BevMap:
         """
         self.config = config = config or BevConfig()
         self.num_categories = num_categories
-        self.core = _core.BevMap(
-            centre_m=centre_m,
-            num_categories=num_categories,
-            **asdict(config),
-        )
+        self.core = _core.BevMap(centre_m, num_categories, config)
         """The map in Rust: what was seen, where the agent has been and collided, and paths."""
         rows, cols = self.core.shape
         self.map_frame = MapFrame(rows, cols, config.cell_m, self.core.corner_m)
@@ -76,25 +72,11 @@ class BevMap:
         Raises:
             InvalidArgumentError: An image has another shape, or a category is out of range; the map stays as it is.
         """
-        self.core.integrate(
-            view.depth_m,
-            categories,
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
-        )
+        self.core.integrate(view, categories)
 
     def cells_of(self, view: View, mask: NDArray[np.bool_]) -> Cells:
         """Return the cells of the marked pixels `(H, W)` of a view, sorted, each once; at any height and distance."""
-        return self.core.cells_of(
-            view.depth_m,
-            mask,
-            position_m=view.pose.position_m,
-            yaw_rad=view.pose.yaw_rad,
-            horizon_rad=view.pose.horizon_rad,
-            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
-        )
+        return self.core.cells_of(view, mask)
 
     def cell_of(self, point_m: Point2) -> tuple[int, int] | None:
         """Return the `(row, col)` of the cell that contains `(x, z)`; `None` off the map."""

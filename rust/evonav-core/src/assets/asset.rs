@@ -1,11 +1,12 @@
 //! Facts about one asset.
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use crate::geometry::Vec3;
 
 /// Facts about one asset, from the catalogue that ships with evonav.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default)]
 pub struct Asset {
     /// Catalogue key, as in house files.
     pub id: String,
@@ -17,6 +18,7 @@ pub struct Asset {
     /// there are none.
     pub surfaces_m: Vec<f64>,
     /// Colours (sRGB) of the asset's materials, most important first; may be empty.
+    #[serde(deserialize_with = "read_colours")]
     pub colours: Vec<[u8; 3]>,
     /// Names of the asset's materials, as ProcTHOR lists them; see
     /// [`crate::assets::Catalogue::material_colour`].
@@ -27,13 +29,27 @@ pub struct Asset {
     /// use.
     pub split: Option<Split>,
     /// Whether a robot can carry it (AI2-THOR's `CanPickup`).
+    #[serde(rename = "pickupable")]
     pub is_pickupable: bool,
     /// Whether it can be pushed (AI2-THOR's `Moveable`).
+    #[serde(rename = "moveable")]
     pub is_moveable: bool,
     /// Whether it can hold other objects (AI2-THOR's `Receptacle`).
+    #[serde(rename = "receptacle")]
     pub is_receptacle: bool,
     /// Whether it has doors, drawers or a lid (AI2-THOR's `CanOpen`).
+    #[serde(rename = "openable")]
     pub is_openable: bool,
+}
+
+fn read_colours<'de, D: Deserializer<'de>>(colours: D) -> Result<Vec<[u8; 3]>, D::Error> {
+    Ok(Vec::<String>::deserialize(colours)?.iter().map(|hex| rgb(hex)).collect())
+}
+
+/// Parse a colour `rrggbb`; black if it is malformed.
+pub(super) fn rgb(hex: &str) -> [u8; 3] {
+    let [_, red, green, blue] = u32::from_str_radix(hex, 16).unwrap_or(0).to_be_bytes();
+    [red, green, blue]
 }
 
 /// A split of ProcTHOR's assets.

@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::OnceLock};
 use serde::Deserialize;
 
 use crate::{
-    assets::{Asset, Split, group_definition::GroupDefinition, placement_rule::PlacementRule},
+    assets::{Asset, asset::rgb, group_definition::GroupDefinition, placement_rule::PlacementRule},
     geometry::Vec3,
 };
 
@@ -29,39 +29,14 @@ struct Category {
     median_size_m: Vec3,
 }
 
-#[derive(Deserialize)]
-struct AssetFile {
-    assets: Vec<AssetRow>,
-}
-
-#[derive(Deserialize)]
-struct AssetRow {
-    id: String,
-    category: String,
-    size_m: Vec3,
-    #[serde(default)]
-    split: Option<Split>,
-    #[serde(default)]
-    surfaces_m: Vec<f64>,
-    #[serde(default)]
-    colours: Vec<String>,
-    #[serde(default)]
-    materials: Vec<String>,
-    #[serde(default)]
-    made_of: Vec<String>,
-    #[serde(default)]
-    pickupable: bool,
-    #[serde(default)]
-    moveable: bool,
-    #[serde(default)]
-    receptacle: bool,
-    #[serde(default)]
-    openable: bool,
-}
-
-#[derive(Deserialize)]
-struct CategoryFile {
+/// A file of the catalogue's data; each file has one of these lists.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct DataFile {
+    assets: Vec<Asset>,
     categories: Vec<CategoryRow>,
+    groups: Vec<GroupDefinition>,
+    materials: Vec<(String, String)>,
 }
 
 #[derive(Deserialize)]
@@ -73,66 +48,43 @@ struct CategoryRow {
     rule: Option<PlacementRule>,
 }
 
-#[derive(Deserialize)]
-struct GroupFile {
-    groups: Vec<GroupDefinition>,
-}
-
-#[derive(Deserialize)]
-struct MaterialFile {
-    materials: Vec<(String, String)>,
-}
-
 impl Catalogue {
     /// Return the catalogue that is part of this build. It is read once, on first use.
     pub fn bundled() -> &'static Self {
         static BUNDLED: OnceLock<Catalogue> = OnceLock::new();
         BUNDLED.get_or_init(|| {
-            let assets = include_str!("../../data/assets.json");
-            let categories = include_str!("../../data/categories.json");
-            let materials = include_str!("../../data/materials.json");
-            let groups = include_str!("../../data/groups.json");
             // The data is part of the build and read by a test: no user input can make this fail.
             #[allow(clippy::expect_used)]
-            Self::from_json(assets, categories, materials, groups)
-                .expect("bundled catalogue is valid")
+            let read = |json: &str| -> DataFile {
+                serde_json::from_str(json).expect("bundled catalogue is valid")
+            };
+            Self::new(DataFile {
+                assets: read(include_str!("../../data/assets.json")).assets,
+                categories: read(include_str!("../../data/categories.json")).categories,
+                groups: read(include_str!("../../data/groups.json")).groups,
+                materials: read(include_str!("../../data/materials.json")).materials,
+            })
         })
     }
 
-    fn from_json(
-        assets: &str,
-        categories: &str,
-        materials: &str,
-        groups: &str,
-    ) -> serde_json::Result<Self> {
-        let assets: AssetFile = serde_json::from_str(assets)?;
-        let categories: CategoryFile = serde_json::from_str(categories)?;
-        let materials: MaterialFile = serde_json::from_str(materials)?;
-        let groups: GroupFile = serde_json::from_str(groups)?;
+    fn new(data: DataFile) -> Self {
         let mut by_name: HashMap<String, Category> = HashMap::new();
-        for row in categories.categories {
-            let category =
-                Category { rule: row.rule, supports: row.supports, ..Category::default() };
-            by_name.insert(row.name, category);
+        for CategoryRow { name, supports, rule } in data.categories {
+            by_name.insert(name, Category { rule, supports, ..Category::default() });
         }
-        let mut by_id = HashMap::new();
-        for row in assets.assets {
-            let category = by_name.entry(row.category.clone()).or_default();
-            category.asset_ids.push(row.id.clone());
-            by_id.insert(row.id.clone(), Asset::from(row));
+        let mut assets = HashMap::new();
+        for asset in data.assets {
+            let category = by_name.entry(asset.category.clone()).or_default();
+            category.asset_ids.push(asset.id.clone());
+            assets.insert(asset.id.clone(), asset);
         }
         #[allow(clippy::iter_over_hash_type, reason = "each entry on its own")]
         for category in by_name.values_mut() {
             category.median_size_m =
-                median_size(category.asset_ids.iter().filter_map(|id| by_id.get(id)));
+                median_size(category.asset_ids.iter().filter_map(|id| assets.get(id)));
         }
-        let colours = materials.materials.into_iter().map(|(name, hex)| (name, rgb(&hex)));
-        Ok(Self {
-            assets: by_id,
-            categories: by_name,
-            materials: colours.collect(),
-            groups: groups.groups,
-        })
+        let colours = data.materials.into_iter().map(|(name, hex)| (name, rgb(&hex)));
+        Self { assets, categories: by_name, materials: colours.collect(), groups: data.groups }
     }
 
     /// Return the facts about an asset; `None` if the catalogue does not hold it.
@@ -186,41 +138,10 @@ impl Catalogue {
         self.rest_probability(child_category, parent_category) > 0.0
     }
 
-    /// Return the heights above the box's bottom at which objects stand on an asset, ascending;
-    /// empty if the asset is unknown or holds nothing.
-    pub fn surface_heights(&self, asset_id: &str) -> &[f64] {
-        self.get(asset_id).map_or(&[], |asset| &asset.surfaces_m)
-    }
-
     /// Return the mean albedo of a material, sRGB.
     pub fn material_colour(&self, name: &str) -> Option<[u8; 3]> {
         self.materials.get(name).copied()
     }
-}
-
-impl From<AssetRow> for Asset {
-    fn from(row: AssetRow) -> Self {
-        Self {
-            id: row.id,
-            category: row.category,
-            size_m: row.size_m,
-            surfaces_m: row.surfaces_m,
-            colours: row.colours.iter().map(|hex| rgb(hex)).collect(),
-            materials: row.materials,
-            made_of: row.made_of,
-            split: row.split,
-            is_pickupable: row.pickupable,
-            is_moveable: row.moveable,
-            is_receptacle: row.receptacle,
-            is_openable: row.openable,
-        }
-    }
-}
-
-/// Parse a colour `rrggbb`; black if it is malformed.
-fn rgb(hex: &str) -> [u8; 3] {
-    let [_, red, green, blue] = u32::from_str_radix(hex, 16).unwrap_or(0).to_be_bytes();
-    [red, green, blue]
 }
 
 /// Return the median of each edge length; zeros for no assets.

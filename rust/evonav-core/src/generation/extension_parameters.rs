@@ -46,11 +46,6 @@ pub struct Schedule {
 }
 
 impl Extensions {
-    /// Return whether all extensions are off.
-    pub fn is_off(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Check every value.
     ///
     /// # Errors

@@ -21,4 +21,4 @@ pub use mode::Mode;
 pub use overrides::{Overrides, StageOverrides};
 pub use parameters::Parameters;
 pub use placement::asset_groups::{AssetGroup, asset_groups};
-pub use task::{Generation, generate_task, generate_with_overrides};
+pub use task::{Generation, generate_task};

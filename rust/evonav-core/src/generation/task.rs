@@ -11,10 +11,13 @@ use crate::{
         Extensions, Overrides, Parameters,
         algorithm::{scene_evolution::sample_scene_evolution, stage_task::sample_stage_task},
         extensions::{schedule::Household, transition::Transition},
-        record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
+        record::{
+            EvolutionOutcome, EvolutionRecord, GeneratedStage, GeneratedTask, RejectReason,
+            Rejected,
+        },
         stage::{
-            changes::no_evolution, generation_state::State, generator::Generator,
-            relations::relations_of, stage_world::StageWorld,
+            generation_state::State, generator::Generator, relations::relations_of,
+            stage_world::StageWorld,
         },
     },
     geometry::{Vec2, distance_2d_m},
@@ -45,47 +48,19 @@ impl Generation {
 /// * `seed`, `label` - names of the random streams; `label` should differ between houses, so that
 ///   one seed does not give the same draws in all of them.
 /// * `parameters` - Θ.
-///
-/// # Returns
-/// The same result for the same arguments, on any number of threads.
-///
-/// # Errors
-/// [`Error::InvalidArgument`] for bad parameters; [`Error::House`] for unknown assets, unless
-/// `unknown` allows them; [`Error::Simulation`] for houses whose geometry makes no scene.
-pub fn generate_task(
-    house: &House,
-    catalogue: &Catalogue,
-    unknown: UnknownAssets,
-    seed: u64,
-    label: &str,
-    parameters: &Parameters,
-) -> Result<Generation, Error> {
-    generate_with_overrides(
-        house,
-        catalogue,
-        unknown,
-        seed,
-        label,
-        parameters,
-        &Overrides::default(),
-    )
-}
-
-/// Generate a task from a house with values that replace some of the draws.
-///
-/// # Arguments
-/// The arguments of [`generate_task`], and:
 /// * `overrides` - values that replace draws. Everything else is drawn from the same streams, so
 ///   that tasks that differ only in `overrides` or in `evolve_probability` share as much as
 ///   possible.
 ///
 /// # Returns
-/// The same as [`generate_task`]. A given goal that is not in the house, or has no reference pose
-/// there, gives [`RejectReason::NoValidGoal`].
+/// The same result for the same arguments, on any number of threads. A given goal that is not in
+/// the house, or has no reference pose there, gives [`RejectReason::NoValidGoal`].
 ///
 /// # Errors
-/// Those of [`generate_task`]; [`Error::InvalidArgument`] for more stages than a task may have.
-pub fn generate_with_overrides(
+/// [`Error::InvalidArgument`] for bad parameters or more stages than a task may have;
+/// [`Error::House`] for unknown assets, unless `unknown` allows them; [`Error::Simulation`] for
+/// houses whose geometry makes no scene.
+pub fn generate_task(
     house: &House,
     catalogue: &Catalogue,
     unknown: UnknownAssets,
@@ -121,7 +96,9 @@ pub fn generate_with_overrides(
     for stage in 1..=num_stages {
         let transition = Transition { generator: &generator, unknown, state: &state, stage };
         let (mut evolution, delta) = match &mut household {
-            _ if stage == 1 => (no_evolution(EvolutionOutcome::FirstStage), HouseDelta::default()),
+            _ if stage == 1 => {
+                (EvolutionRecord::unchanged(EvolutionOutcome::FirstStage), HouseDelta::default())
+            }
             Some(household) => transition.follow_schedule(&world, household)?,
             None => sample_scene_evolution(&generator, &world, &state, stage)?,
         };

@@ -121,6 +121,15 @@ pub fn distance_2d_m(a_m: Vec2, b_m: Vec2) -> f64 {
     (a_m[0] - b_m[0]).hypot(a_m[1] - b_m[1])
 }
 
+/// Return the smallest and largest corner of the box around points of the ground plane; infinite and
+/// reversed for no points.
+pub fn bounds_2d_m(points_m: impl IntoIterator<Item = Vec2>) -> [Vec2; 2] {
+    let empty = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    points_m.into_iter().fold(empty, |[low, high], point| {
+        [[0, 1].map(|i| low[i].min(point[i])), [0, 1].map(|i| high[i].max(point[i]))]
+    })
+}
+
 /// Return the signed area of a polygon in the x-z plane (positive when x turns towards z).
 pub fn polygon_area_m2(polygon_m: &[Vec2]) -> f64 {
     let next = polygon_m.iter().cycle().skip(1);

@@ -101,6 +101,34 @@ impl Components {
     }
 }
 
+/// Take 8-connected groups of cells out of a grid, in the order of their first cells; the cells of a
+/// group are in no particular order.
+pub fn take_groups(mut cells: BitGrid) -> Vec<Vec<[usize; 2]>> {
+    let mut groups = Vec::new();
+    let all: Vec<[usize; 2]> = cells.cells().collect();
+    for first in all {
+        if !cells.get(first[0], first[1]) {
+            continue;
+        }
+        cells.remove(first[0], first[1]);
+        let mut group = vec![first];
+        let mut next = 0;
+        while let Some(&[row, col]) = group.get(next) {
+            next += 1;
+            for r in row.saturating_sub(1)..=row + 1 {
+                for c in col.saturating_sub(1)..=col + 1 {
+                    if cells.get(r, c) {
+                        cells.remove(r, c);
+                        group.push([r, c]);
+                    }
+                }
+            }
+        }
+        groups.push(group);
+    }
+    groups
+}
+
 fn push_runs(words: &[u64], row: u32, runs: &mut Vec<Run>) {
     let mut open: Option<u32> = None;
     for (index, &word) in words.iter().enumerate() {
@@ -152,7 +180,8 @@ fn join_rows(
     }
 }
 
-fn find(parents: &mut [u32], mut index: u32) -> u32 {
+/// Return the representative of a member of disjoint sets, and shorten the path to it.
+pub(crate) fn find(parents: &mut [u32], mut index: u32) -> u32 {
     while parents[index as usize] != index {
         let grandparent = parents[parents[index as usize] as usize];
         parents[index as usize] = grandparent;

@@ -39,16 +39,10 @@ pub(super) fn view(name: &str, document: Value) -> Result<House, Error> {
     let start = metadata.maybe("agent")?.map(|agent| start(&agent)).transpose()?;
     let parameters = root.maybe("proceduralParameters")?;
     let ceiling = parameters.as_ref().map_or_else(|| Ok(Surface::default()), ceiling)?;
-    let rooms = root
-        .get("rooms")?
-        .list(MAX_ROOMS)?
-        .map(|node| room(&node))
-        .collect::<Result<Vec<_>, _>>()?;
-    let walls = root
-        .get("walls")?
-        .list(MAX_WALLS)?
-        .map(|node| wall(&node))
-        .collect::<Result<Vec<_>, _>>()?;
+    let rooms: Vec<Room> =
+        root.get("rooms")?.list(MAX_ROOMS)?.map(|node| room(&node)).collect::<Result<_, _>>()?;
+    let walls: Vec<Wall> =
+        root.get("walls")?.list(MAX_WALLS)?.map(|node| wall(&node)).collect::<Result<_, _>>()?;
     let doors = openings(&root.get("doors")?)?;
     let windows = openings(&root.get("windows")?)?;
     let mut objects = Vec::new();
@@ -242,11 +236,9 @@ fn object(node: &Node<'_>, parent: Option<usize>) -> Result<Object, Error> {
         room: None,
         object_type: node
             .maybe("objectType")?
-            .map(|name| name.name().map(str::to_owned))
+            .map(|it| it.name().map(str::to_owned))
             .transpose()?,
-        is_kinematic: node
-            .maybe("kinematic")?
-            .map_or(Ok(false), |kinematic| kinematic.boolean())?,
+        is_kinematic: node.maybe("kinematic")?.map_or(Ok(false), |it| it.boolean())?,
         openness: node.maybe("openness")?.map(|openness| openness.number(0.0, 1.0)).transpose()?,
         is_on: node.maybe("isOn")?.map(|is_on| is_on.boolean()).transpose()?,
     })

@@ -6,7 +6,7 @@ use crate::{
 };
 
 impl House {
-    /// Read and checks a house.
+    /// Read and check a house.
     ///
     /// # Arguments
     /// * `name` - name of the house in errors; usually the file and line.

@@ -58,9 +58,7 @@ impl OccupancyMap {
     /// not finite.
     pub fn new(spec: GridSpec) -> Result<Self, Error> {
         Error::require("cell_m", spec.cell_m, "finite and > 0", |v| v.is_finite() && v > 0.0)?;
-        for value in spec.corner_m {
-            Error::require("corner_m", value, "finite", f64::is_finite)?;
-        }
+        Error::require_finite("corner_m", &spec.corner_m)?;
         let num_cells = spec.rows as f64 * spec.cols as f64;
         Error::require("rows * cols", num_cells, "in 1..=2^26", |n| {
             n >= 1.0 && n <= crate::grid::MAX_CELLS as f64
@@ -270,8 +268,6 @@ fn check_disc(
     centre_name: &str,
     radius_name: &str,
 ) -> Result<(), Error> {
-    for value in centre_m {
-        Error::require(centre_name, value, "finite", f64::is_finite)?;
-    }
+    Error::require_finite(centre_name, &centre_m)?;
     Error::require(radius_name, radius_m, "finite and >= 0", |v| v.is_finite() && v >= 0.0)
 }

@@ -117,15 +117,11 @@ fn check(
     agent_m: [f64; 2],
     reach_m: f64,
 ) -> Result<BTreeMap<u64, [f64; 2]>, Error> {
-    for value in agent_m {
-        Error::require("agent_m", value, "finite", f64::is_finite)?;
-    }
+    Error::require_finite("agent_m", &agent_m)?;
     Error::require("reach_m", reach_m, "finite and >= 0", |m| m.is_finite() && m >= 0.0)?;
     let mut centres = BTreeMap::new();
     for object in objects {
-        for value in object.centre_m {
-            Error::require("objects.centre_m", value, "finite", f64::is_finite)?;
-        }
+        Error::require_finite("objects.centre_m", &object.centre_m)?;
         if centres.insert(object.id, object.centre_m).is_some() {
             return Err(Error::invalid("objects.id", object.id, "each id once"));
         }

@@ -75,9 +75,7 @@ pub fn noisy_depth(
     stream: &Stream,
 ) -> Result<Vec<f32>, Error> {
     noise.check()?;
-    if width_px == 0 || !depth_m.len().is_multiple_of(width_px) {
-        return Err(Error::invalid("depth_m", depth_m.len(), "whole rows of pixels"));
-    }
+    Error::require_rows("depth_m", depth_m.len(), width_px)?;
     if let Some(depth) = depth_m.iter().find(|depth| depth.is_nan()) {
         return Err(Error::invalid("depth_m", depth, "not NaN"));
     }

@@ -120,9 +120,7 @@ pub fn paint_blobs(
     width_px: usize,
     blobs: &[Blob],
 ) -> Result<(), Error> {
-    if width_px == 0 || !masks.len().is_multiple_of(width_px) {
-        return Err(Error::invalid("masks", masks.len(), "whole rows of pixels"));
-    }
+    Error::require_rows("masks", masks.len(), width_px)?;
     Error::require("surfaces", surfaces.len(), "one value a pixel of the masks", |n| {
         n == masks.len()
     })?;

@@ -10,9 +10,7 @@ pub(super) struct MaskImage {
 
 impl MaskImage {
     pub fn new(masks: &[i32], width_px: usize, num_masks: usize) -> Result<Self, Error> {
-        if width_px == 0 || !masks.len().is_multiple_of(width_px) {
-            return Err(Error::invalid("masks", masks.len(), "whole rows of pixels"));
-        }
+        Error::require_rows("masks", masks.len(), width_px)?;
         for (mask, _) in runs(masks) {
             Error::require("masks", mask, "negative or the index of a detection", |mask| {
                 usize::try_from(mask).is_ok_and(|mask| mask < num_masks) || mask < 0

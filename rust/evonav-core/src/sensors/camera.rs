@@ -71,9 +71,7 @@ impl Camera {
         Error::require("vertical_fov_rad", self.vertical_fov_rad, "0.01 to 3.1", |v| {
             (0.01..=3.1).contains(&v)
         })?;
-        for value in self.position_m {
-            Error::require("position_m", value, "finite", f64::is_finite)?;
-        }
+        Error::require_finite("position_m", &self.position_m)?;
         Error::require("yaw_rad", self.yaw_rad, "finite", f64::is_finite)?;
         Error::require("horizon_rad", self.horizon_rad, "finite", f64::is_finite)
     }

@@ -41,9 +41,7 @@ pub fn number_instances(
     Error::require("max_box_fraction", filter.max_box_fraction, "in 0..=1", |v| {
         (0.0..=1.0).contains(&v)
     })?;
-    if width_px == 0 || !image.len().is_multiple_of(width_px) {
-        return Err(Error::invalid("instances", image.len(), "whole rows of pixels"));
-    }
+    Error::require_rows("instances", image.len(), width_px)?;
     let mut extents = vec![Extent::EMPTY; is_detectable.len()];
     let mut order = Vec::new();
     // Value and length of every run.
@@ -125,9 +123,7 @@ pub fn mask_extents(
     width_px: usize,
     num_masks: usize,
 ) -> Result<Vec<Extent>, Error> {
-    if width_px == 0 || !masks.len().is_multiple_of(width_px) {
-        return Err(Error::invalid("masks", masks.len(), "whole rows of pixels"));
-    }
+    Error::require_rows("masks", masks.len(), width_px)?;
     let mut extents = vec![Extent::EMPTY; num_masks];
     for (row, pixels) in masks.chunks_exact(width_px).enumerate() {
         for (mask, cols) in runs(pixels) {

@@ -58,9 +58,7 @@ pub fn visible_bodies(
     max_distance_m: f64,
 ) -> Result<Vec<usize>, Error> {
     view.check()?;
-    for value in agent_m {
-        Error::require("agent_m", value, "finite", f64::is_finite)?;
-    }
+    Error::require_finite("agent_m", &agent_m)?;
     Error::require("max_distance_m", max_distance_m, "finite", f64::is_finite)?;
     let eye_m = view.camera.position_m;
     let is_first_hit = |body: usize, point_m: Vec3| {

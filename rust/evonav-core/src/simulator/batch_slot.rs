@@ -80,7 +80,7 @@ impl Slot {
         };
         let reachable_m = self.reachable_m.insert(reachable_m);
         let gap_m = |place_m: &Vec2| distance_2d_m(*place_m, target_m);
-        let nearest = reachable_m.iter().copied().min_by(|a, b| gap_m(a).total_cmp(&gap_m(b)));
+        let nearest = navigation.nearest_reachable(target_m, reachable_m);
         let nearest_gap_m = nearest.as_ref().map_or(f64::INFINITY, gap_m);
         if nearest_gap_m > FULL_REACH_M {
             let mut free_m = self.free_centres_m()?;

@@ -34,9 +34,7 @@ impl BevMap {
     /// than 256 categories.
     pub fn new(centre_m: Vec2, num_categories: usize, config: BevConfig) -> Result<Self, Error> {
         config.check()?;
-        for value in centre_m {
-            Error::require("centre_m", value, "finite", f64::is_finite)?;
-        }
+        Error::require_finite("centre_m", &centre_m)?;
         Error::require("num_categories", num_categories, "at most 256", |n| n <= 256)?;
         let side = (config.size_m / config.cell_m).round().max(1.0) as usize;
         let half_m = 0.5 * side as f64 * config.cell_m;
@@ -145,9 +143,7 @@ impl BevMap {
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite.
     pub fn visit(&mut self, from_m: Vec2, to_m: Vec2) -> Result<(), Error> {
-        for value in [from_m, to_m].concat() {
-            Error::require("visit", value, "finite", f64::is_finite)?;
-        }
+        Error::require_finite("visit", &[from_m, to_m].concat())?;
         let far_m = (to_m[0] - from_m[0]).hypot(to_m[1] - from_m[1]);
         let num_steps = (2.0 * far_m / self.spec.cell_m).ceil().clamp(1.0, 1e5);
         for step in 0..=num_steps as usize {

@@ -1,7 +1,7 @@
 //! Choose where to explore: frontier cells, scored by their distance.
 
 use crate::{
-    grid::{bits::BitGrid, dilate::dilate_disk},
+    grid::{bits::BitGrid, components::take_groups, dilate::dilate_disk},
     unigoal::{
         bev_map::BevMap,
         fast_marching::{Until, march},
@@ -66,31 +66,10 @@ pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
 }
 
 /// Return the 8-connected groups of at least `min_cells` cells.
-pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
+pub fn keep_large(cells: BitGrid, min_cells: usize) -> BitGrid {
     let mut large = BitGrid::new(cells.rows(), cells.cols());
-    let all: Vec<[usize; 2]> = cells.cells().collect();
-    for first in all {
-        if !cells.get(first[0], first[1]) {
-            continue;
-        }
-        cells.remove(first[0], first[1]);
-        let mut group = vec![first];
-        let mut next = 0;
-        while let Some(&[row, col]) = group.get(next) {
-            next += 1;
-            for r in row.saturating_sub(1)..=row + 1 {
-                for c in col.saturating_sub(1)..=col + 1 {
-                    if cells.get(r, c) {
-                        cells.remove(r, c);
-                        group.push([r, c]);
-                    }
-                }
-            }
-        }
-        if group.len() >= min_cells {
-            group.iter().for_each(|cell| large.insert(cell[0], cell[1]));
-        }
-    }
+    let groups = take_groups(cells).into_iter().filter(|group| group.len() >= min_cells);
+    groups.flatten().for_each(|[row, col]| large.insert(row, col));
     large
 }
 

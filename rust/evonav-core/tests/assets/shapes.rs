@@ -1,20 +1,13 @@
 //! Shapes of all catalogue assets: exact boxes, sane parts, free room where there should be some.
 
-use evonav_core::{
-    assets::{
-        Asset, Catalogue,
-        part::{Part, Primitive, aabb_of},
-        shapes::shape_of,
-    },
-    geometry::Vec3,
+use evonav_core::assets::{
+    Asset, Catalogue,
+    part::{Part, Primitive, aabb_of},
+    shapes::shape_of,
 };
 use proptest::prelude::*;
 
-use crate::solids::holds;
-
-fn asset(id: &str) -> Asset {
-    Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
-}
+use crate::solids::{asset, is_filled};
 
 /// Triangles that tessellation makes of a part (ellipsoids: 12 meridians, 6 bands).
 fn num_triangles(part: &Part) -> usize {
@@ -23,10 +16,6 @@ fn num_triangles(part: &Part) -> usize {
         Primitive::Frustum { sides, .. } => 4 * usize::from(sides) - 4,
         Primitive::Ellipsoid { .. } => 120,
     }
-}
-
-fn is_filled(parts: &[Part], point_m: Vec3) -> bool {
-    parts.iter().any(|part| holds(part, point_m))
 }
 
 fn is_sane(parts: &[Part]) -> bool {

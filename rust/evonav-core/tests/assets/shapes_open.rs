@@ -8,23 +8,14 @@ use evonav_core::{
         part::{Part, aabb_of},
         shapes::{drawn_openness, shape_in, shape_of, shows_light},
     },
-    geometry::Vec3,
     house::Condition,
 };
 use proptest::prelude::*;
 
-use crate::solids::holds;
+use crate::solids::{asset, is_filled};
 
 fn at(asset: &Asset, openness: f64) -> Vec<Part> {
     shape_in(asset, Condition { openness: Some(openness), is_on: None })
-}
-
-fn asset(id: &str) -> Asset {
-    Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
-}
-
-fn is_filled(parts: &[Part], point_m: Vec3) -> bool {
-    parts.iter().any(|part| holds(part, point_m))
 }
 
 #[test]

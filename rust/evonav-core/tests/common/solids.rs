@@ -1,7 +1,10 @@
 //! Parts by their definition, for tests that look where something is.
 
 use evonav_core::{
-    assets::part::{Part, Primitive},
+    assets::{
+        Asset, Catalogue,
+        part::{Part, Primitive},
+    },
     geometry::{Vec3, sub},
 };
 
@@ -21,4 +24,14 @@ pub fn holds(part: &Part, point_m: Vec3) -> bool {
                 && (own[0] / half(0)).powi(2) + (own[2] / half(1)).powi(2) <= 1.0
         }
     }
+}
+
+/// Whether a point lies in any of some parts.
+pub fn is_filled(parts: &[Part], point_m: Vec3) -> bool {
+    parts.iter().any(|part| holds(part, point_m))
+}
+
+/// An asset of the catalogue.
+pub fn asset(id: &str) -> Asset {
+    Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
 }

@@ -4,9 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets, part::Part},
+    assets::{Catalogue, part::Part},
     generation::{
-        Extensions, Generation, Occurrence, Parameters, Schedule, generate_task,
+        Extensions, Occurrence, Parameters, Schedule,
         record::{EvolutionOutcome, GeneratedTask},
     },
     geometry::{Aabb, Vec2, Vec3},
@@ -18,26 +18,16 @@ use evonav_core::{
 };
 use serde_json::Value;
 
-use crate::solids::holds;
+use crate::{
+    solids::holds,
+    tasks::{self, UNKNOWN, delta_of, houses, stage_houses},
+};
 
-const UNKNOWN: UnknownAssets = UnknownAssets::Error;
 const OFTEN: Option<Occurrence> = Some(Occurrence { probability: 1.0, max_count: 6 });
-
-fn houses() -> Vec<House> {
-    let texts = [
-        include_str!("../data/house_39_objects.json"),
-        include_str!("../data/house_100_objects.json"),
-    ];
-    texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
-}
 
 fn generate(house: &House, seed: u64, extensions: Extensions) -> GeneratedTask {
     let parameters = Parameters { num_stages: vec![5], extensions, ..Parameters::default() };
-    let made = generate_task(house, Catalogue::bundled(), UNKNOWN, seed, "test", &parameters);
-    match made.unwrap() {
-        Generation::Task(task) => task,
-        Generation::Rejected(rejected) => panic!("{rejected:?}"),
-    }
+    tasks::generate(house, seed, &parameters)
 }
 
 fn all_on() -> Extensions {
@@ -54,10 +44,6 @@ fn all_on() -> Extensions {
 fn people() -> Extensions {
     let schedule = Schedule { num_persons: 3, minutes_between_stages: 180, tidiness: 0.7 };
     Extensions { schedule: Some(schedule), ..Extensions::default() }
-}
-
-fn stage_houses(task: &GeneratedTask) -> Vec<House> {
-    task.houses.iter().map(|json| House::from_json("stage", json).unwrap()).collect()
 }
 
 /// Every object of a document by id, without what stands on it, and with what it stands on.
@@ -148,7 +134,7 @@ fn check(task: &GeneratedTask) -> [usize; 4] {
         let (evolution, before, after) = (&stage.evolution, &houses[k - 1], &houses[k]);
         // The record says it all.
         let again: Value =
-            serde_json::from_str(&before.apply(&evolution.delta()).unwrap().to_json()).unwrap();
+            serde_json::from_str(&before.apply(&delta_of(evolution)).unwrap().to_json()).unwrap();
         let made: Value = serde_json::from_str(&task.houses[k]).unwrap();
         assert!(again == made, "stage {} does not follow from its record", k + 1);
         let (then, now) = (entries(before), entries(after));
@@ -374,5 +360,5 @@ fn bad_values_are_named() {
         let error = Parameters::from_json(&theta.to_string()).unwrap_err().to_string();
         assert!(error.contains(name), "{error}");
     }
-    assert!(Extensions::default().is_off() && !all_on().is_off());
+    assert!(all_on() != Extensions::default());
 }

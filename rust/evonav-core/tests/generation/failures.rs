@@ -1,10 +1,9 @@
 //! Rooms that cannot take their modification: what is recorded, and that trying again helps.
 
-use crate::evolved::always;
+use crate::tasks::{always, generate};
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets},
     generation::{
-        Generation, Mode, Parameters, generate_task,
+        Mode, Parameters,
         record::{EvolutionOutcome, EvolutionRecord, GeneratedTask, ModificationFailure},
     },
     house::House,
@@ -12,14 +11,6 @@ use evonav_core::{
 use serde_json::Value;
 
 const HOUSE: &str = include_str!("../data/house_100_objects.json");
-
-fn task_of(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
-    let (catalogue, unknown) = (Catalogue::bundled(), UnknownAssets::Error);
-    match generate_task(house, catalogue, unknown, seed, "test", parameters).unwrap() {
-        Generation::Task(task) => task,
-        Generation::Rejected(rejected) => panic!("{rejected:?}"),
-    }
-}
 
 /// Failures of a task's transitions; the house must be the same where there is one.
 fn failures(task: &GeneratedTask) -> Vec<Option<ModificationFailure>> {
@@ -40,7 +31,7 @@ fn no_place_is_free_where_every_place_is_too_near() {
     let house = House::from_json("house", HOUSE).unwrap();
     for mode in [Mode::SalientObject, Mode::RetainGroup] {
         let parameters = Parameters { relocated_min_m: 1e6, ..always(mode, 3) };
-        let found = failures(&task_of(&house, 0, &parameters));
+        let found = failures(&generate(&house, 0, &parameters));
         assert_eq!(found, [Some(ModificationFailure::NoFreePlace); 2], "{mode:?}");
     }
 }
@@ -55,7 +46,7 @@ fn nothing_moves_where_everything_hangs_on_walls() {
     let house = House::from_json("hung", &document.to_string()).unwrap();
     for mode in Mode::ALL {
         let parameters = Parameters { goals_on_walls: true, ..always(mode, 3) };
-        let found = failures(&task_of(&house, 0, &parameters));
+        let found = failures(&generate(&house, 0, &parameters));
         assert_eq!(found, [Some(ModificationFailure::NothingMovable); 2], "{mode:?}");
     }
 }
@@ -72,7 +63,7 @@ fn a_room_is_tried_again_before_it_is_given_up() {
             num_stages: vec![2],
             ..always(Mode::RetainGroup, 3)
         };
-        let tasks = (0..40).map(|seed| task_of(&house, seed, &parameters));
+        let tasks = (0..40).map(|seed| generate(&house, seed, &parameters));
         let drawn: Vec<(Option<String>, bool)> = tasks
             .map(|task| (task.stages[1].evolution.room_id.clone(), failures(&task)[0].is_some()))
             .collect();

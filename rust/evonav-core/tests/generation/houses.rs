@@ -3,24 +3,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::evolved::always;
 use crate::points::{interpenetrate, object, points_in};
 use crate::recorded::{house_lines, house_of};
+use crate::tasks::{UNKNOWN, always, navigation_in};
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets},
+    assets::Catalogue,
     generation::{
-        Generation, Mode, generate_task,
+        Generation, Mode, Overrides, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask},
     },
     geometry::{Vec2, Vec3, polygon_contains},
     house::House,
-    world::{
-        navigation::{AgentBody, Navigation, NavigationConfig},
-        scene::Scene,
-    },
+    world::scene::Scene,
 };
 
-const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 const FILES: [(&str, usize); 4] = [
     ("ram81-procthor-100k-history/attr-onav-1k-val-100.jsonl.gz", 100),
     ("ram81-procthor-100k-history/uniform-hard-val-75.jsonl.gz", 20),
@@ -33,8 +29,9 @@ const NUM_BUNDLED: usize = 60;
 fn task_of(house: &House, mode: Mode) -> Option<GeneratedTask> {
     // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test generation houses`.
     let seed = std::env::var("EVONAV_SEED").map_or(3, |seed| seed.parse().unwrap());
-    let made =
-        generate_task(house, Catalogue::bundled(), UNKNOWN, seed, &house.name, &always(mode, 3));
+    let (catalogue, parameters) = (Catalogue::bundled(), always(mode, 3));
+    let nothing = Overrides::default();
+    let made = generate_task(house, catalogue, UNKNOWN, seed, &house.name, &parameters, &nothing);
     match made.unwrap() {
         Generation::Task(task) => Some(task),
         Generation::Rejected(_) => None,
@@ -180,9 +177,7 @@ fn reached(
     house: &House,
     start: Vec3,
 ) -> (BTreeSet<usize>, BTreeSet<String>, BTreeSet<[usize; 3]>) {
-    let scene = Scene::build(house, Catalogue::bundled(), UNKNOWN).unwrap();
-    let navigation =
-        Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default()).unwrap();
+    let navigation = navigation_in(house);
     let points = navigation.reachable_positions([start[0], start[2]], 0.25).unwrap();
     let rooms: Vec<Option<usize>> = points.iter().map(|&p| house.room_of(p)).collect();
     let near = |object: &&evonav_core::house::Object| {
@@ -232,9 +227,7 @@ fn reached(
 
 /// Whether a path leads from a place to the house's own start, where simulators begin.
 fn reaches_start(house: &House, from: Vec3) -> bool {
-    let scene = Scene::build(house, Catalogue::bundled(), UNKNOWN).unwrap();
-    let navigation =
-        Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default()).unwrap();
+    let navigation = navigation_in(house);
     let [x, _, z] = house.start.unwrap().position_m;
     navigation.snap([x, z]).is_some_and(|start| navigation.is_connected(start, [from[0], from[2]]))
 }

@@ -3,9 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
 #[allow(dead_code, reason = "other test crates use the rest")]
-#[path = "../common/evolved.rs"]
-mod evolved;
-#[allow(dead_code, reason = "other test crates use the rest")]
 #[path = "../common/points.rs"]
 mod points;
 #[allow(dead_code, reason = "other test crates use the rest")]
@@ -25,3 +22,4 @@ mod sampling;
 mod schema;
 mod start;
 mod task;
+mod tasks;

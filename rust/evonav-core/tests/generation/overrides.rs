@@ -2,44 +2,23 @@
 //! otherwise changes that alone.
 
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets},
+    assets::Catalogue,
     generation::{
-        Generation, Overrides, Parameters, StageOverrides, generate_task, generate_with_overrides,
+        Generation, Overrides, Parameters, StageOverrides, generate_task,
         record::{EvolutionOutcome, GeneratedTask, RejectReason},
     },
     house::House,
 };
 use proptest::prelude::*;
 
-fn houses() -> Vec<House> {
-    let texts = [
-        include_str!("../data/house_39_objects.json"),
-        include_str!("../data/house_100_objects.json"),
-    ];
-    texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
-}
+use crate::tasks::{UNKNOWN, generate, houses, task_in};
 
 fn small(evolve_probability: f64) -> Parameters {
     Parameters { evolve_probability, reference_image_px: 64, ..Parameters::default() }
 }
 
 fn made(house: &House, seed: u64, parameters: &Parameters, given: &Overrides) -> Generation {
-    let unknown = UnknownAssets::Error;
-    generate_with_overrides(house, Catalogue::bundled(), unknown, seed, "test", parameters, given)
-        .unwrap()
-}
-
-fn task(generation: Generation) -> GeneratedTask {
-    match generation {
-        Generation::Task(task) => task,
-        Generation::Rejected(rejected) => panic!("{rejected:?}"),
-    }
-}
-
-fn drawn(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
-    let catalogue = Catalogue::bundled();
-    let made = generate_task(house, catalogue, UnknownAssets::Error, seed, "test", parameters);
-    task(made.unwrap())
+    generate_task(house, Catalogue::bundled(), UNKNOWN, seed, "test", parameters, given).unwrap()
 }
 
 /// The task less the goals that were drawn and refused: a given one is not drawn.
@@ -61,13 +40,13 @@ proptest! {
     fn what_is_given_as_it_was_drawn_changes_nothing(which in 0..2_usize, seed in 0..1000_u64) {
         let house = &houses()[which];
         let parameters = small(0.5);
-        let free = drawn(house, seed, &parameters);
+        let free = generate(house, seed, &parameters);
         let mut stages = goals_of(&free);
         for (given, stage) in stages.iter_mut().zip(&free.stages).skip(1) {
             given.is_evolved = Some(stage.evolution.outcome != EvolutionOutcome::NotTriggered);
         }
         // The probability no longer matters either: every trigger is given.
-        let again = task(made(house, seed, &small(0.0), &Overrides { stages }));
+        let again = task_in(made(house, seed, &small(0.0), &Overrides { stages }));
         prop_assert_eq!(without_refusals(&free), without_refusals(&again));
     }
 
@@ -76,7 +55,7 @@ proptest! {
         which in 0..2_usize, seed in 0..1000_u64, low in 0.0..1.0_f64, high in 0.0..1.0_f64,
     ) {
         let house = &houses()[which];
-        let stages = goals_of(&drawn(house, seed, &small(0.0)));
+        let stages = goals_of(&generate(house, seed, &small(0.0)));
         let triggers = |p: f64| -> Option<Vec<bool>> {
             let given = Overrides { stages: stages.clone() };
             let Generation::Task(task) = made(house, seed, &small(p), &given) else { return None };
@@ -101,7 +80,7 @@ proptest! {
 fn a_change_is_made_where_it_is_given_and_nowhere_else() {
     let mut num_evolved = 0;
     for (house, seed) in houses().iter().flat_map(|house| (0..4).map(move |seed| (house, seed))) {
-        let fixed = drawn(house, seed, &small(0.0));
+        let fixed = generate(house, seed, &small(0.0));
         let mut stages = goals_of(&fixed);
         stages.truncate(3);
         let first_goal = stages[0].goal_id.clone();

@@ -1,18 +1,13 @@
 //! Where a task starts when the house's own start is not free.
 
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets},
-    generation::{Generation, Parameters, generate_task, record::RejectReason},
+    generation::{Generation, Parameters, record::RejectReason},
     geometry::Vec2,
     house::House,
-    world::{
-        navigation::{AgentBody, Navigation, NavigationConfig},
-        scene::Scene,
-    },
 };
 use serde_json::{Value, json};
 
-const UNKNOWN: UnknownAssets = UnknownAssets::Error;
+use crate::tasks::{navigation_in, try_generate};
 
 fn room(number: usize, kind: &str, [x0, z0, x1, z1]: [f64; 4]) -> Value {
     let corners = [[x0, z0], [x0, z1], [x1, z1], [x1, z0]];
@@ -65,8 +60,7 @@ fn house(start_m: Vec2) -> House {
 }
 
 fn start_of(house: &House) -> Result<[f64; 3], RejectReason> {
-    let parameters = Parameters::default();
-    match generate_task(house, Catalogue::bundled(), UNKNOWN, 0, "test", &parameters) {
+    match try_generate(house, 0, &Parameters::default()) {
         Ok(Generation::Task(task)) => Ok(task.stages[0].start_pose.position_m),
         Ok(Generation::Rejected(rejected)) => Err(rejected.reason),
         Err(error) => panic!("{error}"),
@@ -78,9 +72,7 @@ fn a_start_in_a_wall_goes_where_the_house_is() {
     // Nearer to the closet than to the bedroom.
     let start_m = [8.06, 2.0];
     let house = house(start_m);
-    let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).expect("known assets");
-    let navigation = Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default())
-        .expect("a floor");
+    let navigation = navigation_in(&house);
     let nearest_m = navigation.snap(start_m).expect("the closet");
     assert!(nearest_m[0] > 8.0, "{nearest_m:?}");
     let [x, _, z] = start_of(&house).expect("a task");

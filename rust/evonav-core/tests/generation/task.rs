@@ -3,13 +3,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::evolved::always;
 use crate::points::{contains, interpenetrate, object, parts_of, points_in};
+use crate::tasks::{
+    UNKNOWN, always, delta_of, generate, houses, navigation_in, stage_houses, try_generate,
+};
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets, part::Part, placement_rule::Place},
+    assets::{Catalogue, part::Part, placement_rule::Place},
     generation::{
-        AssetGroup, Generation, Mode, Parameters, asset_groups, generate_task,
-        record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},
+        AssetGroup, Generation, Mode, Parameters, asset_groups,
+        record::{EvolutionOutcome, GeneratedStage, RejectReason},
     },
     geometry::{Vec2, Vec3, polygon_contains, sub},
     house::House,
@@ -17,34 +19,8 @@ use evonav_core::{
         camera::Camera,
         raster::{FrameBuffer, Want, render},
     },
-    world::{
-        mesh::SceneMesh,
-        navigation::{AgentBody, Navigation, NavigationConfig},
-        scene::Scene,
-    },
+    world::{mesh::SceneMesh, scene::Scene},
 };
-
-const UNKNOWN: UnknownAssets = UnknownAssets::Error;
-
-fn houses() -> Vec<House> {
-    let texts = [
-        include_str!("../data/house_39_objects.json"),
-        include_str!("../data/house_100_objects.json"),
-    ];
-    texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
-}
-
-fn generate(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
-    let made = generate_task(house, Catalogue::bundled(), UNKNOWN, seed, "test", parameters);
-    match made.unwrap() {
-        Generation::Task(task) => task,
-        Generation::Rejected(rejected) => panic!("{rejected:?}"),
-    }
-}
-
-fn stage_houses(task: &GeneratedTask) -> Vec<House> {
-    task.houses.iter().map(|json| House::from_json("stage", json).unwrap()).collect()
-}
 
 fn relocated(stage: &GeneratedStage) -> BTreeSet<&str> {
     let changes = stage.evolution.changes.iter().filter(|change| change.is_relocated);
@@ -275,10 +251,7 @@ fn rooms_that_could_be_reached_still_can() {
 }
 
 fn rooms_from(house: &House, start: Vec3) -> BTreeSet<usize> {
-    let scene = Scene::build(house, Catalogue::bundled(), UNKNOWN).unwrap();
-    let navigation =
-        Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default()).unwrap();
-    let reached = navigation.reachable_positions([start[0], start[2]], 0.25).unwrap();
+    let reached = navigation_in(house).reachable_positions([start[0], start[2]], 0.25).unwrap();
     reached.iter().filter_map(|&p| house.room_of(p)).collect()
 }
 
@@ -344,7 +317,7 @@ fn houses_follow_from_deltas_and_the_same_seed_gives_the_same_task() {
         assert_ne!(task, generate(&house, 10, &parameters));
         let mut expected = house.clone();
         for (stage, json) in task.stages.iter().zip(&task.houses) {
-            expected = expected.apply(&stage.evolution.delta()).unwrap();
+            expected = expected.apply(&delta_of(&stage.evolution)).unwrap();
             assert_eq!(&expected.to_json(), json);
         }
     }
@@ -374,9 +347,9 @@ fn history_records_say_what_happened() {
             assert_eq!(stage.state.goal_room_ids, goals[last_two(goals.len())..]);
             for weight in &evolution.room_weights {
                 let visited = stage.state.visited_room_ids.contains(&weight.room_id);
-                assert_eq!(weight.is_visited, visited);
+                assert_eq!(weight.history.is_visited, visited);
                 let is_transition = Some(&weight.room_id) == goals.last();
-                assert_eq!(weight.is_transition_room, is_transition);
+                assert_eq!(weight.history.is_transition_room, is_transition);
                 assert!(!is_transition || weight.weight == 0.0);
             }
             goals.push(stage.target.room_id.clone());
@@ -387,15 +360,8 @@ fn history_records_say_what_happened() {
 #[test]
 fn houses_that_allow_no_task_are_refused_with_a_reason() {
     let house = &houses()[0];
-    let refused = |house: &House, parameters: &Parameters| match generate_task(
-        house,
-        Catalogue::bundled(),
-        UNKNOWN,
-        0,
-        "test",
-        parameters,
-    )
-    .unwrap()
+    let refused = |house: &House, parameters: &Parameters| match try_generate(house, 0, parameters)
+        .unwrap()
     {
         Generation::Rejected(rejected) => rejected.reason,
         Generation::Task(_) => panic!("made a task"),
@@ -432,8 +398,7 @@ fn bad_parameters_are_named() {
         },
     ];
     for parameters in bad {
-        let house = &houses()[0];
-        let made = generate_task(house, Catalogue::bundled(), UNKNOWN, 0, "", &parameters);
+        let made = try_generate(&houses()[0], 0, &parameters);
         assert!(matches!(made, Err(evonav_core::Error::InvalidArgument { .. })), "{parameters:?}");
     }
     assert!(Parameters::from_json("{}").is_err());

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use evonav_core::{
+    Error,
     grid::{GridSpec, bits::BitGrid, components::Components},
     memory::{
-        frontiers::{FrontierConfig, Frontiers, extract},
+        frontiers::{Frontier, FrontierConfig, Frontiers},
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },
     sensors::{
@@ -16,6 +17,15 @@ use evonav_core::{
 use proptest::{collection::vec, prelude::*, sample::select};
 
 type Cell = [i32; 2];
+
+/// The frontiers of a map without a history.
+fn extract(
+    map: &OccupancyMap,
+    agent_m: [f64; 2],
+    config: &FrontierConfig,
+) -> Result<Vec<Frontier>, Error> {
+    Frontiers::default().update(map, agent_m, config).map(<[_]>::to_vec)
+}
 
 fn spec(rows: usize, cols: usize) -> GridSpec {
     GridSpec { rows, cols, cell_m: 0.1, corner_m: [-1.0, 0.5] }

@@ -6,6 +6,10 @@ use crate::recorded::{bundled_lines, data_set, house_of, lines, navigation_of, s
 use evonav_core::{geometry::Vec2, world::navigation::AgentBody};
 use serde_json::Value;
 
+/// AI2-THOR's LoCoBot and Stretch (agent modes "locobot" and "stretch").
+const LOCOBOT: AgentBody = AgentBody { radius_m: 0.175, height_m: 0.9 };
+const STRETCH: AgentBody = AgentBody { radius_m: 0.185_462_8, height_m: 1.435_714 };
+
 /// `[x, z]` of a JSON position, an object or an array.
 fn xz(position: &Value) -> Vec2 {
     let at = |key: &str, index: usize| {
@@ -74,7 +78,7 @@ fn locobot_start_positions_are_free() {
         (house, xz(&episode["agentPose"]["position"]))
     }));
     let shares = positions.iter().map(|(&house, positions)| {
-        share_free(&format!("1k-val-{house}"), &houses[house], AgentBody::LOCOBOT, positions)
+        share_free(&format!("1k-val-{house}"), &houses[house], LOCOBOT, positions)
     });
     assert_share("free LoCoBot starts", total(shares), 0.995);
 }
@@ -95,7 +99,7 @@ fn stretch_start_positions_are_free() {
         (house < houses.len()).then(|| (house, xz(&episode["agent_starting_position"])))
     }));
     let shares = positions.iter().map(|(&house, positions)| {
-        share_free(&format!("tiny-val-{house}"), &houses[house], AgentBody::STRETCH, positions)
+        share_free(&format!("tiny-val-{house}"), &houses[house], STRETCH, positions)
     });
     assert_share("free Stretch starts", total(shares), 0.995);
 }

@@ -2,18 +2,21 @@
 
 use evonav_core::{
     Error,
-    geometry::Pose,
     memory::objects::{self, DetectedView, Entry, ObjectMapConfig, sight_lines::SightConfig},
     sensors::{camera::Camera, unproject::MaskedDepth},
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays, error};
+use crate::{
+    arrays,
+    camera::{Intrinsics, PyPose},
+    error,
+};
 
 /// An object entry at the time of the call that returned it.
 #[pyclass(frozen, get_all, module = "evonav._core")]
-struct ObjectEntry {
+pub struct ObjectEntry {
     id: u64,
     label: String,
     label_counts: Vec<(String, u32)>,
@@ -49,122 +52,66 @@ impl ObjectEntry {
 
 /// Detections merged into lasting entries.
 #[pyclass(module = "evonav._core")]
-struct ObjectMap(objects::ObjectMap);
+pub struct ObjectMap(objects::ObjectMap);
 
 type Update = (Vec<Option<u64>>, Vec<u64>, Vec<(u64, u64)>);
 
 #[pymethods]
 impl ObjectMap {
     #[new]
-    #[pyo3(signature = (
-        *, min_points, max_points, min_box_m3, voxel_m, cluster_radius_m, cluster_min_points,
-        max_distance_m, overlap_radius_m, visual_weight, match_threshold, views_per_cleanup,
-        min_detections, merge_overlap, merge_similarity,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
-    fn new(
-        min_points: usize,
-        max_points: usize,
-        min_box_m3: f64,
-        voxel_m: f64,
-        cluster_radius_m: f64,
-        cluster_min_points: usize,
-        max_distance_m: f64,
-        overlap_radius_m: f64,
-        visual_weight: f64,
-        match_threshold: f64,
-        views_per_cleanup: u32,
-        min_detections: u32,
-        merge_overlap: f64,
-        merge_similarity: f64,
-    ) -> PyResult<Self> {
-        let config = ObjectMapConfig {
-            min_points,
-            max_points,
-            min_box_m3,
-            voxel_m,
-            cluster_radius_m,
-            cluster_min_points,
-            max_distance_m,
-            overlap_radius_m,
-            visual_weight,
-            match_threshold,
-            views_per_cleanup,
-            min_detections,
-            merge_overlap,
-            merge_similarity,
-        };
+    fn new(config: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let config = arrays::from_attributes!(
+            config,
+            ObjectMapConfig {
+                min_points,
+                max_points,
+                min_box_m3,
+                voxel_m,
+                cluster_radius_m,
+                cluster_min_points,
+                max_distance_m,
+                overlap_radius_m,
+                visual_weight,
+                match_threshold,
+                views_per_cleanup,
+                min_detections,
+                merge_overlap,
+                merge_similarity,
+            }
+        );
         objects::ObjectMap::new(config).map(Self).map_err(error::to_py)
     }
 
-    #[pyo3(signature = (
-        depth_m, masks, labels, confidences, features,
-        *, position_m, yaw_rad, horizon_rad, vertical_fov_rad,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
-    fn update(
-        &mut self,
-        py: Python<'_>,
-        depth_m: PyReadonlyArray2<'_, f32>,
-        masks: PyReadonlyArray2<'_, i32>,
-        labels: Vec<String>,
-        confidences: PyReadonlyArray1<'_, f32>,
-        features: Option<PyReadonlyArray2<'_, f32>>,
-        position_m: [f64; 3],
-        yaw_rad: f64,
-        horizon_rad: f64,
-        vertical_fov_rad: f64,
-    ) -> PyResult<Update> {
-        let pose = Pose { position_m, yaw_rad, horizon_rad };
-        let arrays = ViewArrays { depth_m, masks, labels, confidences, features };
-        let (view, map) = (arrays.view(pose, vertical_fov_rad)?, &mut self.0);
-        let update = py.detach(|| map.update(&view.borrow())).map_err(error::to_py)?;
+    fn update(&mut self, py: Python<'_>, view: View<'_>) -> PyResult<Update> {
+        let (view, map) = (view.borrow()?, &mut self.0);
+        let update = py.detach(|| map.update(&view.detected())).map_err(error::to_py)?;
         let merged = update.merged.into_iter().map(Into::into).collect();
         Ok((update.entry_ids, update.removed, merged))
     }
 
-    #[pyo3(signature = (
-        entry_id, depth_m, masks, labels, confidences, features,
-        *, position_m, yaw_rad, horizon_rad, vertical_fov_rad,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
     fn compare<'py>(
         &self,
         py: Python<'py>,
         entry_id: u64,
-        depth_m: PyReadonlyArray2<'py, f32>,
-        masks: PyReadonlyArray2<'py, i32>,
-        labels: Vec<String>,
-        confidences: PyReadonlyArray1<'py, f32>,
-        features: Option<PyReadonlyArray2<'py, f32>>,
-        position_m: [f64; 3],
-        yaw_rad: f64,
-        horizon_rad: f64,
-        vertical_fov_rad: f64,
+        view: View<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let pose = Pose { position_m, yaw_rad, horizon_rad };
-        let arrays = ViewArrays { depth_m, masks, labels, confidences, features };
-        let view = arrays.view(pose, vertical_fov_rad)?;
-        let found = py.detach(|| self.0.compare(entry_id, &view.borrow())).map_err(error::to_py)?;
+        let view = view.borrow()?;
+        let found = py.detach(|| self.0.compare(entry_id, &view.detected()));
+        let found = found.map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
     }
 
-    #[pyo3(signature = (
-        targets_m, eyes_m, *, radius_m, step_m, margin_m, max_samples, max_targets,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
     fn visible_shares<'py>(
         &self,
         py: Python<'py>,
         targets_m: PyReadonlyArray2<'py, f32>,
         eyes_m: PyReadonlyArray2<'py, f64>,
-        radius_m: f64,
-        step_m: f64,
-        margin_m: f64,
-        max_samples: usize,
-        max_targets: usize,
+        config: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let config = SightConfig { radius_m, step_m, margin_m, max_samples, max_targets };
+        let config = arrays::from_attributes!(
+            config,
+            SightConfig { radius_m, step_m, margin_m, max_samples, max_targets }
+        );
         let (targets, eyes) =
             (arrays::rows("targets_m", &targets_m)?, arrays::rows("eyes_m", &eyes_m)?);
         let shares = py.detach(|| self.0.visible_shares(targets, eyes, &config));
@@ -211,16 +158,25 @@ impl ObjectMap {
     }
 }
 
-/// The arrays of one view, borrowed from Python.
-struct ViewArrays<'py> {
+/// `evonav.sensors.observation.View`.
+#[derive(FromPyObject)]
+struct View<'py> {
     depth_m: PyReadonlyArray2<'py, f32>,
+    pose: PyPose,
+    intrinsics: Intrinsics,
+    detections: Detections<'py>,
+}
+
+/// `evonav.sensors.observation.Detections`.
+#[derive(FromPyObject)]
+struct Detections<'py> {
     masks: PyReadonlyArray2<'py, i32>,
     labels: Vec<String>,
     confidences: PyReadonlyArray1<'py, f32>,
     features: Option<PyReadonlyArray2<'py, f32>>,
 }
 
-/// The same arrays as slices, which can be used without the interpreter.
+/// The arrays of a view as slices, which can be used without the interpreter.
 struct ViewSlices<'a> {
     camera: Camera,
     depth_m: &'a [f32],
@@ -230,48 +186,38 @@ struct ViewSlices<'a> {
     features: &'a [f32],
 }
 
-impl ViewArrays<'_> {
+impl View<'_> {
     /// Return the view as slices; the image has the size of `masks`.
-    fn view(&self, pose: Pose, vertical_fov_rad: f64) -> PyResult<ViewSlices<'_>> {
-        let (masks, [height_px, width_px]) = arrays::row_major("masks", &self.masks)?;
+    fn borrow(&self) -> PyResult<ViewSlices<'_>> {
+        let Detections { masks, labels, confidences, features } = &self.detections;
+        let (masks, [height_px, width_px]) = arrays::row_major("masks", masks)?;
         let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;
         let expected = "as many rows as `masks`";
         Error::require("depth_m", depth_shape[0], expected, |n| n == height_px)
             .map_err(error::to_py)?;
-        let (features, num_features) = match &self.features {
+        let (features, num_features) = match features {
             Some(features) => {
                 arrays::row_major("features", features).map(|(values, shape)| (values, shape[0]))?
             }
-            None => (&[][..], self.labels.len()),
+            None => (&[][..], labels.len()),
         };
-        Error::require("features", num_features, "a row a label", |n| n == self.labels.len())
+        Error::require("features", num_features, "a row a label", |n| n == labels.len())
             .map_err(error::to_py)?;
-        let height_m = pose.position_m[1];
         Ok(ViewSlices {
-            camera: Camera::at(&pose, [width_px, height_px], vertical_fov_rad, height_m),
+            camera: self.pose.camera([width_px, height_px], self.intrinsics.vertical_fov_rad),
             depth_m,
             masks,
-            labels: &self.labels,
-            confidences: self.confidences.as_slice()?,
+            labels,
+            confidences: confidences.as_slice()?,
             features,
         })
     }
 }
 
 impl ViewSlices<'_> {
-    fn borrow(&self) -> DetectedView<'_> {
-        let image = MaskedDepth { camera: &self.camera, depth_m: self.depth_m, masks: self.masks };
-        DetectedView {
-            image,
-            labels: self.labels,
-            confidences: self.confidences,
-            features: self.features,
-        }
+    fn detected(&self) -> DetectedView<'_> {
+        let &Self { ref camera, depth_m, masks, labels, confidences, features } = self;
+        let image = MaskedDepth { camera, depth_m, masks };
+        DetectedView { image, labels, confidences, features }
     }
-}
-
-/// Add the classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<ObjectEntry>()?;
-    module.add_class::<ObjectMap>()
 }

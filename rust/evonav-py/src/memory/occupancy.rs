@@ -2,7 +2,10 @@
 
 use evonav_core::{
     grid::GridSpec,
-    memory::{frontiers, occupancy},
+    memory::{
+        frontiers::{self, FrontierConfig, Frontiers},
+        occupancy,
+    },
     sensors::visible_cells::VisibleCells,
 };
 use numpy::{PyArray2, PyReadonlyArray2};
@@ -14,7 +17,7 @@ type Cells<'py> = Bound<'py, PyArray2<i32>>;
 
 /// A frontier: a place from which to explore.
 #[pyclass(frozen, module = "evonav._core")]
-struct Frontier(frontiers::Frontier);
+pub struct Frontier(frontiers::Frontier);
 
 #[pymethods]
 impl Frontier {
@@ -41,45 +44,31 @@ impl Frontier {
 
 /// The agent's occupancy map with its frontiers.
 #[pyclass(module = "evonav._core")]
-struct OccupancyMap {
+pub struct OccupancyMap {
     map: occupancy::OccupancyMap,
-    frontiers: frontiers::Frontiers,
-    config: frontiers::FrontierConfig,
+    frontiers: Frontiers,
+    config: FrontierConfig,
 }
 
 #[pymethods]
 impl OccupancyMap {
     #[new]
-    #[pyo3(signature = (
-        *, rows, cols, cell_m, corner_m,
-        min_cells = 20, min_border_cells = 3, max_span_rad = 150.0_f64.to_radians(),
-        clearance_m = 0.5, push_step_m = 0.05, max_push_m = 0.3,
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
-    fn new(
-        rows: usize,
-        cols: usize,
-        cell_m: f64,
-        corner_m: [f64; 2],
-        min_cells: usize,
-        min_border_cells: usize,
-        max_span_rad: f64,
-        clearance_m: f64,
-        push_step_m: f64,
-        max_push_m: f64,
-    ) -> PyResult<Self> {
-        let config = frontiers::FrontierConfig {
-            min_cells,
-            min_border_cells,
-            max_span_rad,
-            clearance_m,
-            push_step_m,
-            max_push_m,
-        };
+    fn new(map_frame: &Bound<'_, PyAny>, config: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let spec = arrays::from_attributes!(map_frame, GridSpec { rows, cols, cell_m, corner_m });
+        let config = arrays::from_attributes!(
+            config,
+            FrontierConfig {
+                min_cells,
+                min_border_cells,
+                max_span_rad,
+                clearance_m,
+                push_step_m,
+                max_push_m,
+            }
+        );
         config.check().map_err(error::to_py)?;
-        let map = occupancy::OccupancyMap::new(GridSpec { rows, cols, cell_m, corner_m })
-            .map_err(error::to_py)?;
-        Ok(Self { map, frontiers: frontiers::Frontiers::default(), config })
+        let map = occupancy::OccupancyMap::new(spec).map_err(error::to_py)?;
+        Ok(Self { map, frontiers: Frontiers::default(), config })
     }
 
     fn conflicts<'py>(
@@ -148,11 +137,8 @@ impl OccupancyMap {
 
     #[getter]
     fn explored<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
-        arrays::image_of(
-            py,
-            self.map.explored_cells(),
-            [self.map.spec().rows, self.map.spec().cols],
-        )
+        let spec = self.map.spec();
+        arrays::image_of(py, self.map.explored_cells(), [spec.rows, spec.cols])
     }
 }
 
@@ -171,10 +157,4 @@ fn pair<'py>(
     conflicts: occupancy::Conflicts,
 ) -> PyResult<(Cells<'py>, Cells<'py>)> {
     Ok((arrays::rows_of(py, conflicts.freed)?, arrays::rows_of(py, conflicts.obstructed)?))
-}
-
-/// Add the classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Frontier>()?;
-    module.add_class::<OccupancyMap>()
 }

@@ -9,7 +9,7 @@ type Owned = (usize, Vec<u64>);
 
 #[pyfunction]
 #[pyo3(signature = (objects, frames, snapshots, *, agent_m, reach_m))]
-fn update_snapshots(
+pub fn update_snapshots(
     py: Python<'_>,
     objects: Vec<(u64, [f64; 2])>,
     frames: Vec<Vec<(u64, f64)>>,
@@ -25,8 +25,4 @@ fn update_snapshots(
     let update = || snapshots::update_snapshots(&objects, &frames, &snapshots, agent_m, reach_m);
     let updated = py.detach(update).map_err(error::to_py)?;
     Ok(updated.into_iter().map(|snapshot| (snapshot.frame, snapshot.objects)).collect())
-}
-
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(update_snapshots, module)?)
 }

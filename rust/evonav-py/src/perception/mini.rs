@@ -17,7 +17,7 @@ use crate::{arrays, error};
 
 /// The detector's network with its weights.
 #[pyclass(frozen, module = "evonav._core")]
-struct MiniNetwork(Network);
+pub struct MiniNetwork(Network);
 
 #[pymethods]
 impl MiniNetwork {
@@ -49,7 +49,7 @@ impl MiniNetwork {
     }
 
     /// Detect instances; return masks, classes and confidences.
-    #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence, colour=0.02, depth=8.0, place=0.5))]
+    #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
     #[expect(clippy::type_complexity, reason = "a triple of arrays")]
     fn detect<'py>(
@@ -60,13 +60,10 @@ impl MiniNetwork {
         horizon_rad: f64,
         min_cells: usize,
         min_confidence: f32,
-        colour: f32,
-        depth: f32,
-        place: f32,
     ) -> PyResult<(Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>)>
     {
         let (pixels, depths, size_px) = picture(&rgb, &depth_m)?;
-        let resemblance = Resemblance { colour, depth, place };
+        let resemblance = Resemblance::default();
         let config = detector::DetectorConfig { min_cells, min_confidence, resemblance };
         let found = py
             .detach(|| detector::detect(&self.0, pixels, depths, size_px, horizon_rad, &config))
@@ -93,9 +90,4 @@ fn picture<'a>(
         return Err(error::to_py(Error::invalid("rgb", found, &expected)));
     }
     Ok((rgb.as_slice()?, depths, [width, height]))
-}
-
-/// Add the class to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<MiniNetwork>()
 }

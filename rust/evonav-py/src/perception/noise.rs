@@ -1,19 +1,21 @@
 //! `evonav_core::perception`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
-    geometry::Vec3,
     perception::{
-        self, depth_noise, false_detections, mask_distortion::MaskChange, mask_outlines::Outline,
+        self,
+        depth_noise::{self, DepthNoise},
+        false_detections::{self, SiteNoise},
+        mask_distortion::MaskChange,
+        mask_outlines::Outline,
     },
     rng::Stream,
-    sensors::camera::Camera,
 };
 use numpy::{
     PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
-use crate::{arrays, error};
+use crate::{arrays, camera::DepthImage, error};
 
 fn stream(seed: u64, labels: &[String]) -> Stream {
     Stream::new(seed, &labels.iter().map(String::as_str).collect::<Vec<_>>())
@@ -22,7 +24,7 @@ fn stream(seed: u64, labels: &[String]) -> Stream {
 /// Draw standard normal numbers, one row per stream.
 #[pyfunction]
 #[pyo3(signature = (seed, labels, *, num_draws))]
-fn draw_normals(
+pub fn draw_normals(
     py: Python<'_>,
     seed: u64,
     labels: Vec<Vec<String>>,
@@ -38,7 +40,7 @@ fn draw_normals(
 /// Return one row per mask: sides of its outline, cut sides, mean depth.
 #[pyfunction]
 #[pyo3(signature = (masks, depth_m, *, num_masks))]
-fn mask_outlines<'py>(
+pub fn mask_outlines<'py>(
     py: Python<'py>,
     masks: PyReadonlyArray2<'py, i32>,
     depth_m: PyReadonlyArray2<'py, f32>,
@@ -55,7 +57,7 @@ fn mask_outlines<'py>(
 
 /// Shrink, grow, cut, split and renumber masks.
 #[pyfunction]
-fn distort_masks<'py>(
+pub fn distort_masks<'py>(
     py: Python<'py>,
     masks: PyReadonlyArray2<'py, i32>,
     changes: PyReadonlyArray2<'py, i32>,
@@ -85,18 +87,13 @@ fn distort_masks<'py>(
 /// Find the sites in view where something may be detected that does not exist.
 #[pyfunction]
 #[pyo3(signature = (
-    depth_m, *, vertical_fov_rad, position_m, yaw_rad, horizon_rad,
-    cell_m, stride_px, persistence, seed, lasting, passing,
+    frame, *, cell_m, stride_px, persistence, seed, lasting, passing,
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
 #[expect(clippy::type_complexity, reason = "a pair of arrays")]
-fn surface_sites<'py>(
+pub fn surface_sites<'py>(
     py: Python<'py>,
-    depth_m: PyReadonlyArray2<'py, f32>,
-    vertical_fov_rad: f64,
-    position_m: Vec3,
-    yaw_rad: f64,
-    horizon_rad: f64,
+    frame: DepthImage<'py>,
     cell_m: f64,
     stride_px: usize,
     persistence: f64,
@@ -104,15 +101,9 @@ fn surface_sites<'py>(
     lasting: Vec<String>,
     passing: Vec<String>,
 ) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>)> {
-    let (depth_m, [height_px, width_px]) = arrays::row_major("depth_m", &depth_m)?;
-    let camera = Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
-    let noise = false_detections::SiteNoise {
-        cell_m,
-        stride_px,
-        persistence,
-        lasting: stream(seed, &lasting),
-        passing: stream(seed, &passing),
-    };
+    let (camera, depth_m) = frame.borrow()?;
+    let (lasting, passing) = (stream(seed, &lasting), stream(seed, &passing));
+    let noise = SiteNoise { cell_m, stride_px, persistence, lasting, passing };
     let sites = py
         .detach(|| false_detections::surface_sites(depth_m, &camera, &noise))
         .map_err(error::to_py)?;
@@ -123,7 +114,7 @@ fn surface_sites<'py>(
 
 /// Paint ellipses into masks, in place.
 #[pyfunction]
-fn paint_blobs(
+pub fn paint_blobs(
     mut masks: PyReadwriteArray2<'_, i32>,
     surfaces: PyReadonlyArray2<'_, i32>,
     blobs: PyReadonlyArray2<'_, i64>,
@@ -150,7 +141,7 @@ fn paint_blobs(
     depth_m, *, sigma_m, sigma_per_m, step_per_m, dropout, edge_dropout, max_depth_m, seed, labels,
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
-fn noisy_depth<'py>(
+pub fn noisy_depth<'py>(
     py: Python<'py>,
     depth_m: PyReadonlyArray2<'py, f32>,
     sigma_m: f64,
@@ -163,26 +154,9 @@ fn noisy_depth<'py>(
     labels: Vec<String>,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (depth_m, shape) = arrays::row_major("depth_m", &depth_m)?;
-    let noise = depth_noise::DepthNoise {
-        sigma_m,
-        sigma_per_m,
-        step_per_m,
-        dropout,
-        edge_dropout,
-        max_depth_m,
-    };
+    let noise = DepthNoise { sigma_m, sigma_per_m, step_per_m, dropout, edge_dropout, max_depth_m };
     let found = py
         .detach(|| depth_noise::noisy_depth(depth_m, shape[1], &noise, &stream(seed, &labels)))
         .map_err(error::to_py)?;
     arrays::image_of(py, found, shape)
-}
-
-/// Add the functions to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(draw_normals, module)?)?;
-    module.add_function(wrap_pyfunction!(mask_outlines, module)?)?;
-    module.add_function(wrap_pyfunction!(distort_masks, module)?)?;
-    module.add_function(wrap_pyfunction!(surface_sites, module)?)?;
-    module.add_function(wrap_pyfunction!(paint_blobs, module)?)?;
-    module.add_function(wrap_pyfunction!(noisy_depth, module)?)
 }

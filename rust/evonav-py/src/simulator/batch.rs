@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use evonav_core::{
-    geometry::{Pose, Vec2, Vec3},
+    geometry::{Pose, Vec2},
     sensors::instance_masks::MaskFilter,
     simulator::{
         actions::Strides,
@@ -17,13 +17,13 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::{arrays, error, simulator::embedded::PyEmbeddedSimulator};
+use crate::{arrays, camera::PyPose, error, simulator::embedded::PyEmbeddedSimulator};
 
 /// Whether each agent's action was carried out, and its distance.
 type Stepped<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
 
 #[pyclass(name = "GeodesicField", module = "evonav._core", frozen)]
-struct PyGeodesicField {
+pub struct PyGeodesicField {
     core: Arc<GeodesicField>,
 }
 
@@ -41,8 +41,13 @@ impl PyGeodesicField {
     }
 }
 
+/// Return points as tuples.
+fn pairs(points_m: Vec<Vec2>) -> Vec<(f64, f64)> {
+    points_m.into_iter().map(Into::into).collect()
+}
+
 #[pyclass(name = "BatchSimulator", module = "evonav._core")]
-struct PyBatchSimulator {
+pub struct PyBatchSimulator {
     core: Batch,
 }
 
@@ -70,18 +75,15 @@ impl PyBatchSimulator {
         Ok(Self { core: Batch::new(num_slots, config).map_err(error::to_py)? })
     }
 
-    #[pyo3(signature = (slot, simulator, *, position_m, yaw_rad, horizon_rad, labels))]
     fn place(
         &mut self,
         slot: usize,
         simulator: &PyEmbeddedSimulator,
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
+        pose: PyPose,
         labels: PyReadonlyArray1<'_, u8>,
     ) -> PyResult<()> {
-        let pose = Pose { position_m, yaw_rad, horizon_rad };
-        let agent = Slot::new(Arc::clone(&simulator.core), pose, Arc::from(labels.as_slice()?));
+        let (world, labels) = (Arc::clone(&simulator.core), Arc::from(labels.as_slice()?));
+        let agent = Slot::new(world, pose.pose(), labels);
         self.core.place(slot, agent).map_err(error::to_py)
     }
 
@@ -98,7 +100,7 @@ impl PyBatchSimulator {
         target_m: Vec2,
     ) -> PyResult<Vec<(f64, f64)>> {
         let path_m = py.detach(|| self.core.plan_one(slot, target_m)).map_err(error::to_py)?;
-        Ok(path_m.into_iter().map(|[x, z]| (x, z)).collect())
+        Ok(pairs(path_m))
     }
 
     fn step<'py>(
@@ -119,10 +121,7 @@ impl PyBatchSimulator {
         targets_m: Vec<Option<Vec2>>,
     ) -> PyResult<Vec<Vec<(f64, f64)>>> {
         let paths_m = py.detach(|| self.core.plan(&targets_m)).map_err(error::to_py)?;
-        Ok(paths_m
-            .into_iter()
-            .map(|path| path.into_iter().map(|[x, z]| (x, z)).collect())
-            .collect())
+        Ok(paths_m.into_iter().map(pairs).collect())
     }
 
     fn follow(&mut self, slot: usize, stops: Vec<(Vec2, f64)>) -> PyResult<usize> {
@@ -157,10 +156,4 @@ impl PyBatchSimulator {
         let labels = labels.as_mut().map(|array| arrays::whole_mut("labels", array)).transpose()?;
         py.detach(|| self.core.render(Images { depth_m, rgb, labels })).map_err(error::to_py)
     }
-}
-
-/// Add the classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PyGeodesicField>()?;
-    module.add_class::<PyBatchSimulator>()
 }

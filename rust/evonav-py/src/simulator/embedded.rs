@@ -7,7 +7,7 @@ use evonav_core::{
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::{
-        camera::{Camera, View},
+        camera::{CLIP_M, View},
         raster::{FrameBuffer, Want},
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
@@ -20,7 +20,7 @@ use evonav_core::{
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays, error};
+use crate::{arrays, camera::PyPose, error, house::unknown_assets};
 
 /// Depth, colours and instances of one view.
 type Images<'py> = (
@@ -44,6 +44,30 @@ pub struct PyEmbeddedSimulator {
     pub core: Arc<EmbeddedSimulator>,
     /// Working memory of the renderer. A second thread that finds it in use creates its own.
     buffer: Mutex<FrameBuffer>,
+}
+
+/// `evonav.world.camera.CameraView`.
+#[derive(FromPyObject)]
+struct CameraView {
+    pose: PyPose,
+    width_px: usize,
+    height_px: usize,
+    vertical_fov_rad: f64,
+    near_m: f64,
+    far_m: f64,
+    roll_rad: f64,
+    orthographic_half_height_m: Option<f64>,
+}
+
+impl CameraView {
+    fn view(&self) -> View {
+        View {
+            camera: self.pose.camera([self.width_px, self.height_px], self.vertical_fov_rad),
+            clip_m: [self.near_m, self.far_m],
+            roll_rad: self.roll_rad,
+            half_height_m: self.orthographic_half_height_m,
+        }
+    }
 }
 
 impl From<EmbeddedSimulator> for PyEmbeddedSimulator {
@@ -72,10 +96,7 @@ impl PyEmbeddedSimulator {
         agent_height_m: f64,
         allow_unknown_assets: bool,
     ) -> PyResult<Self> {
-        let unknown = match allow_unknown_assets {
-            true => UnknownAssets::CategoryDefault,
-            false => UnknownAssets::Error,
-        };
+        let unknown = unknown_assets(allow_unknown_assets);
         let agent = AgentBody { radius_m: agent_radius_m, height_m: agent_height_m };
         let config =
             SimulatorConfig { image_px, vertical_fov_rad, clip_m, camera_height_m, agent, unknown };
@@ -125,69 +146,38 @@ impl PyEmbeddedSimulator {
         (position_m, yaw_rad, horizon_rad)
     }
 
-    #[pyo3(signature = (position_m, yaw_rad, horizon_rad, *, rgb, instances))]
+    #[pyo3(signature = (pose, *, rgb, instances))]
     fn render<'py>(
         &self,
         py: Python<'py>,
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
+        pose: PyPose,
         rgb: bool,
         instances: bool,
     ) -> PyResult<Images<'py>> {
-        let pose = Pose { position_m, yaw_rad, horizon_rad };
-        self.images(py, &self.core.view(&pose), Want { rgb, instances })
+        self.images(py, &self.core.view(&pose.pose()), Want { rgb, instances })
     }
 
-    #[pyo3(signature = (
-        *, image_px, vertical_fov_rad, clip_m, position_m, yaw_rad, horizon_rad, roll_rad,
-        half_height_m, rgb, instances
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
+    #[pyo3(signature = (view, *, rgb, instances))]
     fn render_camera<'py>(
         &self,
         py: Python<'py>,
-        image_px: [usize; 2],
-        vertical_fov_rad: f64,
-        clip_m: [f64; 2],
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
-        roll_rad: f64,
-        half_height_m: Option<f64>,
+        view: CameraView,
         rgb: bool,
         instances: bool,
     ) -> PyResult<Images<'py>> {
-        let [width_px, height_px] = image_px;
-        let camera =
-            Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
-        let view = View { camera, clip_m, roll_rad, half_height_m };
-        self.images(py, &view, Want { rgb, instances })
+        self.images(py, &view.view(), Want { rgb, instances })
     }
 
     /// Return the indices of the bodies that AI2-THOR calls visible.
-    #[pyo3(signature = (
-        *, image_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad, roll_rad, half_height_m,
-        agent_m, max_distance_m
-    ))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
+    #[pyo3(signature = (view, *, agent_m, max_distance_m))]
     fn visible_bodies(
         &self,
         py: Python<'_>,
-        image_px: [usize; 2],
-        vertical_fov_rad: f64,
-        position_m: Vec3,
-        yaw_rad: f64,
-        horizon_rad: f64,
-        roll_rad: f64,
-        half_height_m: Option<f64>,
+        view: CameraView,
         agent_m: Vec2,
         max_distance_m: f64,
     ) -> PyResult<Vec<usize>> {
-        let [width_px, height_px] = image_px;
-        let camera =
-            Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
-        let view = View { roll_rad, half_height_m, ..View::from(camera) };
+        let view = View { clip_m: CLIP_M, ..view.view() };
         py.detach(|| self.core.visible_bodies(&view, agent_m, max_distance_m)).map_err(error::to_py)
     }
 
@@ -301,20 +291,10 @@ fn body_record(body: &Body) -> BodyRecord {
 /// Return the shape and corner of the oracle occupancy's grid.
 #[pyfunction]
 #[pyo3(signature = (house_json, *, name, cell_m))]
-fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResult<MapSpec> {
+pub fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResult<MapSpec> {
     let spec = py.detach(|| {
         let house = House::from_json(name, house_json)?;
         navigation::map_spec(&Scene::build_empty(&house, Catalogue::bundled()), cell_m)
     });
     spec.map(|spec| ((spec.rows, spec.cols), spec.corner_m)).map_err(error::to_py)
-}
-
-/// Add class and function to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    // Images are freed as often as they are created. After one block of this size was freed, glibc
-    // keeps that much memory instead of returning it to the system; getting it back takes a third
-    // of a frame.
-    drop(std::hint::black_box(vec![0_u8; 1 << 24]));
-    module.add_class::<PyEmbeddedSimulator>()?;
-    module.add_function(wrap_pyfunction!(map_spec, module)?)
 }

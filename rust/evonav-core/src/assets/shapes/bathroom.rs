@@ -4,35 +4,22 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::assets::shapes::{
     colour::{CERAMIC, DARK, FABRICS, STEEL, WOODS, shade},
-    sketch::{Along, Motion, Sketch, between, ends, inside},
+    sketch::{ALL, Along, Motion, Sketch, between, ends, inside, piece},
 };
 
 /// Draw a toilet: tank at the back, bowl in front, seat and open lid.
 pub fn toilet(s: &mut Sketch<'_>) {
-    let [_, h, _] = s.size();
-    let [x, y, z] = s.spans();
+    let h = s.size()[1];
+    let [x, _, z] = s.spans();
     let white = s.tint(0, CERAMIC);
     let rim = 0.42 * h;
     s.cuboid(x, [rim, h - 0.03], between(z, 0.0, 0.26), white);
-    s.cuboid(x, between(y, 1.0 - 0.03 / h, 1.0), between(z, 0.0, 0.28), shade(white, 0.95));
+    s.cuboid_at(ALL, [1.0 - 0.03 / h, 1.0], [0.0, 0.28], shade(white, 0.95));
     s.column(between(x, 0.25, 0.75), [0.0, 0.55 * rim], between(z, 0.05, 0.75), 0.85, 12, white);
     s.column(between(x, 0.12, 0.88), [0.5 * rim, rim - 0.03], between(z, 0.2, 1.0), 1.5, 12, white);
-    s.column(
-        between(x, 0.1, 0.9),
-        [rim - 0.03, rim],
-        between(z, 0.22, 1.0),
-        1.0,
-        12,
-        shade(white, 0.92),
-    );
-    s.column(
-        between(x, 0.22, 0.78),
-        [rim, rim + 0.004],
-        between(z, 0.34, 0.92),
-        1.0,
-        12,
-        [120, 150, 165],
-    );
+    let (seat, water) = ([rim - 0.03, rim], [rim, rim + 0.004]);
+    s.column(between(x, 0.1, 0.9), seat, between(z, 0.22, 1.0), 1.0, 12, shade(white, 0.92));
+    s.column(between(x, 0.22, 0.78), water, between(z, 0.34, 0.92), 1.0, 12, [120, 150, 165]);
     let pivot_m = [0.0, rim + 0.004, between(z, 0.28, 0.32)[1]];
     s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
         let lid = between(z, 0.28, 0.32);
@@ -79,12 +66,8 @@ pub fn sink(s: &mut Sketch<'_>) {
         s.cuboid(between(x, 0.47, 0.53), [h - 0.02, h], between(z, 0.02, 0.3), STEEL);
     }
     let side = 0.09 * w.min(d);
-    s.cuboid(
-        inside(x, side),
-        [basin, basin + 0.25 * (rim - basin)],
-        inside(z, side),
-        shade(white, 0.8),
-    );
+    let bottom = [basin, basin + 0.25 * (rim - basin)];
+    s.cuboid(inside(x, side), bottom, inside(z, side), shade(white, 0.8));
     for x in ends(x, side, 0.0) {
         s.cuboid(x, [basin, rim], z, white);
     }
@@ -98,12 +81,12 @@ pub fn sink(s: &mut Sketch<'_>) {
 
 /// Draw a faucet: a base, a riser, a spout towards the front, and two handles if the box is wide.
 pub fn faucet(s: &mut Sketch<'_>) {
-    let [w, _, _] = s.size();
+    let w = s.size()[0];
     let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);
     let thick = (0.5 * w).min(0.03) / w;
     let middle = between(x, 0.5 - 0.5 * thick, 0.5 + 0.5 * thick);
-    s.cuboid(x, between(y, 0.0, 0.12), between(z, 0.0, 0.25), metal);
+    s.cuboid_at(ALL, [0.0, 0.12], [0.0, 0.25], metal);
     s.cuboid(middle, between(y, 0.12, 1.0), between(z, 0.04, 0.18), metal);
     s.cuboid(middle, between(y, 0.85, 1.0), between(z, 0.18, 1.0), metal);
     s.cuboid(middle, between(y, 0.7, 0.85), between(z, 0.86, 1.0), metal);
@@ -117,25 +100,22 @@ pub fn faucet(s: &mut Sketch<'_>) {
 
 /// Draw a shower head: a rail on the wall, an arm and a rose.
 pub fn shower_head(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);
-    s.cuboid(between(x, 0.4, 0.6), y, between(z, 0.0, 0.12), metal);
-    s.cuboid(between(x, 0.42, 0.58), between(y, 0.96, 0.98), between(z, 0.12, 0.8), metal);
-    s.column(x, between(y, 0.93, 0.96), between(z, 0.45, 1.0), 0.7, 12, metal);
-    s.cuboid(between(x, 0.3, 0.7), between(y, 0.3, 0.36), between(z, 0.0, 0.35), shade(metal, 0.8));
+    s.cuboid_at([0.4, 0.6], ALL, [0.0, 0.12], metal);
+    s.cuboid_at([0.42, 0.58], [0.96, 0.98], [0.12, 0.8], metal);
+    s.column_at(ALL, [0.93, 0.96], [0.45, 1.0], 0.7, 12, metal);
+    s.cuboid_at([0.3, 0.7], [0.3, 0.36], [0.0, 0.35], shade(metal, 0.8));
 }
 
 /// Draw a curtain: a rail with folds hanging from it.
 pub fn curtain(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let cloth = s.tint(0, [225, 228, 230]);
-    s.cuboid(x, between(y, 0.97, 1.0), between(z, 0.4, 0.6), STEEL);
+    s.cuboid_at(ALL, [0.97, 1.0], [0.4, 0.6], STEEL);
     for i in 0..6 {
-        let i = f64::from(i);
-        let depth = if i % 2.0 == 0.0 { [0.0, 0.6] } else { [0.4, 1.0] };
-        let fold = between(x, i / 6.0, (i + 1.0) / 6.0);
-        let colour = if i % 2.0 == 0.0 { cloth } else { shade(cloth, 0.9) };
-        s.cuboid(fold, between(y, 0.0, 0.97), between(z, depth[0], depth[1]), colour);
+        let is_back = i % 2 == 0;
+        let depth = if is_back { [0.0, 0.6] } else { [0.4, 1.0] };
+        let colour = if is_back { cloth } else { shade(cloth, 0.9) };
+        s.cuboid_at(piece(ALL, i, 6), [0.0, 0.97], depth, colour);
     }
 }
 
@@ -146,23 +126,18 @@ pub fn towel(s: &mut Sketch<'_>) {
     let cloth =
         s.tint(0, s.choose(&[[225, 225, 220], [120, 150, 170], [170, 110, 100]], FABRICS[5]));
     if h > d {
-        s.cuboid(x, y, between(z, 0.55, 1.0), cloth);
+        s.cuboid_at(ALL, ALL, [0.55, 1.0], cloth);
         s.cuboid(inside(x, 0.005), between(y, 0.3, 1.0), between(z, 0.0, 0.45), shade(cloth, 0.9));
-        s.cuboid(x, between(y, 0.96, 1.0), z, cloth);
+        s.cuboid_at(ALL, [0.96, 1.0], ALL, cloth);
     } else {
-        s.cuboid(x, between(y, 0.0, 0.6), z, cloth);
-        s.cuboid(
-            between(x, 0.1, 0.95),
-            between(y, 0.6, 1.0),
-            between(z, 0.08, 0.9),
-            shade(cloth, 0.93),
-        );
+        s.cuboid_at(ALL, [0.0, 0.6], ALL, cloth);
+        s.cuboid_at([0.1, 0.95], [0.6, 1.0], [0.08, 0.9], shade(cloth, 0.93));
     }
 }
 
 /// Draw a holder: a plate on the wall (-z) and a bar.
 pub fn holder(s: &mut Sketch<'_>) {
-    let [w, _, _] = s.size();
+    let w = s.size()[0];
     let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);
     for end in ends(x, 0.12 * w, 0.0) {
@@ -174,17 +149,9 @@ pub fn holder(s: &mut Sketch<'_>) {
 
 /// Draw a stick with a cup or a brush at its foot.
 pub fn brush(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let rubber = s.tint(1, [150, 60, 50]);
-    s.column(x, between(y, 0.0, 0.25), z, 0.5, 12, rubber);
-    s.column(
-        between(x, 0.42, 0.58),
-        between(y, 0.25, 1.0),
-        between(z, 0.42, 0.58),
-        1.0,
-        8,
-        s.tint(0, WOODS[0]),
-    );
+    s.column_at(ALL, [0.0, 0.25], ALL, 0.5, 12, rubber);
+    s.column_at([0.42, 0.58], [0.25, 1.0], [0.42, 0.58], 1.0, 8, s.tint(0, WOODS[0]));
 }
 
 /// Draw a washing machine: a white box with a round door and a panel.
@@ -193,13 +160,9 @@ pub fn washer(s: &mut Sketch<'_>) {
     let white = s.tint(0, [232, 233, 235]);
     let front = z[1] - 0.04;
     s.cuboid(x, between(y, 0.0, 0.9), [z[0], front], white);
-    s.cuboid(x, between(y, 0.9, 1.0), between(z, 0.0, 0.25), shade(white, 0.85));
-    s.cuboid(
-        between(x, 0.04, 0.96),
-        between(y, 0.76, 0.88),
-        [front, front + 0.01],
-        shade(white, 0.75),
-    );
+    s.cuboid_at(ALL, [0.9, 1.0], [0.0, 0.25], shade(white, 0.85));
+    let panel = [front, front + 0.01];
+    s.cuboid(between(x, 0.04, 0.96), between(y, 0.76, 0.88), panel, shade(white, 0.75));
     s.detail("round door", 1);
     let pivot_m = [between(x, 0.2, 0.8)[0], 0.0, front];
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {

@@ -2,7 +2,7 @@
 
 use crate::assets::shapes::{
     colour::{FABRICS, WOODS, liveliest, shade},
-    sketch::{Sketch, Span, between, ends, inside},
+    sketch::{ALL, Sketch, Span, between, ends, inside, piece},
 };
 
 const LINEN: [[u8; 3]; 6] = [
@@ -61,8 +61,7 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [[u8; 3]; 2], top: f64, x: Span) {
     let width = x[1] - x[0];
     let pillows = if width > 1.25 { 2 } else { 1 };
     for i in 0..pillows {
-        let n = f64::from(pillows);
-        let side = inside(between(x, f64::from(i) / n, (f64::from(i) + 1.0) / n), 0.08 * width);
+        let side = inside(piece(x, i, pillows), 0.08 * width);
         s.cuboid(side, [top - 0.012, top + 0.07], between(length, 0.03, 0.2), [245, 243, 238]);
     }
 }
@@ -77,14 +76,8 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
         s.form("round");
         // Dog beds are round: recorded agents stand in the corners of their boxes.
         s.column(x, [0.0, 0.7 * h], z, 1.0, 16, fabric);
-        s.column(
-            inside(x, 0.5 * rim),
-            [0.7 * h, h],
-            inside(z, 0.5 * rim),
-            1.0,
-            16,
-            shade(fabric, 1.2),
-        );
+        let [x, z] = [x, z].map(|span| inside(span, 0.5 * rim));
+        s.column(x, [0.7 * h, h], z, 1.0, 16, shade(fabric, 1.2));
         return;
     }
     s.cuboid(inside(x, 0.5 * rim), [0.0, 0.5 * h], inside(z, 0.5 * rim), shade(fabric, 1.2));
@@ -97,8 +90,7 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
 
 /// Draw a pillow that is thick in the middle.
 pub fn pillow(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));
-    s.cuboid(x, between(y, 0.2, 0.75), z, fabric);
-    s.cuboid(between(x, 0.05, 0.95), y, between(z, 0.05, 0.95), shade(fabric, 1.04));
+    s.cuboid_at(ALL, [0.2, 0.75], ALL, fabric);
+    s.cuboid_at([0.05, 0.95], ALL, [0.05, 0.95], shade(fabric, 1.04));
 }

@@ -2,7 +2,7 @@
 
 use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
-    sketch::{Along, Sketch, between, ends, inside},
+    sketch::{ALL, Along, Sketch, between, ends, inside},
 };
 
 /// Draw a plant: pot, soil, stem and foliage.
@@ -15,30 +15,17 @@ pub fn plant(s: &mut Sketch<'_>) {
     s.detail("pot", 1);
     let pot_top = (0.32 * h).min(0.5);
     let radius = (0.32 * w.min(d)).min(0.5 * pot_top + 0.05);
-    let around = |span| inside(span, 0.5 * (span_length(span) - 2.0 * radius));
-    s.column(around(x), [0.0, pot_top], around(z), 1.3, 10, pot);
-    s.column(
-        inside(around(x), 0.1 * radius),
-        [pot_top, pot_top + 0.005],
-        inside(around(z), 0.1 * radius),
-        1.0,
-        10,
-        [60, 45, 35],
-    );
+    let around = |span: [f64; 2]| inside(span, 0.5 * (span[1] - span[0] - 2.0 * radius));
+    let [pot_x, pot_z] = [x, z].map(around);
+    s.column(pot_x, [0.0, pot_top], pot_z, 1.3, 10, pot);
+    let [soil_x, soil_z] = [pot_x, pot_z].map(|span| inside(span, 0.1 * radius));
+    s.column(soil_x, [pot_top, pot_top + 0.005], soil_z, 1.0, 10, [60, 45, 35]);
     s.pole([0.0, 0.0], 0.05 * w.min(d), [pot_top, 0.6 * h], 6, [95, 80, 50]);
     let crown = 0.75 * h;
     s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
     s.blob(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
-    s.blob(
-        between(x, 0.4, 1.0),
-        [1.1 * pot_top, crown + 0.1 * h],
-        between(z, 0.0, 0.6),
-        shade(leaf, 1.15),
-    );
-}
-
-fn span_length(span: [f64; 2]) -> f64 {
-    span[1] - span[0]
+    let upper = [1.1 * pot_top, crown + 0.1 * h];
+    s.blob(between(x, 0.4, 1.0), upper, between(z, 0.0, 0.6), shade(leaf, 1.15));
 }
 
 /// Draw a painting: frame and canvas with a horizon.
@@ -60,12 +47,8 @@ pub fn painting(s: &mut Sketch<'_>) {
     s.cuboid(x, y, between(z, 0.0, 0.7), frame);
     let (inner, canvas) = (inside(x, bar), inside(y, bar));
     s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), s.choose(&skies, skies[0]));
-    s.cuboid(
-        inner,
-        between(canvas, 0.0, 0.4),
-        between(z, 0.7, 0.85),
-        s.choose(&grounds, grounds[0]),
-    );
+    let ground = s.choose(&grounds, grounds[0]);
+    s.cuboid(inner, between(canvas, 0.0, 0.4), between(z, 0.7, 0.85), ground);
     for x in ends(x, bar, 0.0) {
         s.cuboid(x, y, between(z, 0.7, 1.0), frame);
     }
@@ -112,71 +95,52 @@ pub fn statue(s: &mut Sketch<'_>) {
         s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
     if w > h {
         // An animal has a body, a head and legs.
-        s.cuboid(between(x, 0.1, 0.8), between(y, 0.35, 0.75), between(z, 0.15, 0.85), stone);
-        s.blob(between(x, 0.65, 1.0), between(y, 0.5, 1.0), between(z, 0.1, 0.9), stone);
+        s.cuboid_at([0.1, 0.8], [0.35, 0.75], [0.15, 0.85], stone);
+        s.blob_at([0.65, 1.0], [0.5, 1.0], [0.1, 0.9], stone);
         for end in ends(between(x, 0.0, 0.8), 0.15 * w, 0.0) {
             s.cuboid(end, between(y, 0.0, 0.4), z, shade(stone, 0.9));
         }
         return;
     }
-    s.column(x, between(y, 0.0, 0.12), z, 0.9, 8, shade(stone, 0.7));
-    s.column(
-        between(x, 0.15, 0.85),
-        between(y, 0.12, 0.75),
-        between(z, 0.15, 0.85),
-        0.55,
-        8,
-        stone,
-    );
-    s.blob(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
+    s.column_at(ALL, [0.0, 0.12], ALL, 0.9, 8, shade(stone, 0.7));
+    s.column_at([0.15, 0.85], [0.12, 0.75], [0.15, 0.85], 0.55, 8, stone);
+    s.blob_at([0.28, 0.72], [0.72, 1.0], [0.28, 0.72], stone);
 }
 
 /// Draw a teddy bear: body, head, ears, arms and legs.
 pub fn teddy_bear(s: &mut Sketch<'_>) {
+    let w = s.size()[0];
     let [x, y, z] = s.spans();
     let fur = s.tint(0, [150, 105, 65]);
-    s.blob(between(x, 0.22, 0.78), between(y, 0.05, 0.62), between(z, 0.05, 0.7), fur);
-    s.ellipsoid(
-        between(x, 0.27, 0.73),
-        between(y, 0.52, 0.95),
-        between(z, 0.05, 0.65),
-        shade(fur, 1.1),
-    );
-    for ear in [between(x, 0.22, 0.38), between(x, 0.62, 0.78)] {
-        s.cuboid(ear, between(y, 0.86, 1.0), between(z, 0.3, 0.4), fur);
+    s.blob_at([0.22, 0.78], [0.05, 0.62], [0.05, 0.7], fur);
+    s.ellipsoid_at([0.27, 0.73], [0.52, 0.95], [0.05, 0.65], shade(fur, 1.1));
+    for ear in [[0.22, 0.38], [0.62, 0.78]] {
+        s.cuboid_at(ear, [0.86, 1.0], [0.3, 0.4], fur);
     }
-    for side in ends(x, 0.3 * span_length(x), 0.0) {
+    for side in ends(x, 0.3 * w, 0.0) {
         s.cuboid(side, between(y, 0.38, 0.5), between(z, 0.25, 0.5), fur);
-        s.cuboid(
-            inside(side, 0.05 * span_length(x)),
-            between(y, 0.0, 0.16),
-            between(z, 0.4, 1.0),
-            fur,
-        );
+        s.cuboid(inside(side, 0.05 * w), between(y, 0.0, 0.16), between(z, 0.4, 1.0), fur);
     }
-    s.cuboid(between(x, 0.4, 0.6), between(y, 0.1, 0.3), between(z, 0.0, 0.1), fur);
+    s.cuboid_at([0.4, 0.6], [0.1, 0.3], [0.0, 0.1], fur);
 }
 
 /// Draw a ball.
 pub fn ball(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
-    s.ellipsoid(x, y, z, s.tint(0, [205, 105, 45]));
+    s.ellipsoid_at(ALL, ALL, ALL, s.tint(0, [205, 105, 45]));
 }
 
 /// Draw two boots.
 pub fn boots(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let leather = s.tint(0, [75, 55, 40]);
-    for foot in [between(x, 0.0, 0.45), between(x, 0.55, 1.0)] {
-        s.cuboid(foot, between(y, 0.0, 0.22), z, leather);
-        s.cuboid(foot, between(y, 0.22, 1.0), between(z, 0.0, 0.5), leather);
+    for foot in [[0.0, 0.45], [0.55, 1.0]] {
+        s.cuboid_at(foot, [0.0, 0.22], ALL, leather);
+        s.cuboid_at(foot, [0.22, 1.0], [0.0, 0.5], leather);
     }
 }
 
 /// Draw a bat: a long cone.
 pub fn bat(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
-    s.column(x, y, z, 0.45, 8, s.tint(0, WOODS[0]));
+    s.column_at(ALL, ALL, ALL, 0.45, 8, s.tint(0, WOODS[0]));
 }
 
 /// Draw a racket: head and handle along the box's longest side.
@@ -187,13 +151,13 @@ pub fn racket(s: &mut Sketch<'_>) {
     let (head, grip) = ([0.42, 1.0], [0.0, 0.45]);
     if h >= w && h >= d {
         s.round(Along::Z, 1.0, 12, [x, between(y, head[0], head[1]), z], frame);
-        s.cuboid(between(x, 0.45, 0.55), between(y, grip[0], grip[1]), between(z, 0.1, 0.9), DARK);
+        s.cuboid_at([0.45, 0.55], grip, [0.1, 0.9], DARK);
     } else if d >= w {
-        s.column(x, y, between(z, head[0], head[1]), 1.0, 12, frame);
-        s.cuboid(between(x, 0.45, 0.55), between(y, 0.1, 0.9), between(z, grip[0], grip[1]), DARK);
+        s.column_at(ALL, ALL, head, 1.0, 12, frame);
+        s.cuboid_at([0.45, 0.55], [0.1, 0.9], grip, DARK);
     } else {
-        s.column(between(x, head[0], head[1]), y, z, 1.0, 12, frame);
-        s.cuboid(between(x, grip[0], grip[1]), between(y, 0.1, 0.9), between(z, 0.45, 0.55), DARK);
+        s.column_at(head, ALL, ALL, 1.0, 12, frame);
+        s.cuboid_at(grip, [0.1, 0.9], [0.45, 0.55], DARK);
     }
 }
 
@@ -206,25 +170,23 @@ pub fn dumbbell(s: &mut Sketch<'_>) {
         for end in ends(z, 0.3 * d, 0.0) {
             s.round(Along::Z, 1.0, 8, [x, y, end], iron);
         }
-        s.cuboid(between(x, 0.4, 0.6), between(y, 0.4, 0.6), z, STEEL);
+        s.cuboid_at([0.4, 0.6], [0.4, 0.6], ALL, STEEL);
     } else {
         for end in ends(x, 0.3 * w, 0.0) {
             s.round(Along::X, 1.0, 8, [end, y, z], iron);
         }
-        s.cuboid(x, between(y, 0.4, 0.6), between(z, 0.4, 0.6), STEEL);
+        s.cuboid_at(ALL, [0.4, 0.6], [0.4, 0.6], STEEL);
     }
 }
 
 /// Draw a candle: wax and wick.
 pub fn candle(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
-    s.column(x, between(y, 0.0, 0.9), z, 1.0, 8, s.tint(0, [235, 225, 195]));
-    s.column(between(x, 0.44, 0.56), between(y, 0.9, 1.0), between(z, 0.44, 0.56), 1.0, 4, DARK);
+    s.column_at(ALL, [0.0, 0.9], ALL, 1.0, 8, s.tint(0, [235, 225, 195]));
+    s.column_at([0.44, 0.56], [0.9, 1.0], [0.44, 0.56], 1.0, 4, DARK);
 }
 
 /// Draw books and other flat things: a block with a lighter core that shows at the edges.
 pub fn slab(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let covers = [[150, 55, 50], [50, 80, 130], [60, 110, 80], [190, 150, 70], [95, 65, 110]];
     let category = s.asset().category.as_str();
     let plain = match category {
@@ -239,13 +201,8 @@ pub fn slab(s: &mut Sketch<'_>) {
     if category != "Book" {
         return s.block(cover);
     }
-    s.cuboid(x, between(y, 0.0, 0.12), z, cover);
-    s.cuboid(
-        between(x, 0.02, 0.97),
-        between(y, 0.12, 0.88),
-        between(z, 0.03, 0.97),
-        [235, 230, 215],
-    );
-    s.cuboid(x, between(y, 0.88, 1.0), z, cover);
-    s.cuboid(between(x, 0.0, 0.04), y, z, shade(cover, 0.9));
+    s.cuboid_at(ALL, [0.0, 0.12], ALL, cover);
+    s.cuboid_at([0.02, 0.97], [0.12, 0.88], [0.03, 0.97], [235, 230, 215]);
+    s.cuboid_at(ALL, [0.88, 1.0], ALL, cover);
+    s.cuboid_at([0.0, 0.04], ALL, ALL, shade(cover, 0.9));
 }

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::assets::shapes::{
     colour::{DARK, STEEL, lightest, shade},
-    sketch::{Along, Motion, Sketch, between, inside},
+    sketch::{ALL, Along, Motion, Sketch, between, inside},
 };
 
 const SCREEN: [u8; 3] = [25, 28, 34];
@@ -28,18 +28,9 @@ pub fn television(s: &mut Sketch<'_>) {
     let panel = [-0.03, 0.03];
     let bottom = 0.1 * h;
     s.cuboid(x, [bottom, h], panel, frame);
-    s.cuboid(
-        inside(x, 0.03 * w),
-        [bottom + 0.04 * h, 0.97 * h],
-        [panel[1], panel[1] + 0.006],
-        screen,
-    );
-    s.cuboid(
-        between(x, 0.44, 0.56),
-        [0.015, 0.5 * h],
-        [panel[0] - 0.03, panel[0]],
-        shade(frame, 1.3),
-    );
+    let (glass, neck) = ([panel[1], panel[1] + 0.006], [panel[0] - 0.03, panel[0]]);
+    s.cuboid(inside(x, 0.03 * w), [bottom + 0.04 * h, 0.97 * h], glass, screen);
+    s.cuboid(between(x, 0.44, 0.56), [0.015, 0.5 * h], neck, shade(frame, 1.3));
     s.cuboid(between(x, 0.25, 0.75), [0.0, 0.02], z, shade(frame, 1.3));
 }
 
@@ -76,7 +67,7 @@ pub fn desktop(s: &mut Sketch<'_>) {
 /// Draw a lamp: foot, pole and shade.
 pub fn lamp(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
-    let [x, y, z] = s.spans();
+    let [x, _, z] = s.spans();
     let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
     let cloths = [[240, 228, 200], [225, 225, 220], [215, 180, 130]];
     s.detail("lampshade", 1);
@@ -88,31 +79,23 @@ pub fn lamp(s: &mut Sketch<'_>) {
     s.column(between(x, 0.2, 0.8), [0.0, foot * h], between(z, 0.2, 0.8), 0.9, 12, metal);
     let middle = |span| between(span, 0.5 - pole, 0.5 + pole);
     s.column(middle(x), [foot * h, 0.9 * h], middle(z), 1.0, 6, metal);
-    s.column(x, between(y, shade_from, 1.0), z, s.choose(&[0.6, 0.75, 1.0], 0.75), 16, cloth);
+    s.column_at(ALL, [shade_from, 1.0], ALL, s.choose(&[0.6, 0.75, 1.0], 0.75), 16, cloth);
 }
 
 /// Draw a body with a face: phones, remote controls, switches, clocks, watches.
 pub fn gadget(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
-    let [x, y, z] = s.spans();
     let is_switch = s.asset().category == "LightSwitch";
-    let body = s.tint(
-        0,
-        if is_switch { [235, 233, 225] } else { s.choose(&[DARK, [180, 60, 55], STEEL], DARK) },
-    );
+    let plain = s.choose(&[DARK, [180, 60, 55], STEEL], DARK);
+    let body = s.tint(0, if is_switch { [235, 233, 225] } else { plain });
     if h > d {
-        s.cuboid(x, y, between(z, 0.0, 0.7), body);
+        s.cuboid_at(ALL, ALL, [0.0, 0.7], body);
         let face = if is_switch { shade(body, 0.8) } else { [230, 232, 225] };
         let inner = if is_switch { [0.38, 0.62] } else { [0.15, 0.85] };
-        s.cuboid(
-            between(x, inner[0], inner[1]),
-            between(y, 0.25, 0.75),
-            between(z, 0.7, 1.0),
-            face,
-        );
+        s.cuboid_at(inner, [0.25, 0.75], [0.7, 1.0], face);
     } else {
-        s.cuboid(x, between(y, 0.0, 0.8), z, body);
-        s.cuboid(between(x, 0.1, 0.9), between(y, 0.8, 1.0), between(z, 0.1, 0.9), [60, 70, 85]);
+        s.cuboid_at(ALL, [0.0, 0.8], ALL, body);
+        s.cuboid_at([0.1, 0.9], [0.8, 1.0], [0.1, 0.9], [60, 70, 85]);
     }
 }
 
@@ -120,9 +103,9 @@ pub fn gadget(s: &mut Sketch<'_>) {
 pub fn vacuum_cleaner(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, [160, 45, 45]);
-    s.cuboid(x, between(y, 0.0, 0.1), between(z, 0.45, 1.0), DARK);
-    s.column(between(x, 0.25, 0.75), between(y, 0.08, 0.6), between(z, 0.1, 0.6), 0.8, 8, body);
-    s.cuboid(between(x, 0.44, 0.56), between(y, 0.55, 1.0), between(z, 0.0, 0.15), STEEL);
+    s.cuboid_at(ALL, [0.0, 0.1], [0.45, 1.0], DARK);
+    s.column_at([0.25, 0.75], [0.08, 0.6], [0.1, 0.6], 0.8, 8, body);
+    s.cuboid_at([0.44, 0.56], [0.55, 1.0], [0.0, 0.15], STEEL);
     let wheel = [between(x, 0.1, 0.9), between(y, 0.0, 0.14), between(z, 0.2, 0.45)];
     s.round(Along::X, 1.0, 8, wheel, DARK);
 }

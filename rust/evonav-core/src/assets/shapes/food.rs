@@ -2,7 +2,7 @@
 
 use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
-    sketch::{Along, Sketch, between},
+    sketch::{ALL, Along, Sketch, between},
 };
 
 /// Draw fruit, vegetables, eggs and bread.
@@ -11,36 +11,24 @@ pub fn food(s: &mut Sketch<'_>) {
     match s.asset().category.as_str() {
         "Apple" => {
             let skin = s.choose(&[[185, 40, 40], [120, 165, 60], [205, 70, 50]], [185, 40, 40]);
-            s.blob(x, between(y, 0.0, 0.88), z, skin);
-            s.cuboid(
-                between(x, 0.46, 0.54),
-                between(y, 0.8, 1.0),
-                between(z, 0.46, 0.54),
-                [80, 55, 30],
-            );
+            s.blob_at(ALL, [0.0, 0.88], ALL, skin);
+            s.cuboid_at([0.46, 0.54], [0.8, 1.0], [0.46, 0.54], [80, 55, 30]);
         }
         "Tomato" => {
-            s.blob(x, between(y, 0.0, 0.92), z, [200, 45, 35]);
-            s.column(
-                between(x, 0.3, 0.7),
-                between(y, 0.9, 1.0),
-                between(z, 0.3, 0.7),
-                0.4,
-                5,
-                [70, 120, 50],
-            );
+            s.blob_at(ALL, [0.0, 0.92], ALL, [200, 45, 35]);
+            s.column_at([0.3, 0.7], [0.9, 1.0], [0.3, 0.7], 0.4, 5, [70, 120, 50]);
         }
         "Potato" => s.blob(x, y, z, [170, 130, 85]),
         "Egg" => s.blob(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190])),
         "Lettuce" => {
-            s.blob(x, y, between(z, 0.0, 0.9), [120, 165, 80]);
+            s.blob_at(ALL, ALL, [0.0, 0.9], [120, 165, 80]);
             let stump = [between(x, 0.3, 0.7), between(y, 0.3, 0.7), between(z, 0.8, 1.0)];
             s.round(Along::Z, 0.6, 8, stump, [185, 205, 150]);
         }
         _ => {
             // Bread is a loaf with a rounded top.
             let crust = [190, 130, 70];
-            s.cuboid(x, between(y, 0.0, 0.6), z, crust);
+            s.cuboid_at(ALL, [0.0, 0.6], ALL, crust);
             s.round(Along::Z, 1.0, 12, [x, between(y, 0.2, 1.0), z], shade(crust, 1.1));
         }
     }
@@ -59,13 +47,13 @@ pub fn utensil(s: &mut Sketch<'_>) {
     };
     let middle = |span| between(span, 0.3, 0.7);
     if d >= w && d >= h {
-        s.cuboid(x, y, between(z, 0.55, 1.0), tip);
+        s.cuboid_at(ALL, ALL, [0.55, 1.0], tip);
         s.cuboid(middle(x), middle(y), between(z, 0.0, 0.55), grip);
     } else if w >= h {
-        s.cuboid(between(x, 0.55, 1.0), y, z, tip);
+        s.cuboid_at([0.55, 1.0], ALL, ALL, tip);
         s.cuboid(between(x, 0.0, 0.55), middle(y), middle(z), grip);
     } else {
-        s.cuboid(x, between(y, 0.0, 0.45), z, tip);
+        s.cuboid_at(ALL, [0.0, 0.45], ALL, tip);
         s.cuboid(middle(x), between(y, 0.45, 1.0), middle(z), grip);
     }
 }

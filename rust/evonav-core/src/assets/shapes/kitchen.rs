@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::assets::shapes::{
     colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{Along, Motion, Sketch, Span, between, ends, inside},
+    sketch::{ALL, Along, Motion, Sketch, Span, between, ends, inside, piece},
 };
 
 /// Colour of the inside of open objects.
@@ -67,8 +67,7 @@ fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     };
     let count = ((run[1] - run[0]) / 0.6).round().clamp(1.0, 5.0) as usize;
     for i in 0..count {
-        let n = count as f64;
-        let span = inside(between(run, i as f64 / n, (i as f64 + 1.0) / n), 0.015);
+        let span = inside(piece(run, i, count), 0.015);
         match face {
             Face::Front(_) => s.cuboid(span, y, [z[1] - 0.015, z[1] - 0.005], door),
             Face::Left => s.cuboid([x[0] + 0.005, x[0] + 0.015], y, span, door),
@@ -116,16 +115,12 @@ pub fn microwave(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
     s.cuboid(x, y, [z[0], z[1] - 0.03], body);
+    let front = [z[1] - 0.03, z[1] - 0.015];
     let pivot_m = [x[0], 0.0, z[1] - 0.03];
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
-        s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], DARK);
+        s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), front, DARK);
     });
-    s.cuboid(
-        between(x, 0.77, 0.98),
-        between(y, 0.08, 0.92),
-        [z[1] - 0.03, z[1] - 0.015],
-        shade(body, 0.7),
-    );
+    s.cuboid(between(x, 0.77, 0.98), between(y, 0.08, 0.92), front, shade(body, 0.7));
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
         s.cuboid(between(x, 0.7, 0.73), between(y, 0.15, 0.85), [z[1] - 0.03, z[1]], STEEL);
     });
@@ -137,30 +132,21 @@ pub fn microwave(s: &mut Sketch<'_>) {
 
 /// Draw a coffee machine: back column, head, drip tray and pot.
 pub fn coffee_machine(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[DARK, [150, 40, 40], [180, 182, 185]], DARK));
-    s.cuboid(x, y, between(z, 0.0, 0.45), body);
-    s.cuboid(between(x, 0.05, 0.95), between(y, 0.72, 1.0), between(z, 0.45, 1.0), body);
-    s.cuboid(between(x, 0.0, 1.0), between(y, 0.0, 0.08), between(z, 0.45, 1.0), shade(body, 1.3));
-    s.column(
-        between(x, 0.28, 0.72),
-        between(y, 0.08, 0.5),
-        between(z, 0.5, 0.92),
-        0.8,
-        8,
-        [70, 50, 40],
-    );
+    s.cuboid_at(ALL, ALL, [0.0, 0.45], body);
+    s.cuboid_at([0.05, 0.95], [0.72, 1.0], [0.45, 1.0], body);
+    s.cuboid_at(ALL, [0.0, 0.08], [0.45, 1.0], shade(body, 1.3));
+    s.column_at([0.28, 0.72], [0.08, 0.5], [0.5, 0.92], 0.8, 8, [70, 50, 40]);
 }
 
 /// Draw a toaster: body, two slots and a lever.
 pub fn toaster(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[STEEL, [190, 60, 55], [235, 230, 220], DARK], STEEL));
-    s.cuboid(x, between(y, 0.0, 0.96), between(z, 0.0, 0.94), body);
-    for slot in [between(x, 0.2, 0.4), between(x, 0.6, 0.8)] {
-        s.cuboid(slot, between(y, 0.95, 1.0), between(z, 0.12, 0.82), DARK);
+    s.cuboid_at(ALL, [0.0, 0.96], [0.0, 0.94], body);
+    for slot in [[0.2, 0.4], [0.6, 0.8]] {
+        s.cuboid_at(slot, [0.95, 1.0], [0.12, 0.82], DARK);
     }
-    s.cuboid(between(x, 0.42, 0.58), between(y, 0.55, 0.65), between(z, 0.94, 1.0), DARK);
+    s.cuboid_at([0.42, 0.58], [0.55, 0.65], [0.94, 1.0], DARK);
 }
 
 /// Draw a pan: a shallow dish with a long handle along the box's longer side.
@@ -189,17 +175,16 @@ pub fn pot(s: &mut Sketch<'_>) {
     let metal = s.tint(0, s.choose(&[STEEL, [160, 60, 50], DARK], STEEL));
     let (long, body) = if d >= w { (z, w / d) } else { (x, d / w) };
     let middle = between(long, 0.5 - 0.5 * body.clamp(0.5, 1.0), 0.5 + 0.5 * body.clamp(0.5, 1.0));
-    let ear = [long, [0.0; 2]][0];
-    let y_ear = between(y, 0.55, 0.68);
+    let ears = [0.55, 0.68];
     s.detail("handle", 2);
     if d >= w {
         s.column(x, between(y, 0.0, 0.9), middle, 1.0, 12, metal);
-        s.cuboid(between(x, 0.35, 0.65), y_ear, ear, shade(metal, 0.5));
-        s.column(between(x, 0.4, 0.6), between(y, 0.9, 1.0), between(z, 0.45, 0.55), 1.0, 8, DARK);
+        s.cuboid_at([0.35, 0.65], ears, ALL, shade(metal, 0.5));
+        s.column_at([0.4, 0.6], [0.9, 1.0], [0.45, 0.55], 1.0, 8, DARK);
     } else {
         s.column(middle, between(y, 0.0, 0.9), z, 1.0, 12, metal);
-        s.cuboid(ear, y_ear, between(z, 0.35, 0.65), shade(metal, 0.5));
-        s.column(between(x, 0.45, 0.55), between(y, 0.9, 1.0), between(z, 0.4, 0.6), 1.0, 8, DARK);
+        s.cuboid_at(ALL, ears, [0.35, 0.65], shade(metal, 0.5));
+        s.column_at([0.45, 0.55], [0.9, 1.0], [0.4, 0.6], 1.0, 8, DARK);
     }
 }
 
@@ -207,9 +192,9 @@ pub fn pot(s: &mut Sketch<'_>) {
 pub fn kettle(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);
-    s.column(between(x, 0.05, 0.95), between(y, 0.0, 0.75), between(z, 0.12, 0.78), 0.7, 12, metal);
-    s.column(between(x, 0.3, 0.7), between(y, 0.75, 0.85), between(z, 0.3, 0.6), 0.6, 8, DARK);
-    s.cuboid(between(x, 0.45, 0.55), between(y, 0.92, 1.0), between(z, 0.1, 0.8), DARK);
+    s.column_at([0.05, 0.95], [0.0, 0.75], [0.12, 0.78], 0.7, 12, metal);
+    s.column_at([0.3, 0.7], [0.75, 0.85], [0.3, 0.6], 0.6, 8, DARK);
+    s.cuboid_at([0.45, 0.55], [0.92, 1.0], [0.1, 0.8], DARK);
     for end in ends(between(z, 0.1, 0.8), 0.015, 0.0) {
         s.cuboid(between(x, 0.45, 0.55), between(y, 0.6, 0.92), end, DARK);
     }

@@ -2,7 +2,7 @@
 
 use crate::assets::shapes::{
     colour::{DARK, FABRICS, STEEL, WOODS, shade},
-    sketch::{Sketch, Span, between, ends, inside},
+    sketch::{Sketch, between, ends, inside, piece},
 };
 
 /// Return the recorded height of the seat, or `otherwise`.
@@ -108,18 +108,13 @@ pub fn sofa(s: &mut Sketch<'_>) {
     s.detail("seat cushion", count);
     s.detail("armrest", 2);
     for i in 0..count {
-        let cushion = slot(inner, i, count);
+        let cushion = inside(piece(inner, i, count), 0.006);
         s.cuboid(cushion, [seat - pad, seat], [back[1], front], soft);
         if is_sofa {
             let lean = [back[1], back[1] + 0.12 * d];
             s.cuboid(inside(cushion, 0.01), [seat, seat + 0.75 * (h - seat)], lean, soft);
         }
     }
-}
-
-fn slot(span: Span, index: usize, count: usize) -> Span {
-    let n = count as f64;
-    inside(between(span, index as f64 / n, (index as f64 + 1.0) / n), 0.006)
 }
 
 /// Draw a padded block on feet.

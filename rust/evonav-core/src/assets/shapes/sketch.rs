@@ -14,6 +14,8 @@ use crate::{
 
 /// Start and end along one axis, metres.
 pub type Span = [f64; 2];
+/// The whole box along one axis, in fractions of it.
+pub const ALL: Span = [0.0, 1.0];
 
 /// Traits by which a drawn shape can be described.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -146,6 +148,35 @@ impl<'a> Sketch<'a> {
     pub fn choose<T: Copy>(&self, choices: &[T], otherwise: T) -> T {
         let index = colour::hash(&self.asset.id) as usize % choices.len().max(1);
         choices.get(index).copied().unwrap_or(otherwise)
+    }
+
+    /// Return the spans between fractions of the box's width, height and depth.
+    fn fractions(&self, x: Span, y: Span, z: Span) -> [Span; 3] {
+        let [width, height, depth] = self.spans();
+        [(width, x), (height, y), (depth, z)].map(|(span, [from, to])| between(span, from, to))
+    }
+
+    /// Draw a cuboid between fractions of the box's width, height and depth.
+    pub fn cuboid_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let [x, y, z] = self.fractions(x, y, z);
+        self.cuboid(x, y, z, colour);
+    }
+
+    /// Draw a [`Sketch::column`] between fractions of the box's width, height and depth.
+    pub fn column_at(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
+        self.round(Along::Y, taper, sides, self.fractions(x, y, z), colour);
+    }
+
+    /// Draw an ellipsoid between fractions of the box's width, height and depth.
+    pub fn ellipsoid_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let [x, y, z] = self.fractions(x, y, z);
+        self.ellipsoid(x, y, z, colour);
+    }
+
+    /// Draw a [`Sketch::blob`] between fractions of the box's width, height and depth.
+    pub fn blob_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let [x, y, z] = self.fractions(x, y, z);
+        self.blob(x, y, z, colour);
     }
 
     pub fn cuboid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
@@ -302,6 +333,12 @@ pub fn ends(span: Span, thick: f64, inset: f64) -> [Span; 2] {
 pub fn inside(span: Span, by: f64) -> Span {
     let by = by.min(0.49 * (span[1] - span[0]));
     [span[0] + by, span[1] - by]
+}
+
+/// Return piece `index` of `count` equal pieces of a span.
+pub fn piece(span: Span, index: usize, count: usize) -> Span {
+    let n = count as f64;
+    between(span, index as f64 / n, (index as f64 + 1.0) / n)
 }
 
 /// Return the part of a span between two fractions of it.

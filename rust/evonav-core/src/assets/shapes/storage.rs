@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::assets::shapes::{
     colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{Along, Motion, Sketch, Span, between, ends, inside},
+    sketch::{Along, Motion, Sketch, Span, between, ends, inside, piece},
 };
 
 /// Draw dressers, television stands and nightstands: open where objects were recorded inside, with
@@ -58,11 +58,8 @@ fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour:
     s.detail("drawer", columns * rows);
     for column in 0..columns {
         for row in 0..rows {
-            let part = |span, i: usize, n: usize| {
-                let n = n as f64;
-                inside(between(span, i as f64 / n, (i as f64 + 1.0) / n), 0.01)
-            };
-            let (x, y) = (part(x, column, columns), part(y, row, rows));
+            let x = inside(piece(x, column, columns), 0.01);
+            let y = inside(piece(y, row, rows), 0.01);
             let front = |s: &mut Sketch<'_>| {
                 s.cuboid(x, y, face, colour);
                 let grip = between(x, 0.4, 0.6);

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::assets::shapes::{
     colour::{CERAMIC, DARK, STEEL, shade},
-    sketch::{Along, Motion, Sketch, between, ends, inside},
+    sketch::{ALL, Along, Motion, Sketch, between, ends, inside},
 };
 
 /// Draw an open bin: four sides (or a round wall where the box is square) and a dark inside.
@@ -16,15 +16,8 @@ pub fn bin(s: &mut Sketch<'_>) {
     let floor = s.levels().first().copied().unwrap_or(0.04 * h).min(0.6 * h);
     if (w - d).abs() < 0.02 {
         s.form("round");
-        s.column(x, between(y, 0.0, 0.97), z, 1.12, 12, plastic);
-        s.column(
-            between(x, 0.06, 0.94),
-            between(y, 0.97, 1.0),
-            between(z, 0.06, 0.94),
-            1.0,
-            12,
-            shade(plastic, 0.5),
-        );
+        s.column_at(ALL, [0.0, 0.97], ALL, 1.12, 12, plastic);
+        s.column_at([0.06, 0.94], [0.97, 1.0], [0.06, 0.94], 1.0, 12, shade(plastic, 0.5));
         return;
     }
     let wall = 0.06 * w.min(d);
@@ -39,17 +32,9 @@ pub fn bin(s: &mut Sketch<'_>) {
 
 /// Draw a full bag with a knot.
 pub fn bag(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let plastic = s.tint(0, [40, 42, 46]);
-    s.ellipsoid(x, between(y, 0.0, 0.85), z, plastic);
-    s.column(
-        between(x, 0.4, 0.6),
-        between(y, 0.78, 1.0),
-        between(z, 0.4, 0.6),
-        1.6,
-        6,
-        shade(plastic, 1.4),
-    );
+    s.ellipsoid_at(ALL, [0.0, 0.85], ALL, plastic);
+    s.column_at([0.4, 0.6], [0.78, 1.0], [0.4, 0.6], 1.6, 6, shade(plastic, 1.4));
 }
 
 /// Draw an open cardboard box, with two flaps if its openness is known.
@@ -74,28 +59,26 @@ pub fn open_box(s: &mut Sketch<'_>) {
 
 /// Draw a bottle: body, shoulder, neck and cap.
 pub fn bottle(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let glasses = [[60, 100, 70], [190, 205, 215], [120, 70, 45], [210, 160, 90], [130, 160, 190]];
     let glass = s.tint(0, s.choose(&glasses, glasses[0]));
     let is_pump = matches!(s.asset().category.as_str(), "SoapBottle" | "SprayBottle");
-    s.column(x, between(y, 0.0, 0.58), z, 1.0, 10, glass);
-    s.column(x, between(y, 0.58, 0.74), z, 0.4, 10, glass);
-    s.column(between(x, 0.32, 0.68), between(y, 0.74, 0.9), between(z, 0.32, 0.68), 1.0, 8, glass);
+    s.column_at(ALL, [0.0, 0.58], ALL, 1.0, 10, glass);
+    s.column_at(ALL, [0.58, 0.74], ALL, 0.4, 10, glass);
+    s.column_at([0.32, 0.68], [0.74, 0.9], [0.32, 0.68], 1.0, 8, glass);
     let cap = if is_pump { [230, 230, 230] } else { shade(glass, 0.5) };
-    s.column(between(x, 0.28, 0.72), between(y, 0.9, 1.0), between(z, 0.28, 0.72), 1.0, 8, cap);
+    s.column_at([0.28, 0.72], [0.9, 1.0], [0.28, 0.72], 1.0, 8, cap);
     if is_pump {
         s.detail("pump", 1);
-        s.cuboid(between(x, 0.42, 0.58), between(y, 0.94, 1.0), between(z, 0.5, 1.0), cap);
+        s.cuboid_at([0.42, 0.58], [0.94, 1.0], [0.5, 1.0], cap);
     }
 }
 
 /// Draw a shaker: a body and a perforated cap.
 pub fn shaker(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let is_salt = s.asset().category == "SaltShaker";
     let body = if is_salt { [235, 235, 230] } else { [70, 55, 50] };
-    s.column(x, between(y, 0.0, 0.78), z, 0.85, 8, s.tint(0, body));
-    s.column(between(x, 0.1, 0.9), between(y, 0.78, 1.0), between(z, 0.1, 0.9), 0.7, 8, STEEL);
+    s.column_at(ALL, [0.0, 0.78], ALL, 0.85, 8, s.tint(0, body));
+    s.column_at([0.1, 0.9], [0.78, 1.0], [0.1, 0.9], 0.7, 8, STEEL);
 }
 
 /// Draw a cup with dark content, and a handle if the box is longer in one direction.
@@ -124,63 +107,31 @@ pub fn mug(s: &mut Sketch<'_>) {
 
 /// Draw a bowl: a wide cone standing on its narrow end.
 pub fn bowl(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [150, 180, 190], [200, 150, 110]], CERAMIC));
-    s.column(x, between(y, 0.0, 0.96), z, 2.0, 12, glaze);
-    s.column(
-        between(x, 0.06, 0.94),
-        between(y, 0.96, 1.0),
-        between(z, 0.06, 0.94),
-        1.0,
-        12,
-        shade(glaze, 0.75),
-    );
+    s.column_at(ALL, [0.0, 0.96], ALL, 2.0, 12, glaze);
+    s.column_at([0.06, 0.94], [0.96, 1.0], [0.06, 0.94], 1.0, 12, shade(glaze, 0.75));
 }
 
 /// Draw a plate: a flat disc with a rim.
 pub fn plate(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [190, 205, 215], [225, 205, 180]], CERAMIC));
-    s.column(x, between(y, 0.0, 0.9), z, 1.5, 12, glaze);
-    s.column(
-        between(x, 0.15, 0.85),
-        between(y, 0.9, 1.0),
-        between(z, 0.15, 0.85),
-        1.0,
-        12,
-        shade(glaze, 0.88),
-    );
+    s.column_at(ALL, [0.0, 0.9], ALL, 1.5, 12, glaze);
+    s.column_at([0.15, 0.85], [0.9, 1.0], [0.15, 0.85], 1.0, 12, shade(glaze, 0.88));
 }
 
 /// Draw a vase: foot, belly and neck.
 pub fn vase(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
     let glazes = [[110, 150, 165], [190, 120, 90], [220, 215, 205], [90, 80, 110], [70, 70, 72]];
     let glaze = s.tint(0, s.choose(&glazes, glazes[0]));
-    s.column(x, between(y, 0.0, 0.45), z, 1.7, 10, glaze);
-    s.column(x, between(y, 0.45, 0.82), z, 0.45, 10, glaze);
-    s.column(
-        between(x, 0.22, 0.78),
-        between(y, 0.82, 1.0),
-        between(z, 0.22, 0.78),
-        1.3,
-        10,
-        shade(glaze, 1.1),
-    );
+    s.column_at(ALL, [0.0, 0.45], ALL, 1.7, 10, glaze);
+    s.column_at(ALL, [0.45, 0.82], ALL, 0.45, 10, glaze);
+    s.column_at([0.22, 0.78], [0.82, 1.0], [0.22, 0.78], 1.3, 10, shade(glaze, 1.1));
 }
 
 /// Draw a box with a tissue standing out.
 pub fn tissue_box(s: &mut Sketch<'_>) {
-    let [x, y, z] = s.spans();
-    s.cuboid(x, between(y, 0.0, 0.7), z, s.tint(0, [140, 170, 190]));
-    s.column(
-        between(x, 0.35, 0.65),
-        between(y, 0.7, 1.0),
-        between(z, 0.35, 0.65),
-        0.3,
-        6,
-        [245, 245, 245],
-    );
+    s.cuboid_at(ALL, [0.0, 0.7], ALL, s.tint(0, [140, 170, 190]));
+    s.column_at([0.35, 0.65], [0.7, 1.0], [0.35, 0.65], 0.3, 6, [245, 245, 245]);
 }
 
 /// Draw a roll along its longest side, with its core.

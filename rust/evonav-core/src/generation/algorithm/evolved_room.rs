@@ -1,9 +1,11 @@
 //! Sample the room that evolves between two stages (paper, Sec. 3.2).
 
+use serde::Serialize;
+
 use crate::{generation::Parameters, rng::Stream};
 
 /// The factors of a room's weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct RoomHistory {
     /// Number of objects in the room, children included.
     pub num_assets: usize,

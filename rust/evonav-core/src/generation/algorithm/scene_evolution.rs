@@ -10,9 +10,7 @@ use crate::{
         record::{EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord},
         sample_evolved_room,
         stage::{
-            changes::{changes_of, no_evolution},
-            generation_state::State,
-            generator::Generator,
+            changes::changes_of, generation_state::State, generator::Generator,
             stage_world::StageWorld,
         },
     },
@@ -29,7 +27,10 @@ pub(crate) fn sample_scene_evolution(
     let parameters = generator.parameters;
     let is_drawn = || generator.stream(stage, "trigger").uniform() < parameters.evolve_probability;
     if !generator.overrides.is_evolved(stage).unwrap_or_else(is_drawn) {
-        return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
+        return Ok((
+            EvolutionRecord::unchanged(EvolutionOutcome::NotTriggered),
+            HouseDelta::default(),
+        ));
     }
     let house = &world.house;
     let window = state.changed.len().saturating_sub(parameters.changed_room_window);
@@ -43,15 +44,12 @@ pub(crate) fn sample_scene_evolution(
         .collect();
     let (room, weights) =
         sample_evolved_room(&rooms, parameters, &mut generator.stream(stage, "room"));
-    let weighed = |((room, history), weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
+    let weighed = |((room, &history), &weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
         room_id: house.rooms[room].id.clone(),
-        num_assets: history.num_assets,
-        is_visited: history.is_visited,
-        is_transition_room: history.is_transition_room,
-        was_changed_recently: history.was_changed_recently,
-        weight: *weight,
+        history,
+        weight,
     };
-    let mut record = no_evolution(EvolutionOutcome::NoRoom);
+    let mut record = EvolutionRecord::unchanged(EvolutionOutcome::NoRoom);
     record.room_weights = rooms.iter().enumerate().zip(&weights).map(weighed).collect();
     let Some(room) = room else { return Ok((record, HouseDelta::default())) };
     record.room_id = Some(house.rooms[room].id.clone());

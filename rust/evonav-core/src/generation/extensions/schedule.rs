@@ -14,7 +14,7 @@ use crate::{
         },
         record::{ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord},
         stage::{
-            changes::{changes_of, no_evolution},
+            changes::changes_of,
             stage_world::{Access, StageWorld},
         },
     },
@@ -132,7 +132,7 @@ impl Transition<'_> {
         let house = &world.house;
         let layout = world.layout.clone();
         let mut work = HouseInUse { transition: self, world, layout, causes: BTreeMap::new() };
-        let mut record = no_evolution(EvolutionOutcome::NotTriggered);
+        let mut record = EvolutionRecord::unchanged(EvolutionOutcome::NotTriggered);
         let task_stream = |name: &str| self.generator.stream(0, &format!("schedule {name}"));
         for event in household.events(self.stage, task_stream) {
             let ScheduleEvent { minute, is_begin, person, habit, start_min, end_min } = event;
@@ -364,12 +364,9 @@ impl HouseInUse<'_, '_> {
             Ok(Some(world.access(layout, &reachable, parameters)))
         };
         let (then, now) = (access(&world.layout)?, access(&self.layout)?);
-        let covers = |now: &[bool], then: &[bool]| now.iter().zip(then).all(|(n, t)| *n || !*t);
-        Ok(then.zip(now).is_some_and(|(then, now)| {
-            // Objects that are carried to another room need not be reachable: that is checked for
-            // goals.
-            covers(&now.rooms, &then.rooms)
-        }))
+        // Objects that are carried to another room need not be reachable: that is checked for
+        // goals.
+        Ok(then.zip(now).is_some_and(|(then, now)| now.includes_rooms(&then)))
     }
 }
 

@@ -51,12 +51,11 @@ impl Transition<'_> {
             Ok(world.access(&world.layout, &reachable, parameters))
         };
         let (then, now) = (reached(before)?, reached(after)?);
-        let rooms = then.rooms.iter().zip(&now.rooms).all(|(then, now)| *now || !*then);
         let objects = then.objects.iter().enumerate().filter(|(_, was_reached)| **was_reached);
         let is_reached = |(index, _): (usize, &bool)| {
             let index = after.house.object_index(&before.house.objects[index].id);
             index.is_none_or(|index| now.objects[index])
         };
-        Ok(rooms && objects.into_iter().all(is_reached))
+        Ok(now.includes_rooms(&then) && objects.into_iter().all(is_reached))
     }
 }

@@ -136,7 +136,7 @@ fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     names
 }
 
-/// AssetFind groups by the arrangement of furniture: the largest group of each main piece.
+/// Find groups by the arrangement of furniture: the largest group of each main piece.
 fn standing(
     layout: &Layout,
     catalogue: &Catalogue,

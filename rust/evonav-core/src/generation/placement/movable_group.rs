@@ -3,7 +3,7 @@
 use crate::{
     assets::placement_rule::Place,
     generation::placement::room_outline::{AT_WALL_M, RoomOutline},
-    geometry::{Vec2, Vec3, add, rotate, sub, yaw_rotation},
+    geometry::{Vec2, Vec3, add, bounds_2d_m, rotate, sub, yaw_rotation},
     world::{
         footprint::Footprint,
         layout::{
@@ -146,18 +146,13 @@ impl MovableGroup {
     /// Compute the box for the present frame.
     fn measure(&mut self) {
         let into_frame = yaw_rotation(-self.yaw_deg.to_radians());
-        self.min_m = [f64::INFINITY; 2];
-        self.max_m = [f64::NEG_INFINITY; 2];
-        for solid in self.members.iter().filter(|m| m.is_root).flat_map(|m| &m.solids) {
-            for p in &solid.outline_m {
-                let offset = [p[0] - self.pivot_m[0], 0.0, p[1] - self.pivot_m[2]];
-                let local = rotate(&into_frame, offset);
-                for (axis, value) in [local[0], local[2]].into_iter().enumerate() {
-                    self.min_m[axis] = self.min_m[axis].min(value);
-                    self.max_m[axis] = self.max_m[axis].max(value);
-                }
-            }
-        }
+        let solids = self.members.iter().filter(|m| m.is_root).flat_map(|m| &m.solids);
+        let corners = solids.flat_map(|solid| &solid.outline_m).map(|p| {
+            let offset = [p[0] - self.pivot_m[0], 0.0, p[1] - self.pivot_m[2]];
+            let [x, _, z] = rotate(&into_frame, offset);
+            [x, z]
+        });
+        [self.min_m, self.max_m] = bounds_2d_m(corners);
     }
 
     /// Return the distance of the middle of the back from the nearest wall.

@@ -7,7 +7,7 @@ use crate::{
         movable_group::{FramePose, MovableGroup, Rules},
         room_outline::{RoomOutline, WALL_GAP_M},
     },
-    geometry::{Vec2, distance_2d_m, outline::is_within, polygon_contains},
+    geometry::{Vec2, bounds_2d_m, distance_2d_m, outline::is_within, polygon_contains},
     rng::Stream,
     world::{
         footprint::convex_hull,
@@ -131,12 +131,8 @@ impl PlaceSearch<'_> {
     /// Draw a random pose away from the walls, square to the room's first edge.
     fn sample_middle(&self, stream: &mut Stream) -> Option<FramePose> {
         let polygon_m = &self.outline.polygon_m;
-        let point_m = [0, 1].map(|axis| {
-            let values = polygon_m.iter().map(|p| p[axis]);
-            let low = values.clone().fold(f64::INFINITY, f64::min);
-            let high = values.fold(f64::NEG_INFINITY, f64::max);
-            low + stream.uniform() * (high - low)
-        });
+        let [low, high] = bounds_2d_m(polygon_m.iter().copied());
+        let point_m = [0, 1].map(|axis| low[axis] + stream.uniform() * (high[axis] - low[axis]));
         let along = self.outline.edge(0).along;
         let yaw_deg = along[0].atan2(along[1]).to_degrees() + 90.0 * stream.below(4) as f64;
         let pose = FramePose { point_m, yaw_deg, anchor: Place::Middle };

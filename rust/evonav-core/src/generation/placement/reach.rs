@@ -41,7 +41,7 @@ struct Access {
 }
 
 impl Reach {
-    /// Return the find what `layout` lets an agent reach from `start_m`.
+    /// Find what `layout` lets an agent reach from `start_m`.
     ///
     /// # Arguments
     /// * `navigation` - built from the layout's scene.
@@ -80,7 +80,7 @@ impl Reach {
         Some(reach)
     }
 
-    /// Return the take in that objects have moved, and check that all that could be reached still
+    /// Take in that objects have moved, and check that all that could be reached still
     /// can.
     ///
     /// Where it cannot, the objects must be put back and taken in again.
@@ -92,7 +92,7 @@ impl Reach {
         self.access(layout).includes(&self.before)
     }
 
-    /// Return the take in that objects have moved; false if the geometry of one is not finite.
+    /// Take in that objects have moved; return false if the geometry of one is not finite.
     pub fn take_in(&mut self, layout: &Layout, moved: impl Iterator<Item = usize>) -> bool {
         for index in moved {
             let Some(body) = layout.scene.bodies.get(layout.scene.first_object + index) else {
@@ -106,7 +106,7 @@ impl Reach {
         true
     }
 
-    /// Return the find the points that can be reached.
+    /// Find the points that can be reached.
     fn flood(&mut self) {
         self.is_reached.fill(false);
         let mut queue = std::mem::take(&mut self.queue);
@@ -155,7 +155,7 @@ impl Reach {
         })
     }
 
-    /// Return the find the ways through rooms, between the rooms next to them.
+    /// Return the ways through rooms, between the rooms next to them.
     fn ways(&self) -> Vec<[u32; 3]> {
         let room = &self.grid.room;
         // Parts of rooms: the reached points that steps within a room connect.

@@ -142,7 +142,7 @@ impl StepGrid {
         (0..self.room.len()).filter(is_near).map(|point| point as u32).collect()
     }
 
-    /// Return the find what a body blocks; `None` if its geometry is not finite.
+    /// Return what a body blocks; `None` if its geometry is not finite.
     pub fn blocked_by(&self, body: &Body) -> Option<Blocked> {
         let mut blocked = Blocked::default();
         if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
@@ -202,7 +202,7 @@ impl StepGrid {
         }
     }
 
-    /// Return the count what a body blocks once more, or once less if `is_added` is false.
+    /// Count what a body blocks once more, or once less if `is_added` is false.
     pub fn count(&mut self, blocked: &Blocked, is_added: bool) {
         let change = |count: &mut u16| {
             *count = if is_added { count.saturating_add(1) } else { count.saturating_sub(1) };

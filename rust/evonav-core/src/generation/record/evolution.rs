@@ -3,16 +3,16 @@
 use serde::Serialize;
 
 use crate::{
-    generation::Mode,
+    generation::{Mode, RoomHistory},
     geometry::Vec3,
-    house::{AddedObject, HouseDelta, ObjectMove, StateChange},
 };
 
 /// The outcome of a transition.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EvolutionOutcome {
     /// There is no transition before stage 1.
+    #[default]
     FirstStage,
     /// The draw decided against an evolution.
     NotTriggered,
@@ -25,7 +25,7 @@ pub enum EvolutionOutcome {
 }
 
 /// ΔH_k, with the weights from which it was drawn.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct EvolutionRecord {
     /// Outcome of the transition.
     pub outcome: EvolutionOutcome,
@@ -63,32 +63,9 @@ pub struct EvolutionRecord {
 }
 
 impl EvolutionRecord {
-    /// Return the delta to be applied to the house of the previous stage.
-    pub fn delta(&self) -> HouseDelta {
-        let moves = self.changes.iter().map(|change| ObjectMove {
-            id: change.id.clone(),
-            position_m: change.to_position_m,
-            rotation_deg: change.to_rotation_deg,
-            parent: change.to_support_id.clone(),
-        });
-        let added = self.additions.iter().map(|object| AddedObject {
-            id: object.id.clone(),
-            asset_id: object.asset_id.clone(),
-            position_m: object.position_m,
-            rotation_deg: object.rotation_deg,
-            parent: object.support_id.clone(),
-        });
-        let states = self.states.iter().map(|change| StateChange {
-            id: change.id.clone(),
-            openness: (change.field == "openness").then_some(change.after),
-            is_on: (change.field == "isOn").then_some(change.after > 0.0),
-        });
-        HouseDelta {
-            moves: moves.collect(),
-            removed: self.removals.iter().map(|object| object.id.clone()).collect(),
-            added: added.collect(),
-            states: states.collect(),
-        }
+    /// Create the record of a transition without change.
+    pub(crate) fn unchanged(outcome: EvolutionOutcome) -> Self {
+        Self { outcome, ..Self::default() }
     }
 }
 
@@ -109,14 +86,9 @@ pub enum ModificationFailure {
 pub struct RoomWeightRecord {
     /// Id of the room.
     pub room_id: String,
-    /// Number of objects in it.
-    pub num_assets: usize,
-    /// Whether the reference trajectory has been in it.
-    pub is_visited: bool,
-    /// Whether the reference trajectory ends in it.
-    pub is_transition_room: bool,
-    /// Whether it changed within the window.
-    pub was_changed_recently: bool,
+    /// Factors of the weight.
+    #[serde(flatten)]
+    pub history: RoomHistory,
     /// Product of the factors, not normalised.
     pub weight: f64,
 }

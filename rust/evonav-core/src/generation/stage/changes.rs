@@ -1,10 +1,6 @@
 //! Differences between a house and a layout of it.
 
-use crate::{
-    generation::record::{ChangeRecord, EvolutionOutcome, EvolutionRecord},
-    house::House,
-    world::layout::Layout,
-};
+use crate::{generation::record::ChangeRecord, house::House, world::layout::Layout};
 
 /// List the objects whose pose or support differs between house and layout.
 pub(crate) fn changes_of(
@@ -41,26 +37,4 @@ pub(crate) fn changes_of(
             }
         })
         .collect()
-}
-
-/// Create the record of a transition without change.
-pub(crate) fn no_evolution(outcome: EvolutionOutcome) -> EvolutionRecord {
-    EvolutionRecord {
-        outcome,
-        mode: None,
-        room_id: None,
-        salient_id: None,
-        room_weights: vec![],
-        failure: None,
-        changes: vec![],
-        unmoved_ids: vec![],
-        blocking_ids: vec![],
-        crowded_ids: vec![],
-        rearranged_ids: vec![],
-        additions: vec![],
-        removals: vec![],
-        states: vec![],
-        clock_min: None,
-        activities: vec![],
-    }
 }

@@ -52,6 +52,13 @@ pub struct Access {
     pub objects: Vec<bool>,
 }
 
+impl Access {
+    /// Return whether all rooms that could be reached before still can.
+    pub fn includes_rooms(&self, before: &Self) -> bool {
+        before.rooms.iter().zip(&self.rooms).all(|(then, now)| *now || !*then)
+    }
+}
+
 /// The reference view of a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {

@@ -46,10 +46,18 @@ impl Frontiers {
     }
 
     /// Update the frontiers for the present map. A frontier whose region has hardly changed keeps
-    /// its id, position and direction.
+    /// its id, position and direction. New ones come in the order of their regions' first cells
+    /// (row-major; the parts of a split region by angle).
+    ///
+    /// # Arguments
+    /// * `agent_m` - position of the agent, `[x, z]`; frontiers lie on the free floor connected to
+    ///   it.
     ///
     /// # Errors
-    /// As [`extract`].
+    /// [`Error::InvalidArgument`] if a number is not finite or outside its domain.
+    ///
+    /// # Complexity
+    /// O(cells / 64) for the map, O(cells of the regions) for the rest.
     pub fn update(
         &mut self,
         map: &OccupancyMap,
@@ -105,29 +113,6 @@ impl Frontiers {
     }
 }
 
-/// Find the frontiers of a map without a history.
-///
-/// # Arguments
-/// * `agent_m` - position of the agent, `[x, z]`; frontiers lie on the free floor connected to it.
-///
-/// # Returns
-/// Frontiers in the order of their regions' first cells (row-major; the parts of a split region by
-/// angle), with ids from 0.
-///
-/// # Errors
-/// [`Error::InvalidArgument`] if a number is not finite or outside its domain.
-///
-/// # Complexity
-/// O(cells / 64) for the map, O(cells of the regions) for the rest.
-pub fn extract(
-    map: &OccupancyMap,
-    agent_m: Vec2,
-    config: &FrontierConfig,
-) -> Result<Vec<Frontier>, Error> {
-    let mut frontiers = Frontiers::default();
-    frontiers.update(map, agent_m, config)?;
-    Ok(frontiers.list)
-}
 /// Compare old frontiers with regions: return the frontiers that stay, and the regions that become
 /// new ones.
 fn reconcile(

@@ -6,4 +6,4 @@ mod regions;
 mod viewpoints;
 
 pub use frontier::{Frontier, FrontierConfig};
-pub use frontier_set::{Frontiers, extract};
+pub use frontier_set::Frontiers;

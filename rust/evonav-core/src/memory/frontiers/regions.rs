@@ -7,7 +7,7 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::{
         bits::BitGrid,
-        components::{Components, Run},
+        components::{Components, Run, take_groups},
     },
     memory::{frontiers::FrontierConfig, occupancy::OccupancyMap},
 };
@@ -28,9 +28,7 @@ pub(crate) fn find_regions(
     config: &FrontierConfig,
 ) -> Result<Found, Error> {
     config.check()?;
-    for value in agent_m {
-        Error::require("agent_m", value, "finite", f64::is_finite)?;
-    }
+    Error::require_finite("agent_m", &agent_m)?;
     let island = island(map, agent_m, seeds);
     let (mut inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
     given_up.into_iter().flat_map(BitGrid::cells).for_each(|[row, col]| inner.remove(row, col));
@@ -51,8 +49,12 @@ pub(crate) fn find_regions(
         return Ok(Found { regions, edges, is_last_resort: false });
     }
     let (unknown, edges) = borders(map, &island, given_up);
-    let mut regions = groups(unknown);
-    regions.retain(|cells| cells.len() >= config.min_border_cells);
+    let groups = take_groups(unknown).into_iter();
+    let regions = groups.filter(|cells| cells.len() >= config.min_border_cells).map(|mut cells| {
+        cells.sort_unstable();
+        cells.into_iter().map(|cell| cell.map(|i| i as i32)).collect()
+    });
+    let regions = regions.collect();
     Ok(Found { regions, edges, is_last_resort: true })
 }
 
@@ -77,38 +79,6 @@ fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> 
         }
     }
     (unknown, edges)
-}
-
-/// Group cells with their 8 neighbours; groups are in the order of their first cells, each
-/// row-major.
-fn groups(mut cells: BitGrid) -> Vec<Vec<[i32; 2]>> {
-    let mut groups = Vec::new();
-    for row in 0..cells.rows() {
-        for col in 0..cells.cols() {
-            let mut stack = Vec::new();
-            if cells.get(row, col) {
-                cells.remove(row, col);
-                stack.push([row, col]);
-            }
-            let mut group = Vec::new();
-            while let Some([row, col]) = stack.pop() {
-                group.push([row as i32, col as i32]);
-                for next_row in row.saturating_sub(1)..=row + 1 {
-                    for next_col in col.saturating_sub(1)..=col + 1 {
-                        if cells.get(next_row, next_col) {
-                            cells.remove(next_row, next_col);
-                            stack.push([next_row, next_col]);
-                        }
-                    }
-                }
-            }
-            group.sort_unstable();
-            if !group.is_empty() {
-                groups.push(group);
-            }
-        }
-    }
-    groups
 }
 
 /// Return the free cells connected (4 neighbours) to the agent, or to the free cell nearest to it,

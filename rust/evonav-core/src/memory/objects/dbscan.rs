@@ -3,6 +3,7 @@
 use std::{borrow::Cow, sync::LazyLock};
 
 use crate::{
+    grid::components::find,
     memory::objects::voxels::{Voxel, VoxelIndex, voxel_of},
     sensors::unproject::Point,
 };
@@ -181,7 +182,7 @@ impl<'a> Grid<'a> {
             let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
                 return false;
             };
-            let (a, b) = (root(parents, cell as u32), root(parents, other as u32));
+            let (a, b) = (find(parents, cell as u32), find(parents, other as u32));
             let is_joined = a != b && cores(cell).any(|a| cores(other).any(|b| self.is_near(a, b)));
             if is_joined {
                 parents[a.max(b) as usize] = a.min(b);
@@ -199,7 +200,7 @@ impl<'a> Grid<'a> {
         if num_parts > 1 {
             self.join_rest(&mut parents, &has_core, join);
         }
-        (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
+        (0..self.num_cells() as u32).map(|cell| find(&mut parents, cell)).collect()
     }
 
     /// Join the parts that touching cells leave separate. It is enough to start from cells outside
@@ -212,10 +213,10 @@ impl<'a> Grid<'a> {
     ) {
         let with_core = || (0..self.num_cells()).filter(|&cell| has_core[cell]);
         let mut sizes = vec![0_usize; self.num_cells()];
-        with_core().for_each(|cell| sizes[root(parents, cell as u32) as usize] += 1);
+        with_core().for_each(|cell| sizes[find(parents, cell as u32) as usize] += 1);
         let largest = (0..sizes.len()).max_by_key(|&cell| sizes[cell]);
         let mut left: Vec<usize> = with_core().collect();
-        left.retain(|&cell| Some(root(parents, cell as u32) as usize) != largest);
+        left.retain(|&cell| Some(find(parents, cell as u32) as usize) != largest);
         for &step in &self.half_steps[NUM_TOUCHING..] {
             for &cell in &left {
                 join(parents, cell, step);
@@ -250,16 +251,6 @@ impl<'a> Grid<'a> {
         let cores = near.filter(|&i| is_core[i as usize] && self.is_near(border as u32, i));
         cores.map(|core| labels[core as usize]).min().unwrap_or(NOISE)
     }
-}
-
-/// Return the representative of a cell, and shorten the path to it.
-fn root(parents: &mut [u32], mut cell: u32) -> u32 {
-    while parents[cell as usize] != cell {
-        let parent = parents[cell as usize];
-        parents[cell as usize] = parents[parent as usize];
-        cell = parent;
-    }
-    cell
 }
 
 /// Largest number of steps along an axis to cells that may contain neighbours.

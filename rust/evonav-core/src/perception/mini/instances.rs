@@ -2,6 +2,7 @@
 
 use crate::{
     Error,
+    grid::components::find,
     perception::mini::{
         convolution::Tensor,
         network::{SIDE_CELLS, samples},
@@ -54,7 +55,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
         .zip(&is_object)
         .map(|(cell, &is_object)| if is_object { shares(&cell[..=num_classes]) } else { vec![] })
         .collect();
-    let mut forest = Forest::new(cells.len());
+    let mut parents: Vec<u32> = (0..cells.len() as u32).collect();
     for (place, cell) in cells.iter().enumerate().filter(|(place, _)| is_object[*place]) {
         let right = (place % width + 1 < width).then_some(place + 1);
         let links = [(right, cell[num_classes + 1]), (Some(place + width), cell[num_classes + 2])];
@@ -63,7 +64,8 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
                 && link > MIN_LINK
                 && agree(&shares[place], &shares[other])
             {
-                forest.join(place, other);
+                let [a, b] = [place, other].map(|cell| find(&mut parents, cell as u32));
+                parents[a.max(b) as usize] = a.min(b);
             }
         }
     }
@@ -72,7 +74,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
     let mut votes: Vec<(usize, Vec<f32>)> = Vec::new();
     let mut found = vec![usize::MAX; cells.len()];
     for place in (0..cells.len()).filter(|&place| is_object[place]) {
-        let root = forest.root(place);
+        let root = find(&mut parents, place as u32) as usize;
         if number_of[root] == usize::MAX {
             number_of[root] = votes.len();
             votes.push((0, vec![0.0; num_classes]));
@@ -126,28 +128,6 @@ fn largest(values: &[f32]) -> usize {
         }
     }
     best
-}
-
-/// Disjoint sets that can be joined; the smallest member represents a set.
-struct Forest(Vec<usize>);
-
-impl Forest {
-    fn new(len: usize) -> Self {
-        Self((0..len).collect())
-    }
-
-    fn root(&mut self, mut place: usize) -> usize {
-        while self.0[place] != place {
-            self.0[place] = self.0[self.0[place]];
-            place = self.0[place];
-        }
-        place
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b);
-    }
 }
 
 /// Weights of the differences between a pixel and a cell.

@@ -1,4 +1,4 @@
-//! FloorPatch that stays free of furniture: in front of doors, along open-plan borders, and around
+//! Floor that stays free of furniture: in front of doors, along open-plan borders, and around
 //! furniture.
 //!
 //! The lengths are those of the package `procthor` (`constants.MARGIN`, `doors.py`); 1,115 recorded

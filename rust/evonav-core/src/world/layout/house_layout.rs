@@ -3,7 +3,9 @@
 use crate::{
     Error,
     assets::{Catalogue, UnknownAssets, placement_rule::Place, shapes::shape_in},
-    geometry::{Aabb, add, euler_rotation_deg, outline::overlap_m, rotate, sub, yaw_rotation},
+    geometry::{
+        Aabb, add, bounds_2d_m, euler_rotation_deg, outline::overlap_m, rotate, sub, yaw_rotation,
+    },
     house::{House, HouseDelta, ObjectMove},
     world::{
         footprint::{Footprint, footprint},
@@ -185,11 +187,9 @@ impl Layout {
 
     fn is_off_passages(&self, solids: &[Footprint], bounds: &Aabb) -> bool {
         self.passages.iter().all(|floor| {
+            let [low, high] = bounds_2d_m(*floor);
             let is_beside = [0, 1].iter().any(|&axis| {
-                let values = floor.iter().map(|corner| corner[axis]);
-                let low = values.clone().fold(f64::INFINITY, f64::min);
-                let high = values.fold(f64::NEG_INFINITY, f64::max);
-                bounds.max_m[2 * axis] < low || high < bounds.min_m[2 * axis]
+                bounds.max_m[2 * axis] < low[axis] || high[axis] < bounds.min_m[2 * axis]
             });
             is_beside || !solids.iter().any(|s| overlap_m(&s.outline_m, floor) > TOUCH_M)
         })

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::{
     Error,
     assets::{Catalogue, UnknownAssets},
-    geometry::{Vec2, polygon_area_m2, polygon_contains},
+    geometry::{Vec2, bounds_2d_m, polygon_area_m2, polygon_contains},
     house::{House, HouseDelta},
     rng::Stream,
     world::{
@@ -195,14 +195,9 @@ fn sample_floor_place(
     stream: &mut Stream,
 ) -> Option<Placement> {
     let polygon_m = &house.rooms[room].polygon_m;
-    let range = |axis: usize| {
-        let values = polygon_m.iter().map(|corner| corner[axis]);
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
-    };
-    let [x, z] = [0, 1].map(|axis| {
-        let [low, high] = range(axis);
-        round_to(low + stream.uniform() * (high - low), ROUND_M)
-    });
+    let [low, high] = bounds_2d_m(polygon_m.iter().copied());
+    let [x, z] = [0, 1]
+        .map(|axis| round_to(low[axis] + stream.uniform() * (high[axis] - low[axis]), ROUND_M));
     let item = &layout.items[index];
     let [x_deg, _, z_deg] = item.placement.rotation_deg;
     let rise_m = item.rise_m();

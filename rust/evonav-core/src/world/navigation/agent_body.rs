@@ -12,11 +12,6 @@ pub struct AgentBody {
 impl AgentBody {
     /// AI2-THOR's default agent (`PhysicsRemoteFPSAgentController`: radius 0.2, height 1.8).
     pub const DEFAULT: Self = Self { radius_m: 0.2, height_m: 1.8 };
-    /// AI2-THOR's LoCoBot (agent mode "locobot": radius 0.175, height 0.9).
-    pub const LOCOBOT: Self = Self { radius_m: 0.175, height_m: 0.9 };
-
-    /// AI2-THOR's Stretch (agent mode "stretch": radius 0.185, height 1.436).
-    pub const STRETCH: Self = Self { radius_m: 0.185_462_8, height_m: 1.435_714 };
 
     /// Return the largest radius of the capsule between two heights above the floor, 0 outside it.
     pub fn radius_between_m(&self, bottom_m: f64, top_m: f64) -> f64 {

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use crate::{
     Error,
-    geometry::{Vec2, distance_2d_m},
+    geometry::{Vec2, bounds_2d_m, distance_2d_m},
     grid::{GridSpec, MAX_CELLS},
     world::{
         footprint::footprint,
@@ -90,7 +90,7 @@ impl Navigation {
         let thinner = AgentBody { radius_m: agent.radius_m - config.tolerance_m, ..agent };
         let obstacles = Obstacles::build(&scene.bodies, thinner, config.step_height_m)?;
         let floors = floors_of(scene)?;
-        let (min_m, max_m) = extent_of(&floors);
+        let [min_m, max_m] = extent_of(&floors);
         Ok(Self { agent, config, obstacles, floors, min_m, max_m, graph: OnceLock::new() })
     }
 
@@ -333,7 +333,7 @@ impl Navigation {
 /// # Errors
 /// As [`GridSpec::covering`]; [`Error::Simulation`] if the scene has no floor.
 pub fn map_spec(scene: &Scene, cell_m: f64) -> Result<GridSpec, Error> {
-    let (min_m, max_m) = extent_of(&floors_of(scene)?);
+    let [min_m, max_m] = extent_of(&floors_of(scene)?);
     spec_around(min_m, max_m, cell_m)
 }
 
@@ -344,15 +344,8 @@ fn spec_around(min_m: Vec2, max_m: Vec2, cell_m: f64) -> Result<GridSpec, Error>
 }
 
 /// Return the smallest and largest corner of all outlines.
-fn extent_of(floors: &[Obstacle]) -> (Vec2, Vec2) {
-    let (mut min_m, mut max_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for point in floors.iter().flat_map(|floor| &floor.outline_m) {
-        for axis in 0..2 {
-            min_m[axis] = min_m[axis].min(point[axis]);
-            max_m[axis] = max_m[axis].max(point[axis]);
-        }
-    }
-    (min_m, max_m)
+fn extent_of(floors: &[Obstacle]) -> [Vec2; 2] {
+    bounds_2d_m(floors.iter().flat_map(|floor| floor.outline_m.iter().copied()))
 }
 
 /// Return the floors' parts as polygons that contain all points within the slack of them.

@@ -2,7 +2,7 @@
 
 use crate::{
     Error,
-    geometry::{Vec2, outline::distance_squared},
+    geometry::{Vec2, bounds_2d_m, outline::distance_squared},
     world::{
         footprint::{Footprint, footprint},
         navigation::AgentBody,
@@ -86,14 +86,9 @@ impl Sweep {
 impl Obstacle {
     /// Create an obstacle: the footprint grown by `radius_m`.
     pub(super) fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
-        let mut min_m = [f64::INFINITY; 2];
-        let mut max_m = [f64::NEG_INFINITY; 2];
-        for point in &footprint.outline_m {
-            for axis in 0..2 {
-                min_m[axis] = min_m[axis].min(point[axis] - HUG * radius_m);
-                max_m[axis] = max_m[axis].max(point[axis] + HUG * radius_m);
-            }
-        }
+        let [low_m, high_m] = bounds_2d_m(footprint.outline_m.iter().copied());
+        let min_m = low_m.map(|v| v - HUG * radius_m);
+        let max_m = high_m.map(|v| v + HUG * radius_m);
         Self { outline_m: footprint.outline_m, radius_m, body, min_m, max_m }
     }
 

@@ -10,7 +10,7 @@
 
 use crate::{
     Error,
-    geometry::Vec2,
+    geometry::{Vec2, bounds_2d_m},
     world::{
         navigation::{
             AgentBody,
@@ -134,17 +134,9 @@ impl Obstacles {
     }
 
     fn with_buckets(obstacles: Vec<Obstacle>) -> Self {
-        let mut corner_m = [f64::INFINITY; 2];
-        let mut far_m = [f64::NEG_INFINITY; 2];
-        for obstacle in &obstacles {
-            for axis in 0..2 {
-                corner_m[axis] = corner_m[axis].min(obstacle.min_m[axis]);
-                far_m[axis] = far_m[axis].max(obstacle.max_m[axis]);
-            }
-        }
-        if obstacles.is_empty() {
-            (corner_m, far_m) = ([0.0; 2], [0.0; 2]);
-        }
+        let corners = obstacles.iter().flat_map(Obstacle::extent_m);
+        let [corner_m, far_m] =
+            if obstacles.is_empty() { [[0.0; 2]; 2] } else { bounds_2d_m(corners) };
         let extent_m = (far_m[0] - corner_m[0]).max(far_m[1] - corner_m[1]);
         let bucket_m = BUCKET_M.max(extent_m / MAX_BUCKETS);
         let count = |axis: usize| ((far_m[axis] - corner_m[axis]) / bucket_m) as usize + 1;

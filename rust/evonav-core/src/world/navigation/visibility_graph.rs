@@ -95,11 +95,6 @@ impl VisibilityGraph {
         Self { nodes, edges }
     }
 
-    /// Return the number of places where paths may bend.
-    pub fn num_nodes(&self) -> usize {
-        self.nodes.len()
-    }
-
     /// Return a test of whether a taut path may go straight between a node and `end_m`.
     ///
     /// From an end that lies inside the tangents of a corner, no path passes that corner

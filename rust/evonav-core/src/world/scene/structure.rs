@@ -7,7 +7,7 @@
 
 use crate::{
     assets::part::{Part, Primitive},
-    geometry::{IDENTITY, Mat3, Vec2, distance_2d_m, polygon_contains},
+    geometry::{IDENTITY, Mat3, Vec2, distance_2d_m, outline::edges, polygon_contains},
     house::{House, Opening, Room, Wall},
 };
 
@@ -203,12 +203,8 @@ fn covering_rectangles(polygon_m: &[Vec2]) -> Vec<[Vec2; 2]> {
     let mut marks: Vec<f64> = polygon_m.iter().map(|corner| corner[1]).collect();
     marks.sort_by(f64::total_cmp);
     marks.dedup_by(|a, b| *a - *b < 1e-6);
-    let edges: Vec<[Vec2; 2]> = polygon_m
-        .iter()
-        .zip(polygon_m.iter().cycle().skip(1))
-        .map(|(&a, &b)| if a[1] < b[1] { [a, b] } else { [b, a] })
-        .filter(|[a, b]| b[1] - a[1] > 1e-9)
-        .collect();
+    let upwards = edges(polygon_m).map(|[a, b]| if a[1] < b[1] { [a, b] } else { [b, a] });
+    let edges: Vec<[Vec2; 2]> = upwards.filter(|[a, b]| b[1] - a[1] > 1e-9).collect();
     let height_m = marks.last().zip(marks.first()).map_or(0.0, |(high, low)| high - low);
     let step_m = STEP_M.max(height_m / MAX_STEPS);
     let mut rectangles: Vec<[Vec2; 2]> = Vec::new();
