@@ -69,7 +69,7 @@ fn full_map(config: ObjectMapConfig) -> ObjectMap {
         {
             let camera = camera(x + dx, y + 0.7, z + dz, turn * quarter, 0.7);
             let (depth_m, masks) = look(&[[x, y, z]], &camera);
-            let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+            let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
             let labels = ["Box".to_owned()];
             let view = DetectedView { image, labels: &labels, confidences: &[1.0], features: &[] };
             map.update(&view).expect("a valid view");
@@ -92,7 +92,7 @@ fn bench_objects(c: &mut Criterion) {
     let masks: Vec<i32> = masks.iter().map(number).collect();
     let labels = vec!["Box".to_owned(); 20];
     let confidences = [1.0; 20];
-    let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+    let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
     let view = DetectedView { image, labels: &labels, confidences: &confidences, features: &[] };
     c.bench_function("objects/update_20_masks_100_entries", |b| {
         b.iter_batched_ref(

@@ -84,7 +84,7 @@ pub fn unproject_masks<'py>(
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<i64>>)> {
     let (camera, depth_m) = view.borrow()?;
     let (masks, _) = arrays::row_major("masks", &masks)?;
-    let image = MaskedDepth { camera: &camera, depth_m, masks };
+    let image = MaskedDepth { camera, depth_m, masks };
     let clouds = py
         .detach(|| unproject::unproject_masks(image, num_detections, max_points))
         .map_err(error::to_py)?;

@@ -229,9 +229,5 @@ fn listed<'py>(py: Python<'py>, grid: &BitGrid) -> PyResult<Cells<'py>> {
 }
 
 fn mask<'py>(py: Python<'py>, grid: &BitGrid) -> PyResult<Mask<'py>> {
-    let mut cells = vec![false; grid.rows() * grid.cols()];
-    for [row, col] in grid.cells() {
-        cells[row * grid.cols() + col] = true;
-    }
-    arrays::image_of(py, cells, [grid.rows(), grid.cols()])
+    arrays::image_of(py, grid.to_bools(), [grid.rows(), grid.cols()])
 }

@@ -127,6 +127,13 @@ impl BitGrid {
         })
     }
 
+    /// Return every bit, row-major.
+    pub fn to_bools(&self) -> Vec<bool> {
+        let mut bits = vec![false; self.rows * self.cols];
+        self.cells().for_each(|[row, col]| bits[row * self.cols + col] = true);
+        bits
+    }
+
     /// Return 64 bits of a row, starting at column `first`, which may be negative; bits outside are
     /// 0.
     pub(crate) fn window(&self, row: usize, first: i64) -> u64 {
@@ -142,6 +149,11 @@ impl BitGrid {
         let rows = row.saturating_sub(2)..=row + 2;
         rows.map(|r| (self.window(r, col as i64 - 2) & 0b11111).count_ones()).sum()
     }
+}
+
+/// Return the cells above, left, right and below; some may be off the grid.
+pub(crate) fn beside([row, col]: [usize; 2]) -> [[usize; 2]; 4] {
+    [[row.wrapping_sub(1), col], [row, col.wrapping_sub(1)], [row, col + 1], [row + 1, col]]
 }
 
 /// Return the positions of the 1 bits of a word, ascending.

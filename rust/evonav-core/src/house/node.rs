@@ -89,42 +89,33 @@ impl<'a> Node<'a> {
         self.value.as_object().ok_or_else(|| self.expected("an object"))
     }
 
+    /// Return the node of a value that this one contains.
+    fn child<'n>(&'n self, value: &'n Value, step: Step<'n>) -> Node<'n> {
+        Node { house: self.house, value, from: Some((self, step)) }
+    }
+
     /// Return the value under `key`; `None` if it is absent or null.
     pub(super) fn maybe<'n>(&'n self, key: &'n str) -> Result<Option<Node<'n>>, Error> {
         let value = self.map()?.get(key).filter(|value| !value.is_null());
-        Ok(value.map(|value| Node { house: self.house, value, from: Some((self, Step::Key(key))) }))
+        Ok(value.map(|value| self.child(value, Step::Key(key))))
     }
 
     /// Return the value under `key`, null included.
     pub(super) fn get<'n>(&'n self, key: &'n str) -> Result<Node<'n>, Error> {
-        match self.map()?.get(key) {
-            Some(value) => {
-                Ok(Node { house: self.house, value, from: Some((self, Step::Key(key))) })
-            }
-            None => {
-                let missing = Node {
-                    house: self.house,
-                    value: &Value::Null,
-                    from: Some((self, Step::Key(key))),
-                };
-                Err(missing.error("is missing"))
-            }
-        }
+        let value = self.map()?.get(key);
+        let missing = || self.child(&Value::Null, Step::Key(key)).error("is missing");
+        value.map(|value| self.child(value, Step::Key(key))).ok_or_else(missing)
     }
 
     /// Return the entries of a list that has at most `limit` of them.
     pub(super) fn list(&self, limit: usize) -> Result<impl Iterator<Item = Node<'_>>, Error> {
         let values = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
         if values.len() > limit {
-            return Err(
-                self.error(format!("has {} entries, at most {limit} are read", values.len()))
-            );
+            let found = format!("has {} entries, at most {limit} are read", values.len());
+            return Err(self.error(found));
         }
-        Ok(values.iter().enumerate().map(|(index, value)| Node {
-            house: self.house,
-            value,
-            from: Some((self, Step::Index(index))),
-        }))
+        let entries = values.iter().enumerate();
+        Ok(entries.map(|(index, value)| self.child(value, Step::Index(index))))
     }
 
     /// Return whether the value is null.

@@ -74,11 +74,8 @@ fn cross(a: [Vec2; 2], b: [Vec2; 2]) -> bool {
 
 fn check_wall(house: &House, wall: &Wall, rooms: &HashSet<&str>) -> Result<(), Error> {
     if wall.room_id != super::EXTERIOR && !rooms.contains(wall.room_id.as_str()) {
-        return Err(house.error(
-            &wall.id,
-            "roomId",
-            &format!("is {:?}, which is no room", wall.room_id),
-        ));
+        let message = format!("is {:?}, which is no room", wall.room_id);
+        return Err(house.error(&wall.id, "roomId", &message));
     }
     let length_m = wall.length_m();
     if length_m < MIN_WALL_M {

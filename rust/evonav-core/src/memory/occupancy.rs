@@ -218,25 +218,14 @@ impl OccupancyMap {
         cells
     }
 
-    /// Return whether each cell is explored, row-major.
-    pub fn explored_cells(&self) -> Vec<bool> {
-        let mut cells = vec![false; self.spec.len()];
-        for cell in self.explored.cells() {
-            cells[self.spec.index(cell)] = true;
-        }
-        cells
-    }
-
     fn check(&self, cells: &[[i32; 2]], name: &str) -> Result<(), Error> {
         let (rows, cols) = (self.spec.rows, self.spec.cols);
         let is_outside = |cell: &&[i32; 2]| {
             let [row, col] = cell.map(|i| usize::try_from(i).unwrap_or(usize::MAX));
             row >= rows || col >= cols
         };
-        match cells.iter().find(is_outside) {
-            None => Ok(()),
-            Some(cell) => Err(Error::invalid(name, format!("{cell:?}"), "cells of the map")),
-        }
+        let Some(cell) = cells.iter().find(is_outside) else { return Ok(()) };
+        Err(Error::invalid(name, format!("{cell:?}"), "cells of the map"))
     }
 
     fn distance2_m2(&self, cell: [usize; 2], point_m: Vec2) -> f64 {

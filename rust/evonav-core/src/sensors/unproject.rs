@@ -12,7 +12,7 @@ pub type Point = [f32; 3];
 #[derive(Debug, Clone, Copy)]
 pub struct MaskedDepth<'a> {
     /// Camera of the image.
-    pub camera: &'a Camera,
+    pub camera: Camera,
     /// Planar depth, row-major, metres; infinite or not positive where there is none.
     pub depth_m: &'a [f32],
     /// Detection of each pixel, negative if none.

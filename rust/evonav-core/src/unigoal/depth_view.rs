@@ -21,12 +21,8 @@ impl DepthView<'_> {
         let Some(categories) = self.categories else { return Ok(()) };
         Error::require("categories", categories.len(), "one value a pixel", |n| n == num)?;
         let is_known = |c: &i32| *c >= -1 && i64::from(*c) < num_categories as i64;
-        match categories.iter().find(|c| !is_known(c)) {
-            None => Ok(()),
-            Some(category) => {
-                let expected = format!("-1 to {}", num_categories as i64 - 1);
-                Err(Error::invalid("categories", category, &expected))
-            }
-        }
+        let Some(category) = categories.iter().find(|c| !is_known(c)) else { return Ok(()) };
+        let expected = format!("-1 to {}", num_categories as i64 - 1);
+        Err(Error::invalid("categories", category, &expected))
     }
 }

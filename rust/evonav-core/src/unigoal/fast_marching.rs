@@ -2,7 +2,7 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-use crate::grid::bits::BitGrid;
+use crate::grid::bits::{BitGrid, beside};
 
 /// A rectangle of cells of a larger grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,14 +118,8 @@ pub fn flood(passable: &BitGrid, start: [usize; 2], window: Window) -> BitGrid {
     let mut reached = BitGrid::new(passable.rows(), passable.cols());
     let mut stack = vec![start];
     reached.insert(start[0], start[1]);
-    while let Some([row, col]) = stack.pop() {
-        let around = [
-            [row.wrapping_sub(1), col],
-            [row + 1, col],
-            [row, col.wrapping_sub(1)],
-            [row, col + 1],
-        ];
-        for [r, c] in around {
+    while let Some(cell) = stack.pop() {
+        for [r, c] in beside(cell) {
             if window.index([r, c]).is_some() && passable.get(r, c) && !reached.get(r, c) {
                 reached.insert(r, c);
                 stack.push([r, c]);

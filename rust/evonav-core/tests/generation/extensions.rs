@@ -9,7 +9,7 @@ use evonav_core::{
         Extensions, Occurrence, Parameters, Schedule,
         record::{EvolutionOutcome, GeneratedTask},
     },
-    geometry::{Aabb, Vec2, Vec3},
+    geometry::Vec2,
     house::House,
     world::{
         navigation::{AgentBody, Navigation, NavigationConfig},
@@ -19,6 +19,7 @@ use evonav_core::{
 use serde_json::Value;
 
 use crate::{
+    points::{contains, points_in},
     solids::holds,
     tasks::{self, UNKNOWN, delta_of, houses, stage_houses},
 };
@@ -67,32 +68,6 @@ fn entries(house: &House) -> BTreeMap<String, Value> {
     found
 }
 
-/// Points throughout a part, off its surface.
-fn points_in(part: &Part) -> Vec<Vec3> {
-    let Aabb { min_m, max_m } = part.aabb();
-    let steps = [0.06, 0.3, 0.5, 0.7, 0.94];
-    let mut points = Vec::new();
-    for x in steps {
-        for y in steps {
-            for z in steps {
-                let t = [x, y, z];
-                let point = [0, 1, 2].map(|i| min_m[i] + t[i] * (max_m[i] - min_m[i]));
-                if holds(part, point) {
-                    points.push(point);
-                }
-            }
-        }
-    }
-    points
-}
-
-/// Whether a point is deeper in a part than a touch.
-fn is_deep_in(part: &Part, point: Vec3) -> bool {
-    let offsets = [[0.0; 3], [0.004, 0.0, 0.0], [-0.004, 0.0, 0.0], [0.0, 0.004, 0.0]];
-    let more = [[0.0, -0.004, 0.0], [0.0, 0.0, 0.004], [0.0, 0.0, -0.004]];
-    offsets.iter().chain(&more).all(|by| holds(part, [0, 1, 2].map(|i| point[i] + by[i])))
-}
-
 /// Whether parts share space with any object but `id`, or, if asked, with walls.
 fn collides(scene: &Scene, id: &str, parts: &[Part], with_walls: bool) -> Option<String> {
     let others = scene.bodies.iter().filter(|body| {
@@ -105,8 +80,9 @@ fn collides(scene: &Scene, id: &str, parts: &[Part], with_walls: bool) -> Option
     });
     for other in others {
         for part in parts.iter().filter(|part| part.aabb().intersects(&other.aabb)) {
-            let points = points_in(part);
-            if other.parts.iter().any(|its| points.iter().any(|&point| is_deep_in(its, point))) {
+            let points = points_in(part, 0.9);
+            if other.parts.iter().any(|its| points.iter().any(|&point| contains(its, point, 0.004)))
+            {
                 return Some(other.id.clone());
             }
         }

@@ -273,7 +273,7 @@ proptest! {
         for (x, z, yaw_rad) in cameras {
             let camera = camera(x, z, yaw_rad);
             let (depth_m, masks) = look(&boxes, &camera);
-            let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+            let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
             let view = DetectedView {
                 image, labels: &labels, confidences: &vec![1.0; labels.len()], features: &[],
             };
@@ -292,7 +292,7 @@ proptest! {
         let boxes = [([x, 1.0, 2.0], [1.0; 3], "Bed"), ([-0.5, 0.5, 1.2], [0.3; 3], "Mug")];
         let camera = camera(x, 0.0, yaw_rad);
         let (depth_m, masks) = look(&boxes, &camera);
-        let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+        let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
         let clouds = unproject_masks(image, 2, max_points).unwrap();
         let naive = unproject_naive(image, 2, max_points);
         prop_assert_eq!(clouds.iter().map(Vec::len).collect::<Vec<_>>(), naive.iter().map(Vec::len).collect::<Vec<_>>());
@@ -305,7 +305,7 @@ proptest! {
 fn see(map: &mut ObjectMap, boxes: &[SolidBox], camera: &Camera) -> Update {
     let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
     let (depth_m, masks) = look(boxes, camera);
-    let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
+    let image = MaskedDepth { camera: *camera, depth_m: &depth_m, masks: &masks };
     let confidences = vec![1.0; labels.len()];
     map.update(&DetectedView { image, labels: &labels, confidences: &confidences, features: &[] })
         .expect("a valid view")
@@ -339,7 +339,7 @@ fn compare_tells_an_object_still_there_from_one_gone() {
     let compare = |boxes: &[SolidBox]| {
         let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
         let (depth_m, masks) = look(boxes, &camera);
-        let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+        let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
         let confidences = vec![1.0; labels.len()];
         let view =
             DetectedView { image, labels: &labels, confidences: &confidences, features: &[] };
@@ -380,7 +380,7 @@ fn features_decide_where_there_are_any() {
     let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
     let camera = camera(0.0, 0.0, 0.0);
     let (depth_m, masks) = look(&[SOFA], &camera);
-    let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+    let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
     let mut see = |label: &str, feature: [f32; 2]| {
         let view = DetectedView {
             image,
@@ -404,7 +404,7 @@ fn arguments_that_do_not_fit_are_named_and_change_nothing() {
     let (depth_m, masks) = look(&[SOFA], &camera);
     let labels = ["Sofa".to_owned()];
     let good = DetectedView {
-        image: MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks },
+        image: MaskedDepth { camera, depth_m: &depth_m, masks: &masks },
         labels: &labels,
         confidences: &[1.0],
         features: &[],
@@ -415,10 +415,8 @@ fn arguments_that_do_not_fit_are_named_and_change_nothing() {
         assert_eq!(map.num_views(), 0);
     };
     let nan = vec![f32::NAN; depth_m.len()];
-    let with = |depth_m, masks| DetectedView {
-        image: MaskedDepth { camera: &camera, depth_m, masks },
-        ..good
-    };
+    let with =
+        |depth_m, masks| DetectedView { image: MaskedDepth { camera, depth_m, masks }, ..good };
     fails(&with(&nan, &masks), "depth_m");
     fails(&with(&depth_m[1..], &masks), "depth_m");
     fails(&with(&depth_m, &vec![1; masks.len()]), "masks");

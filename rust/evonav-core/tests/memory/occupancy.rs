@@ -134,7 +134,7 @@ proptest! {
                     explored.insert(cell);
                 }
             }
-            let (found, found_explored) = (map.cells(), map.explored_cells());
+            let (found, found_explored) = (map.cells(), map.explored().to_bools());
             for (i, value) in found.into_iter().enumerate() {
                 let cell = [(i / 70) as i32, (i % 70) as i32];
                 prop_assert_eq!(value, state.get(&cell).map_or(UNKNOWN, |s| s.0));
@@ -186,7 +186,7 @@ fn regions_naive(map: &OccupancyMap, agent_m: [f64; 2], min_cells: usize) -> Vec
     let all: Vec<Cell> = (0..spec.rows as i32)
         .flat_map(|row| (0..spec.cols as i32).map(move |col| [row, col]))
         .collect();
-    let (cells, explored) = (map.cells(), map.explored_cells());
+    let (cells, explored) = (map.cells(), map.explored().to_bools());
     let at = |cell: Cell| spec.index(cell.map(|i| i as usize));
     let is_on =
         |[row, col]: Cell| row >= 0 && col >= 0 && row < spec.rows as i32 && col < spec.cols as i32;

@@ -3,7 +3,7 @@
 use evonav_core::{
     Error,
     memory::objects::{self, DetectedView, Entry, ObjectMapConfig, sight_lines::SightConfig},
-    sensors::{camera::Camera, unproject::MaskedDepth},
+    sensors::unproject::MaskedDepth,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -83,8 +83,9 @@ impl ObjectMap {
     }
 
     fn update(&mut self, py: Python<'_>, view: View<'_>) -> PyResult<Update> {
-        let (view, map) = (view.borrow()?, &mut self.0);
-        let update = py.detach(|| map.update(&view.detected())).map_err(error::to_py)?;
+        let found = view.detections.extract()?;
+        let (view, map) = (view.detected(&found)?, &mut self.0);
+        let update = py.detach(|| map.update(&view)).map_err(error::to_py)?;
         let merged = update.merged.into_iter().map(Into::into).collect();
         Ok((update.entry_ids, update.removed, merged))
     }
@@ -95,8 +96,9 @@ impl ObjectMap {
         entry_id: u64,
         view: View<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let view = view.borrow()?;
-        let found = py.detach(|| self.0.compare(entry_id, &view.detected()));
+        let found = view.detections.extract()?;
+        let view = view.detected(&found)?;
+        let found = py.detach(|| self.0.compare(entry_id, &view));
         let found = found.map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
     }
@@ -164,7 +166,8 @@ struct View<'py> {
     depth_m: PyReadonlyArray2<'py, f32>,
     pose: PyPose,
     intrinsics: Intrinsics,
-    detections: Detections<'py>,
+    /// Extracted on its own, so that errors name the array.
+    detections: Bound<'py, PyAny>,
 }
 
 /// `evonav.sensors.observation.Detections`.
@@ -176,20 +179,11 @@ struct Detections<'py> {
     features: Option<PyReadonlyArray2<'py, f32>>,
 }
 
-/// The arrays of a view as slices, which can be used without the interpreter.
-struct ViewSlices<'a> {
-    camera: Camera,
-    depth_m: &'a [f32],
-    masks: &'a [i32],
-    labels: &'a [String],
-    confidences: &'a [f32],
-    features: &'a [f32],
-}
-
 impl View<'_> {
-    /// Return the view as slices; the image has the size of `masks`.
-    fn borrow(&self) -> PyResult<ViewSlices<'_>> {
-        let Detections { masks, labels, confidences, features } = &self.detections;
+    /// Return the view as slices, which can be used without the interpreter; the image has the size
+    /// of `masks`.
+    fn detected<'a>(&'a self, found: &'a Detections<'_>) -> PyResult<DetectedView<'a>> {
+        let Detections { masks, labels, confidences, features } = found;
         let (masks, [height_px, width_px]) = arrays::row_major("masks", masks)?;
         let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;
         let expected = "as many rows as `masks`";
@@ -203,21 +197,8 @@ impl View<'_> {
         };
         Error::require("features", num_features, "a row a label", |n| n == labels.len())
             .map_err(error::to_py)?;
-        Ok(ViewSlices {
-            camera: self.pose.camera([width_px, height_px], self.intrinsics.vertical_fov_rad),
-            depth_m,
-            masks,
-            labels,
-            confidences: confidences.as_slice()?,
-            features,
-        })
-    }
-}
-
-impl ViewSlices<'_> {
-    fn detected(&self) -> DetectedView<'_> {
-        let &Self { ref camera, depth_m, masks, labels, confidences, features } = self;
+        let camera = self.pose.camera([width_px, height_px], self.intrinsics.vertical_fov_rad);
         let image = MaskedDepth { camera, depth_m, masks };
-        DetectedView { image, labels, confidences, features }
+        Ok(DetectedView { image, labels, confidences: confidences.as_slice()?, features })
     }
 }

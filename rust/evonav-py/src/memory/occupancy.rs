@@ -138,7 +138,7 @@ impl OccupancyMap {
     #[getter]
     fn explored<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
         let spec = self.map.spec();
-        arrays::image_of(py, self.map.explored_cells(), [spec.rows, spec.cols])
+        arrays::image_of(py, self.map.explored().to_bools(), [spec.rows, spec.cols])
     }
 }
 

@@ -34,12 +34,7 @@ pub fn bathtub(s: &mut Sketch<'_>) {
     let white = s.tint(0, CERAMIC);
     let side = 0.07;
     s.cuboid(inside(x, side), [0.0, 0.25 * h], inside(z, side), shade(white, 0.93));
-    for x in ends(x, side, 0.0) {
-        s.cuboid(x, y, z, white);
-    }
-    for z in ends(z, side, 0.0) {
-        s.cuboid(inside(x, side), y, z, white);
-    }
+    s.rim([x, y, z], [0, 2], side, white);
 }
 
 /// Draw basins: set into counters (flat), or standing on a pedestal or a cabinet (tall).

@@ -49,12 +49,7 @@ pub fn painting(s: &mut Sketch<'_>) {
     s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), s.choose(&skies, skies[0]));
     let ground = s.choose(&grounds, grounds[0]);
     s.cuboid(inner, between(canvas, 0.0, 0.4), between(z, 0.7, 0.85), ground);
-    for x in ends(x, bar, 0.0) {
-        s.cuboid(x, y, between(z, 0.7, 1.0), frame);
-    }
-    for y in ends(y, bar, 0.0) {
-        s.cuboid(inner, y, between(z, 0.7, 1.0), frame);
-    }
+    s.rim([x, y, between(z, 0.7, 1.0)], [0, 1], bar, frame);
 }
 
 /// Draw a window as an asset of its own.
@@ -64,12 +59,7 @@ pub fn window(s: &mut Sketch<'_>) {
     let frame = s.tint(0, [235, 235, 230]);
     let bar = 0.07 * w.min(h);
     s.cuboid(inside(x, bar), inside(y, bar), between(z, 0.4, 0.6), [190, 215, 235]);
-    for x in ends(x, bar, 0.0) {
-        s.cuboid(x, y, z, frame);
-    }
-    for y in ends(y, bar, 0.0) {
-        s.cuboid(inside(x, bar), y, z, frame);
-    }
+    s.rim([x, y, z], [0, 1], bar, frame);
 }
 
 /// Draw a door as an asset of its own: frame, and a closed leaf unless it is a bare frame.

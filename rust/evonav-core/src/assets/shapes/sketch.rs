@@ -179,6 +179,19 @@ impl<'a> Sketch<'a> {
         self.blob(x, y, z, colour);
     }
 
+    /// Draw a rim: cuboids `thick` wide at both ends of the spans along `axes`, the second pair
+    /// between the first.
+    pub fn rim(&mut self, spans: [Span; 3], axes: [usize; 2], thick: f64, colour: Colour) {
+        let mut rest = spans;
+        for axis in axes {
+            for end in ends(spans[axis], thick, 0.0) {
+                rest[axis] = end;
+                self.cuboid(rest[0], rest[1], rest[2], colour);
+            }
+            rest[axis] = inside(spans[axis], thick);
+        }
+    }
+
     pub fn cuboid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
         let spans = self.clamped([x, y, z]);
         let half_m = spans.map(|[low, high]| 0.5 * (high - low));

@@ -22,12 +22,7 @@ pub fn bin(s: &mut Sketch<'_>) {
     }
     let wall = 0.06 * w.min(d);
     s.cuboid(inside(x, wall), [0.0, floor], inside(z, wall), shade(plastic, 0.6));
-    for x in ends(x, wall, 0.0) {
-        s.cuboid(x, y, z, plastic);
-    }
-    for z in ends(z, wall, 0.0) {
-        s.cuboid(inside(x, wall), y, z, plastic);
-    }
+    s.rim([x, y, z], [0, 2], wall, plastic);
 }
 
 /// Draw a full bag with a knot.

@@ -75,12 +75,8 @@ impl Transition<'_> {
                 let [old, new] = [&world, &next].map(|world| &world.layout.scene);
                 if has_clearance(old, new, &id) && self.preserves_access(&world, &next)? {
                     if let Some(index) = next.house.object_index(&id) {
-                        record.additions.push(object_record(
-                            &next.house,
-                            &next.layout,
-                            index,
-                            "INSERTION",
-                        ));
+                        let (house, layout) = (&next.house, &next.layout);
+                        record.additions.push(object_record(house, layout, index, "INSERTION"));
                     }
                     world = next;
                     break;

@@ -283,14 +283,8 @@ fn structures_near(
                 [[low[0], low[2]], [high[0], low[2]], [high[0], high[2]], [low[0], high[2]]];
             let gap_m = gap_m(outline, &corners);
             if gap_m < STRUCTURE_M {
-                let determiner = one_of(of_room.len());
-                near.push(Claim {
-                    kind: Kind::Structure,
-                    what,
-                    determiner,
-                    gap_m,
-                    is_aside: false,
-                });
+                let (kind, determiner) = (Kind::Structure, one_of(of_room.len()));
+                near.push(Claim { kind, what, determiner, gap_m, is_aside: false });
             }
         }
     }

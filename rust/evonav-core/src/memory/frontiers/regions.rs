@@ -6,7 +6,7 @@ use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
     grid::{
-        bits::BitGrid,
+        bits::{BitGrid, beside},
         components::{Components, Run, take_groups},
     },
     memory::{frontiers::FrontierConfig, occupancy::OccupancyMap},
@@ -64,13 +64,7 @@ fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> 
     let (rows, cols) = (island.rows(), island.cols());
     let (mut unknown, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
     for [row, col] in island.cells() {
-        let beside = [
-            [row.wrapping_sub(1), col],
-            [row, col.wrapping_sub(1)],
-            [row, col + 1],
-            [row + 1, col],
-        ];
-        for [r, c] in beside {
+        for [r, c] in beside([row, col]) {
             let is_known = map.free().get(r, c) || map.blocked().get(r, c);
             if r < rows && c < cols && !is_known && !given_up.is_some_and(|g| g.get(r, c)) {
                 unknown.insert(r, c);
