@@ -1,5 +1,9 @@
 //! Images and what is visible in them.
 
+#[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/scenes.rs"]
+mod scenes;
+
 mod raster;
 mod visible_bodies;
 mod visible_px;

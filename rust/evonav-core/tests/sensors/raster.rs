@@ -3,7 +3,7 @@
 
 use evonav_core::{
     assets::part::{Part, Primitive, aabb_of},
-    geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate},
+    geometry::{Vec3, add, euler_rotation_deg, rotate, sub},
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Want, render, render_view},
@@ -17,19 +17,11 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
-fn dot(a: Vec3, b: Vec3) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
-}
+use crate::scenes::{self, cross, dot};
 
-fn sub(a: Vec3, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
+/// A scene with a body for each part.
+fn scene_of(parts: &[Part]) -> Scene {
+    scenes::scene_of(&parts.iter().map(|part| vec![*part]).collect::<Vec<_>>())
 }
 
 /// Moeller & Trumbore 1997, front side only. Returns the distance and how deep inside the
@@ -66,23 +58,6 @@ fn cast_naive(
             (distance >= least && inside >= -margin).then_some((distance, triangle.body))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-fn scene_of(parts: &[Part]) -> Scene {
-    let bodies: Vec<Body> = parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| Body {
-            id: format!("body|{i}"),
-            category: "Box".to_owned(),
-            kind: BodyKind::Object,
-            parts: vec![*part],
-            aabb: aabb_of(&[*part]),
-            unopened: Aabb::EMPTY,
-            oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
-        })
-        .collect();
-    Scene { bodies, first_object: 0, bounds: Aabb::EMPTY }
 }
 
 fn primitive() -> impl Strategy<Value = Primitive> {

@@ -14,6 +14,8 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
+use crate::scenes::scene_of;
+
 fn part() -> impl Strategy<Value = Part> {
     let half_m = [0.02..0.8_f64, 0.02..0.8_f64, 0.02..0.8_f64];
     let primitive = prop_oneof![
@@ -29,21 +31,6 @@ fn part() -> impl Strategy<Value = Part> {
             colour: [128; 3],
         },
     )
-}
-
-/// Bodies of one to three parts.
-fn scene_of(bodies: &[Vec<Part>]) -> Scene {
-    let body = |(i, parts): (usize, &Vec<Part>)| Body {
-        id: format!("body|{i}"),
-        category: "Box".to_owned(),
-        kind: BodyKind::Object,
-        parts: parts.clone(),
-        aabb: aabb_of(parts),
-        unopened: Aabb::EMPTY,
-        oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
-    };
-    let bodies = bodies.iter().enumerate().map(body).collect();
-    Scene { bodies, first_object: 0, bounds: Aabb::EMPTY }
 }
 
 proptest! {

@@ -14,30 +14,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-fn scene_of(shapes: Vec<Vec<Part>>) -> Scene {
-    let body = |(index, parts): (usize, Vec<Part>)| {
-        let aabb = aabb_of(&parts);
-        Body {
-            id: format!("thing {index}"),
-            category: "Thing".to_owned(),
-            kind: BodyKind::Object,
-            unopened: Aabb::EMPTY,
-            oriented: OrientedBox::of_aabb(&aabb),
-            aabb,
-            parts,
-        }
-    };
-    let bodies: Vec<Body> = shapes.into_iter().enumerate().map(body).collect();
-    Scene { bodies, first_object: 0, bounds: Aabb::EMPTY }
-}
-
-fn dot(a: Vec3, b: Vec3) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
-}
-
-fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
-}
+use crate::scenes::{cross, dot, scene_of};
 
 /// Corners, face normals and edges of a part that is no ellipsoid.
 fn polytope(part: &Part) -> (Vec<Vec3>, Vec<Vec3>, Vec<Vec3>) {
@@ -125,7 +102,7 @@ proptest! {
     #[test]
     fn depths_are_those_of_the_separating_axis_theorem(a in part(), b in part()) {
         let expected_m = depth_by_axes(&a, &b).max(0.0);
-        let scene = scene_of(vec![vec![a], vec![b]]);
+        let scene = scene_of(&[vec![a], vec![b]]);
         let found_m = Inspector::new(&scene).depth_m(0, 1);
         prop_assert!((found_m - expected_m).abs() < 1e-6, "found {found_m}, expected {expected_m}");
     }

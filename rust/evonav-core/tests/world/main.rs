@@ -4,6 +4,9 @@
 #[path = "../common/recorded.rs"]
 mod recorded;
 #[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/scenes.rs"]
+mod scenes;
+#[allow(dead_code, reason = "other test crates use the rest")]
 #[path = "../common/solids.rs"]
 mod solids;
 
