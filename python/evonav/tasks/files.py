@@ -9,7 +9,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from evonav import _core
 from evonav.errors import TaskError
@@ -38,6 +37,8 @@ def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
     Raises:
         TaskError: The file is not a PNG, not RGB, or of another size.
     """
+    from PIL import Image  # generating tasks needs no decoder, and must start fast
+
     data = read_file(path)
     # Size, depth and colour type stand in the first chunk. They are checked first, so that huge images are not decoded.
     if data[:16] != b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" or data[16:26] != struct.pack(">IIBB", size_px, size_px, 8, 2):
