@@ -79,7 +79,7 @@ OUTCOMES = st.lists(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(OUTCOMES)
 def test_a_summary_agrees_with_arithmetic(outcomes):
     summary = summarise("x", made("x", outcomes), num_stages=len(outcomes))
