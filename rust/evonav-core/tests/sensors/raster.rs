@@ -2,7 +2,7 @@
 //! triangle.
 
 use evonav_core::{
-    assets::part::{Part, Primitive, aabb_of},
+    assets::part::{Part, Primitive},
     geometry::{Vec3, add, euler_rotation_deg, rotate, sub},
     sensors::{
         camera::{CLIP_M, Camera, View},
@@ -12,7 +12,7 @@ use evonav_core::{
     },
     world::{
         mesh::{SceneMesh, Triangle},
-        scene::{Body, BodyKind, OrientedBox, Scene},
+        scene::{BodyKind, Scene},
     },
 };
 use proptest::{collection::vec, prelude::*};

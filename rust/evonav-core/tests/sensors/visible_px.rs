@@ -1,16 +1,13 @@
 //! How many pixels of a body are seen, against a picture of everything.
 
 use evonav_core::{
-    assets::part::{Part, Primitive, aabb_of},
-    geometry::{Aabb, euler_rotation_deg},
+    assets::part::{Part, Primitive},
+    geometry::euler_rotation_deg,
     sensors::{
         camera::Camera,
         raster::{FrameBuffer, Want, render, visible_px},
     },
-    world::{
-        mesh::SceneMesh,
-        scene::{Body, BodyKind, OrientedBox, Scene},
-    },
+    world::mesh::SceneMesh,
 };
 use proptest::{collection::vec, prelude::*};
 

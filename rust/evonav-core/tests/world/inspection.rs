@@ -3,13 +3,13 @@
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,
-        part::{Part, Primitive, aabb_of},
+        part::{Part, Primitive},
     },
-    geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate, sub},
+    geometry::{Vec3, add, euler_rotation_deg, rotate, sub},
     house::{House, HouseDelta, ObjectMove},
     world::{
         inspection::{Finding, FindingKind, Inspector, Tolerances, inspect_houses},
-        scene::{Body, BodyKind, OrientedBox, Scene},
+        scene::Scene,
     },
 };
 use proptest::prelude::*;

@@ -50,7 +50,6 @@ impl MiniNetwork {
 
     /// Detect instances; return masks, classes and confidences.
     #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence))]
-    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
     #[expect(clippy::type_complexity, reason = "a triple of arrays")]
     fn detect<'py>(
         &self,
