@@ -16,14 +16,8 @@ from pydantic import ConfigDict, Field, ValidationError
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.run_settings import RunSettings
-from evonav.evaluation.run.settings import (
-    DecisionSettings,
-    PerceptionSettings,
-    SettingError,
-    Settings,
-    SimulatorSettings,
-    SpendingSettings,
-)
+from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings, SpendingSettings
+from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
 from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import read_toml

@@ -18,7 +18,7 @@ from annotated_types import Ge
 from typer.core import TyperGroup
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.settings import Settings
+    from evonav.evaluation.run.settings_model import Settings
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
             groups = {name: settings_options(name) for name in names}
 
             def run(**given: Any) -> None:  # noqa: ANN401 - values of options
-                from evonav.evaluation.run.settings import SettingError
+                from evonav.evaluation.run.settings_model import SettingError
 
                 try:
                     command(**{name: options.read(given) for name, options in groups.items()}, **given)
@@ -237,7 +237,8 @@ def _noise(text: str) -> dict[str, float]:
     """Read rates of mistakes, such as wrong=0.1,lost=0.01."""
     from evonav.decision.noisy import NoiseRates, read_rates
     from evonav.errors import InvalidArgumentError
-    from evonav.evaluation.run.settings import DecisionSettings, SettingError
+    from evonav.evaluation.run.settings import DecisionSettings
+    from evonav.evaluation.run.settings_model import SettingError
 
     try:
         return read_rates(text, list(NoiseRates.__dataclass_fields__))

@@ -17,7 +17,7 @@ from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
-from evonav.evaluation.run.settings import NUM_RETRIES
+from evonav.evaluation.run.settings_model import NUM_RETRIES
 from evonav.evaluation.run.summary import MODELS_KEY
 from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing
@@ -88,10 +88,10 @@ def evaluate(
         on_progress: Called after every recorded stage.
 
     Returns:
-        One summary an agent wanted for.
+        One summary for each agent.
 
     Raises:
-        InvalidArgumentError: An agent is unknown, or wanted for twice.
+        InvalidArgumentError: An agent is unknown, or named twice.
         StoreError: The folder holds a run of another configuration or cannot be written.
         EngineError: Workers do not start.
     """
@@ -125,10 +125,10 @@ def evaluate_all(
         on_progress: Called with the index of a request as it begins and after each of its recorded stages.
 
     Returns:
-        By request, one summary an agent wanted for.
+        For each request, one summary for each agent.
 
     Raises:
-        InvalidArgumentError: An agent is unknown or wanted for twice, or two requests have one folder.
+        InvalidArgumentError: An agent is unknown or named twice, or two requests have the same folder.
         StoreError: A folder holds a run of another configuration or cannot be written.
         PerceptionError: Models of a perception are missing.
         EngineError: Workers do not start.
@@ -136,7 +136,7 @@ def evaluate_all(
     num_workers = workforce.num_workers
     _check_requests(requests, num_workers)
     for request in requests:
-        if not (request.run_dir / FILE_NAME).exists():  # what cannot begin leaves nothing behind
+        if not (request.run_dir / FILE_NAME).exists():  # a run that cannot begin leaves no folder behind
             request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
         runs: list[RunJobs] = []
@@ -229,7 +229,7 @@ def perception_seed(seed: int, task_id: str) -> int:
 
 def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
     if len({request.run_dir.absolute() for request in requests}) != len(requests):
-        raise InvalidArgumentError("two runs are wanted for in one folder")
+        raise InvalidArgumentError("two runs have the same folder")
     checked: set[tuple[str, bool]] = set()
     for request in requests:
         if not request.agents:

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.settings import NUM_RETRIES, DecisionSettings, SettingError, Settings
+from evonav.evaluation.run.settings_model import NUM_RETRIES, SettingError, Settings
 from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.settings import DecisionSettings
 
 
 class RunSettings(Settings):
@@ -54,7 +55,7 @@ class RunSettings(Settings):
         return Workforce(self.num_workers, self.engine, self.ray_address, num_gpus=self.worker_gpus)
 
     def config(
-        self, seed: int, backend: "Backend", decisions: DecisionSettings, protocol: ProtocolConfig | None = None
+        self, seed: int, backend: "Backend", decisions: "DecisionSettings", protocol: ProtocolConfig | None = None
     ) -> "RunConfig":
         """Return the configuration of a run with these limits.
 

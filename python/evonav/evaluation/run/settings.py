@@ -9,23 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
-from evonav.tasks.records import Record
 from evonav.world.simulator import Simulator
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
 
-NUM_RETRIES = 2
-"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
@@ -38,32 +36,6 @@ ANSWER_TIMEOUT_S, VLM_ANSWER_TIMEOUT_S = 600.0, 3600.0
 _COMPONENTS = "evonav.evaluation.run.components"
 _SIMULATOR_HOST_OPTIONS = ("gpu_device", "x_display", "timeout_s")
 """Settings of AI2-THOR that depend on this machine."""
-
-
-class SettingError(InvalidArgumentError):
-    """A setting that is invalid beside the others; the command and sweep files add its full name."""
-
-    def __init__(self, settings: "type[Settings]", key: str, problem: str) -> None:
-        """Create the error.
-
-        Args:
-            settings: The model of the settings.
-            key: A field of the settings.
-            problem: The problem, as the end of a sentence that begins with the field's name.
-        """
-        super().__init__(f"{key} {problem}")
-        self.settings = settings
-        self.key = key
-        self.problem = problem
-
-
-class Settings(Record):
-    """Options that people write, in a file or on the command line.
-
-    The string below a field is its description in the JSON Schema of sweep files and in the command's help.
-    """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
 
 
 class SimulatorSettings(Settings):
