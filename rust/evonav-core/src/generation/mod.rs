@@ -13,7 +13,7 @@ mod stage;
 mod task;
 
 pub use algorithm::{
-    evolved_room::{RoomHistory, evolved_room_weight, sample_evolved_room},
+    evolved_room::{evolved_room_weight, sample_evolved_room},
     goal::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores},
 };
 pub use extension_parameters::{Extensions, Occurrence, Schedule};
@@ -21,4 +21,5 @@ pub use mode::Mode;
 pub use overrides::{Overrides, StageOverrides};
 pub use parameters::Parameters;
 pub use placement::asset_groups::{AssetGroup, asset_groups};
+pub use record::RoomHistory;
 pub use task::{Generation, generate_task};

@@ -1,21 +1,9 @@
 //! Sample the room that evolves between two stages (paper, Sec. 3.2).
 
-use serde::Serialize;
-
-use crate::{generation::Parameters, rng::Stream};
-
-/// The factors of a room's weight.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct RoomHistory {
-    /// Number of objects in the room, children included.
-    pub num_assets: usize,
-    /// Whether the reference trajectory has been in it.
-    pub is_visited: bool,
-    /// Whether the reference trajectory ends in it.
-    pub is_transition_room: bool,
-    /// Whether it changed within the last `changed_room_window` transitions.
-    pub was_changed_recently: bool,
-}
+use crate::{
+    generation::{Parameters, record::RoomHistory},
+    rng::Stream,
+};
 
 /// Compute `q_asset * q_visited * q_current * q_evolved` of one room, not normalised.
 ///

@@ -2,10 +2,7 @@
 
 use serde::Serialize;
 
-use crate::{
-    generation::{Mode, RoomHistory},
-    geometry::Vec3,
-};
+use crate::{generation::Mode, geometry::Vec3};
 
 /// The outcome of a transition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -79,6 +76,19 @@ pub enum ModificationFailure {
     NoFreePlace,
     /// Every free place cut off a room or object.
     CutsOff,
+}
+
+/// The factors of a room's weight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct RoomHistory {
+    /// Number of objects in the room, children included.
+    pub num_assets: usize,
+    /// Whether the reference trajectory has been in it.
+    pub is_visited: bool,
+    /// Whether the reference trajectory ends in it.
+    pub is_transition_room: bool,
+    /// Whether it changed within the last `changed_room_window` transitions.
+    pub was_changed_recently: bool,
 }
 
 /// The weight of one room.

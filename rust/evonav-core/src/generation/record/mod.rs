@@ -6,7 +6,7 @@ mod task;
 
 pub use evolution::{
     ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure,
-    ObjectRecord, RoomWeightRecord, StateChangeRecord,
+    ObjectRecord, RoomHistory, RoomWeightRecord, StateChangeRecord,
 };
 pub use target::{Anchor, Appearance, Determiner, Relations, TargetRecord, Tint};
 pub use task::{
