@@ -93,6 +93,24 @@ fn part() -> impl Strategy<Value = Part> {
     )
 }
 
+fn red_cuboid(half_m: Vec3, centre_m: Vec3) -> Part {
+    Part {
+        primitive: Primitive::Cuboid { half_m },
+        centre_m,
+        rotation: euler_rotation_deg([0.0; 3]),
+        colour: [200, 40, 40],
+    }
+}
+
+fn level_camera(
+    width_px: usize,
+    height_px: usize,
+    vertical_fov_rad: f64,
+    position_m: Vec3,
+) -> Camera {
+    Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad: 0.0, horizon_rad: 0.0 }
+}
+
 fn camera() -> impl Strategy<Value = Camera> {
     let place = [-3.0..3.0_f64, 0.0..2.0_f64, -3.0..3.0_f64];
     (place, 0.0..6.3_f64, -1.2..1.2_f64, 1..50_usize, 1..40_usize, 0.6..2.0_f64).prop_map(
@@ -336,12 +354,8 @@ proptest! {
 #[test]
 fn camera_turns_clockwise_and_looks_down() {
     let mut camera = Camera {
-        width_px: 300,
-        height_px: 300,
-        vertical_fov_rad: 90.0_f64.to_radians(),
-        position_m: [0.0, 1.575, 0.0],
         yaw_rad: 90.0_f64.to_radians(),
-        horizon_rad: 0.0,
+        ..level_camera(300, 300, 90.0_f64.to_radians(), [0.0, 1.575, 0.0])
     };
     let close = |a: Vec3, b: Vec3| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-9);
     // Facing +x, -z is on the right hand.
@@ -356,21 +370,9 @@ fn camera_turns_clockwise_and_looks_down() {
 
 #[test]
 fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
-    let part = Part {
-        primitive: Primitive::Cuboid { half_m: [f64::NAN, 1.0, f64::INFINITY] },
-        centre_m: [0.0, 1.0, 2.0],
-        rotation: euler_rotation_deg([0.0; 3]),
-        colour: [255; 3],
-    };
+    let part = red_cuboid([f64::NAN, 1.0, f64::INFINITY], [0.0, 1.0, 2.0]);
     let mesh = SceneMesh::build(&scene_of(&[part]));
-    let camera = Camera {
-        width_px: 16,
-        height_px: 16,
-        vertical_fov_rad: 1.5,
-        position_m: [0.0; 3],
-        yaw_rad: 0.0,
-        horizon_rad: 0.0,
-    };
+    let camera = level_camera(16, 16, 1.5, [0.0; 3]);
     let mut frame = FrameBuffer::default();
     render(&mesh, &camera, Want { rgb: true, instances: true }, &mut frame).unwrap();
     assert!(frame.instances.iter().all(|&id| id == 0));
@@ -379,24 +381,11 @@ fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
 /// Sky where nothing is; the walls' own colour, darkest where they meet.
 #[test]
 fn colours_show_corners_and_sky() {
-    let wall = |half_m: Vec3, centre_m: Vec3| Part {
-        primitive: Primitive::Cuboid { half_m },
-        centre_m,
-        rotation: euler_rotation_deg([0.0; 3]),
-        colour: [200, 40, 40],
-    };
     // A wall across and one to the right of it that meets it; nothing to the left.
-    let ahead = wall([1.5, 3.0, 0.1], [1.5, 0.0, 3.1]);
-    let beside = wall([0.1, 3.0, 3.0], [2.1, 0.0, 0.0]);
+    let ahead = red_cuboid([1.5, 3.0, 0.1], [1.5, 0.0, 3.1]);
+    let beside = red_cuboid([0.1, 3.0, 3.0], [2.1, 0.0, 0.0]);
     let mesh = SceneMesh::build(&scene_of(&[ahead, beside]));
-    let camera = Camera {
-        width_px: 301,
-        height_px: 301,
-        vertical_fov_rad: 90.0_f64.to_radians(),
-        position_m: [0.5, 0.0, 0.0],
-        yaw_rad: 0.0,
-        horizon_rad: 0.0,
-    };
+    let camera = level_camera(301, 301, 90.0_f64.to_radians(), [0.5, 0.0, 0.0]);
     let mut frame = FrameBuffer::default();
     render(&mesh, &camera, Want { rgb: true, instances: false }, &mut frame).unwrap();
     let at = |col: usize| &frame.rgb[3 * (150 * 301 + col)..][..3];
@@ -410,20 +399,8 @@ fn colours_show_corners_and_sky() {
 /// A wall 20 m away is seen, one a hair farther is sky; so is what the near plane cuts off.
 #[test]
 fn surfaces_are_drawn_between_the_clip_planes() {
-    let slab = |z: f64| Part {
-        primitive: Primitive::Cuboid { half_m: [100.0, 100.0, 0.05] },
-        centre_m: [0.0, 0.0, z + 0.05],
-        rotation: euler_rotation_deg([0.0; 3]),
-        colour: [200, 40, 40],
-    };
-    let camera = Camera {
-        width_px: 9,
-        height_px: 7,
-        vertical_fov_rad: 1.5,
-        position_m: [0.0; 3],
-        yaw_rad: 0.0,
-        horizon_rad: 0.0,
-    };
+    let slab = |z: f64| red_cuboid([100.0, 100.0, 0.05], [0.0, 0.0, z + 0.05]);
+    let camera = level_camera(9, 7, 1.5, [0.0; 3]);
     let [near_m, far_m] = CLIP_M;
     for half_height_m in [None, Some(2.0)] {
         let view = View { half_height_m, ..View::from(camera) };
@@ -453,24 +430,12 @@ fn surfaces_are_drawn_between_the_clip_planes() {
 /// AI2-THOR's ceilings have one side: seen from below, looked through from above.
 #[test]
 fn ceilings_are_seen_from_below_only() {
-    let slab = |y: f64| Part {
-        primitive: Primitive::Cuboid { half_m: [10.0, 0.01, 10.0] },
-        centre_m: [0.0, y, 0.0],
-        rotation: euler_rotation_deg([0.0; 3]),
-        colour: [200, 40, 40],
-    };
+    let slab = |y: f64| red_cuboid([10.0, 0.01, 10.0], [0.0, y, 0.0]);
     let mut scene = scene_of(&[slab(0.0), slab(2.5)]);
     scene.bodies[1].kind = BodyKind::Ceiling;
     let mesh = SceneMesh::build(&scene);
     let middle = |y: f64, horizon_rad: f64| {
-        let camera = Camera {
-            width_px: 3,
-            height_px: 3,
-            vertical_fov_rad: 1.0,
-            position_m: [0.0, y, 0.0],
-            yaw_rad: 0.0,
-            horizon_rad,
-        };
+        let camera = Camera { horizon_rad, ..level_camera(3, 3, 1.0, [0.0, y, 0.0]) };
         let mut frame = FrameBuffer::default();
         render(&mesh, &camera, Want { rgb: false, instances: true }, &mut frame).unwrap();
         frame.instances[4]
