@@ -1,30 +1,40 @@
-# Everything runs in a virtual environment of its own; the two commands of the README are `demo` and `test`.
+# Everything runs in a virtual environment of its own; `make help` lists the commands.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
-.PHONY: setup demo test test-procthor test-models lint bench wheel data readme docs clean
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-procthor test-models lint format bench wheel data readme docs clean
 
-$(VENV)/.dependencies: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+help:  ## list these commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+$(VENV)/.maturin:
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	@$(BIN)/python -m pip install --quiet --group build
+	@touch $@
+
+# The package with what its reports draw plots with: all that the demo needs.
+$(VENV)/.built: $(VENV)/.maturin pyproject.toml $(RUST_SOURCES)
+	@echo "Building evonav in $(VENV), which takes some minutes the first time ..."
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras viz
+	@touch $@
+
+$(VENV)/.dependencies: $(VENV)/.maturin pyproject.toml
 	$(BIN)/python -m pip install --quiet --group dev
 	touch $@
 
-$(VENV)/.built: $(VENV)/.dependencies $(RUST_SOURCES)
-	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet
-	touch $@
+setup: $(VENV)/.built $(VENV)/.dependencies  ## build the package, and install all that tests and lint need, into .venv
 
-setup: $(VENV)/.built
-
-demo: setup
-	$(BIN)/evonav demo --out out/demo
+demo: $(VENV)/.built  ## evaluate three agents on the bundled tasks: a table, and a report in out/demo
+	@$(BIN)/evonav demo --out out/demo
 
 # The same random cases every time; `cargo test` by itself looks for others. CI measures coverage too, which takes
 # longer and fails below the floor in pyproject.toml: make test PYTEST_OPTIONS="--cov --cov-report=".
 test: export PROPTEST_RNG_SEED ?= 20261121
-test: setup
+test: setup  ## run every Rust and Python test
 	cargo test --workspace
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_OPTIONS)
 
@@ -35,7 +45,7 @@ $(VENV)-procthor/.dependencies: pyproject.toml
 	$(VENV)-procthor/bin/python -m pip install --quiet --group procthor
 	touch $@
 
-test-procthor: setup $(VENV)-procthor/.dependencies
+test-procthor: setup $(VENV)-procthor/.dependencies  ## test houses of the published generator
 	EVONAV_PROCTHOR_PYTHON=$(CURDIR)/$(VENV)-procthor/bin/python $(BIN)/python -m pytest tests/thor/test_procthor_houses.py
 
 # Models of predicted perception with random weights, in an environment of its own (6 GB; docs/perception.md).
@@ -45,10 +55,10 @@ $(VENV)-models/.dependencies: pyproject.toml
 	$(VENV)-models/bin/python -m pip install --quiet --group models
 	touch $@
 
-test-models: setup $(VENV)-models/.dependencies
+test-models: setup $(VENV)-models/.dependencies  ## test predicted perception with PyTorch (6 GB)
 	PYTHONPATH=$(CURDIR)/python $(VENV)-models/bin/python -m pytest tests/models
 
-lint: setup
+lint: setup  ## check format, types, imports, spelling and English
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
@@ -60,29 +70,34 @@ lint: setup
 	$(BIN)/typos
 	$(BIN)/python scripts/check_english.py
 
-bench: setup
+format: setup  ## format Rust and Python, and sort imports
+	cargo fmt --all
+	$(BIN)/ruff check --quiet --select I --fix .
+	$(BIN)/ruff format .
+
+bench: setup  ## time the kernels against their peers, and write benches/README.md
 	$(BIN)/python -m pip install --quiet --group bench
 	cargo bench --workspace
 	$(BIN)/python -m benches
 
-wheel: $(VENV)/.dependencies
+wheel: $(VENV)/.maturin  ## build the wheel into dist
 	$(BIN)/maturin build --release --out dist
 
 # The bundled tasks, made again from the bundled houses, and the JSON Schema of their files from the records.
-data: setup
+data: setup  ## make the bundled tasks and the JSON Schema again
 	$(BIN)/python scripts/build_tasks.py
 	$(BIN)/evonav tasks schema --out python/evonav/tasks/schema
 
 # The results and the picture of the README, from a fresh demo.
-readme: setup
+readme: setup  ## renew the table and the picture of the README
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/update_readme.py out/demo
 	$(BIN)/evonav strip out/demo --agents ftu --out docs/images/episode.svg
 
 # The site, from the repository's own pages, into out/docs.
-docs: setup
+docs: setup  ## build the site into out/docs
 	$(BIN)/python scripts/build_docs.py
 
-clean:
+clean:  ## delete the environments and all that was built
 	rm -rf $(VENV) $(VENV)-models $(VENV)-procthor target dist out
