@@ -19,7 +19,7 @@ $(VENV)/.maturin:
 # The package with what its reports draw plots with: all that the demo needs.
 $(VENV)/.built: $(VENV)/.maturin pyproject.toml $(RUST_SOURCES)
 	@echo "Building evonav in $(VENV), which takes some minutes the first time ..."
-	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras viz
+	@$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[viz]"
 	@touch $@
 
 $(VENV)/.dependencies: $(VENV)/.maturin pyproject.toml
