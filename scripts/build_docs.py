@@ -18,6 +18,8 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "out" / "docs-source"
 SITE = ROOT / "out" / "docs"
 PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "benches/README.md", "docs/**/*.md")
+# The README is the package's page on its index too, so its links into the repository are absolute.
+_REPOSITORY = re.compile(r"https://(?:github\.com/evonav/evonav/blob|raw\.githubusercontent\.com/evonav/evonav)/main/")
 _LINK = re.compile(r"(!?\[[^\]]*\])\(([^)#\s]+)(#[^)\s]*)?\)")
 _ABSOLUTE = re.compile(r"[a-z]+:")
 
@@ -42,7 +44,7 @@ def pages() -> list[Path]:
 
 def links(page: Path) -> Iterator[tuple[str, Path]]:
     """What a page links inside the repository: the words of the link, and the file relative to the repository."""
-    text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"^```.*?^```", "", _text(page), flags=re.DOTALL | re.MULTILINE)
     for _, target, _ in _LINK.findall(text):
         if not _ABSOLUTE.match(target):
             yield target, (ROOT / page.parent / target).resolve().relative_to(ROOT)
@@ -56,10 +58,16 @@ def stage() -> None:
         for _, target in links(page):
             if target not in known and (ROOT / target).is_file():
                 _copy(target)
-        text = (ROOT / page).read_text(encoding="utf-8")
+        text = _text(page)
         name = page.with_name("index.md") if page == Path("README.md") else page
         (SOURCE / name).parent.mkdir(parents=True, exist_ok=True)
         (SOURCE / name).write_text(re.sub(r"\]\(\.\./README\.md", "](../index.md", text), encoding="utf-8")
+
+
+def _text(page: Path) -> str:
+    """Return a page with relative links into the repository."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return _REPOSITORY.sub("", text) if page == Path("README.md") else text
 
 
 def _copy(path: Path) -> None:

@@ -1,6 +1,8 @@
 """The wheel works outside the tree: built, unpacked by pip, and run with nothing of the repository on its path."""
 
+import email
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,6 +33,19 @@ def test_wheel_is_abi3_and_holds_types_and_data(wheel: Path) -> None:
     assert {"evonav/py.typed", "evonav/_core.pyi", "evonav/data/houses.jsonl.gz"} <= set(names)
     data_bytes = sum(info.compress_size for info in zipfile.ZipFile(wheel).infolist() if "/data/" in info.filename)
     assert data_bytes < 7_000_000
+
+
+def test_metadata_of_the_wheel_has_the_readme_with_absolute_links(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+    metadata = email.message_from_string(archive.read(name).decode())
+    assert metadata["Description-Content-Type"].startswith("text/markdown")
+    assert {"Author", "Keywords", "License-Expression", "License-File", "Requires-Python"} <= set(metadata)
+    assert len(metadata.get_all("Project-URL")) >= 4
+    page = re.sub(r"^```.*?^```", "", str(metadata.get_payload()), flags=re.DOTALL | re.MULTILINE)
+    targets = re.findall(r"\]\(([^)\s]+)\)", page)
+    assert targets
+    assert [target for target in targets if not target.startswith(("https://", "#"))] == []
 
 
 @pytest.mark.slow
