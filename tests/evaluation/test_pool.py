@@ -49,7 +49,7 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
         assert evaluate(["random-walk"], tasks, alone, config=config, num_workers=0) == summaries[index]
         assert texts(alone) == texts(tmp_path / f"cell-{index}")
     assert texts(tmp_path / "cell-0") != texts(tmp_path / "cell-1")
-    with pytest.raises(InvalidArgumentError, match="in one folder"):
+    with pytest.raises(InvalidArgumentError, match="the same folder"):
         evaluate_all([together[0], together[0]], Workforce(0))
 
 
