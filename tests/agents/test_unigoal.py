@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scripted_model import Scripted
+from scripted_model import scripted
 from toy_house import OBJECTS, ToySimulator, stage_case
 
 from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished
@@ -33,19 +33,6 @@ def run(agent, *stages, start=START, perception=None, protocol=None):
     records = [outcome.record for outcome in episode.run()]
     assert all(record.is_scored for record in records), [record.error for record in records]
     return records
-
-
-def scripted(**said):
-    """The text matcher, but for questions of the kinds given: words, or a function of the question."""
-    rules = TextMatch()
-
-    def script(question):
-        words = said.get(question.kind.replace("-", "_"))
-        if words is None:
-            return question.answer_text(rules.answer(question).answer)
-        return words(question) if callable(words) else words
-
-    return Scripted(script)
 
 
 def choices(record):

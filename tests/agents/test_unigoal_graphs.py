@@ -1,7 +1,7 @@
 """UniGoal's reasoning over goal graph and scene graph, with models that answer by a script."""
 
 import pytest
-from scripted_model import Scripted
+from scripted_model import scripted
 from toy_house import stage_case
 
 from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
@@ -10,24 +10,10 @@ from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.questions import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
 from evonav.agents.unigoal.scene_questions import CorrectionQuestion, LayoutQuestion
 from evonav.decision.query import QuerySession
-from evonav.decision.text.matcher import TextMatch
 
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
 OBJECTS_NAMED = "[vase, table, chair]"
 RELATIONS = "vase and table: vase is on table\ntable and chair: table is next to chair"
-
-
-def scripted(**said):
-    """The text matcher, but for questions of the kinds given: words, or a function of the question."""
-    rules = TextMatch()
-
-    def script(question):
-        words = said.get(question.kind.replace("-", "_"))
-        if words is None:
-            return question.answer_text(rules.answer(question).answer)
-        return words(question) if callable(words) else words
-
-    return Scripted(script)
 
 
 def reasoner(model, target="Chair|1", instruction=CHAIR_TEXT, *, nodes=(), relations=(), **config):

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from evonav.decision.question import Question, Reply
+from evonav.decision.text.matcher import TextMatch
 
 A = TypeVar("A")
 
@@ -32,3 +33,16 @@ class Scripted:
         self.questions.append(question)
         text = self._script(question)
         return Reply(question.parse(text), text)
+
+
+def scripted(**said: str | Callable[[Question[Any]], str]) -> Scripted:
+    """Return the text matcher, but for questions of the kinds given: words, or a function of the question."""
+    rules = TextMatch()
+
+    def script(question: Question[Any]) -> str:
+        words = said.get(question.kind.replace("-", "_"))
+        if words is None:
+            return question.answer_text(rules.answer(question).answer)
+        return words(question) if callable(words) else words
+
+    return Scripted(script)

@@ -132,11 +132,12 @@ class Explorer:
 
 def _eroded(cells: NDArray[np.bool_], margin_cells: int) -> NDArray[np.bool_]:
     """Return the cells whose neighbours up to `margin_cells` rows and columns away are all set, too."""
-    from scipy.ndimage import binary_erosion
-
-    width = 2 * margin_cells + 1
-    eroded: NDArray[np.bool_] = binary_erosion(cells, np.ones((width, width), np.bool_))
-    return eroded
+    for _ in range(margin_cells):
+        padded = np.pad(cells, 1)
+        shifts = range(3)
+        rows, cols = cells.shape
+        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in shifts for c in shifts])
+    return cells
 
 
 def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:
