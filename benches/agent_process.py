@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from evonav.agents.agent import AgentAction, Sensing, Stop
+from evonav.agents.agent import AgentAction, SensorConfig, Stop
 from evonav.component import Component
 from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
@@ -23,7 +23,7 @@ from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -41,12 +41,12 @@ NUM_PAIRS = 2
 class Idle:
     """Does nothing."""
 
-    sensing = Sensing()
+    sensors = SensorConfig()
 
     def begin_task(self, task: TaskInfo) -> None:
         """Nothing."""
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Nothing."""
 
     def act(self, observation: Observation) -> AgentAction:
@@ -93,7 +93,7 @@ def _agent() -> Iterator[RemoteAgent]:
             processes, "benches.agent_process:Idle", Component("evonav.decision.backends:text_match"), 0
         )
         agent.begin_task(TaskInfo("bench", 1, 50, MapFrame(100, 100, 0.1, (0.0, 0.0)), 0))
-        agent.begin_stage(StageInput(1, "Chair", "", "", "", np.zeros((SIDE_PX, SIDE_PX, 3), np.uint8)))
+        agent.begin_stage(Goal(1, "Chair", "", "", "", np.zeros((SIDE_PX, SIDE_PX, 3), np.uint8)))
         yield agent
 
 

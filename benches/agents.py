@@ -28,7 +28,7 @@ from evonav.report.run import PAPER_ORDER
 from evonav.sensors.observation import Observation
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_file
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Simulator
 
 A = TypeVar("A")
@@ -61,16 +61,16 @@ class Led:
     num_entries: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.sensing = self.agent.sensing
+        self.sensors = self.agent.sensors
 
     def begin_task(self, task: TaskInfo) -> None:
         """Of the house."""
         self.agent.begin_task(task)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """The first one with the tour."""
-        self.agent.begin_stage(stage)
-        if stage.stage == 1:
+        self.agent.begin_stage(goal)
+        if goal.stage == 1:
             self.tour(self.agent)
 
     def act(self, observation: Observation) -> AgentAction:
@@ -141,10 +141,10 @@ def _measure_growth(name: str) -> None:
     case = _case(backend)
     agent: Any = make_agent(name, TextMatchWithImages())
     simulator.reset(case.stages[0].house_json, case.start)
-    sensors = Sensors(simulator, perception, agent.sensing, _scene(case, simulator))
+    sensors = Sensors(simulator, perception, agent.sensors, _scene(case, simulator))
     sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
     before_mb = _peak_mb()
-    led = Led(agent, lambda _: None, never_stops=agent.sensing.motion == "waypoints")
+    led = Led(agent, lambda _: None, never_stops=agent.sensors.motion == "waypoints")
     _play(case, name, led, simulator, perception)
     sys.stdout.write(json.dumps({"growth_mb": _peak_mb() - before_mb, "rounds": len(led.round_ms)}))
 
@@ -173,7 +173,7 @@ def _scene(case: EpisodeSpec, simulator: Simulator) -> StageScene:
 def _tour(agent: Agent, case: EpisodeSpec, simulator: Simulator, perception: Perception) -> None:
     """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
     start = simulator.pose
-    sensors = Sensors(simulator, perception, agent.sensing, _scene(case, simulator))
+    sensors = Sensors(simulator, perception, agent.sensors, _scene(case, simulator))
     is_first = True
     for x_m, z_m in _places(simulator):
         for yaw_rad in (0.0, math.pi):

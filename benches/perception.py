@@ -15,7 +15,7 @@ from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.shorthand import read_word
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame
@@ -87,7 +87,7 @@ def _rounds() -> list[Round]:
 def _perceiver(word: str, rounds: Sequence[Round]) -> tuple[Callable[[int], object], bool]:
     """What perceives round `i`, and whether it needs colours."""
     backend = Backend(perception=read_word(word))
-    goal = StageInput(1, "Bed", "the bed", "the bed", "Find the bed.", np.zeros((300, 300, 3), np.uint8))
+    goal = Goal(1, "Bed", "the bed", "the bed", "Find the bed.", np.zeros((300, 300, 3), np.uint8))
     perceptions: list[Perception] = []
     for number, one in enumerate(rounds):
         perception = backend.perception.create()

@@ -9,25 +9,25 @@ the category, and believes what it remembers: it stops where a thing has been.
 
 import math
 
-from evonav.agents.agent import AgentAction, NavigateTo, Sensing, Stop
+from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop
 from evonav.memory import ObjectMap, OccupancyMap
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 class OwnAgent:
     """Goes to the nearest object of the asked-for category that it knows of, and explores until it knows one."""
 
     def __init__(self) -> None:
-        self.sensing = Sensing()
+        self.sensors = SensorConfig()
 
     def begin_task(self, task: TaskInfo) -> None:
         """A new house: forget everything."""
         self.map, self.objects = OccupancyMap(task.map_frame), ObjectMap()
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """A new goal in the same house: what is remembered stays."""
-        self.category = stage.category
+        self.category = goal.category
         self.target_m: tuple[float, float] | None = None
 
     def act(self, observation: Observation) -> AgentAction:

@@ -384,8 +384,8 @@ def view_of(points_m):
 
 def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
     agent, records = moved
-    assert agent.sensing.later_rounds == agent.sensing.first_round
-    assert (agent.sensing.later_rounds.count, agent.sensing.later_rounds.spacing_deg) == (7, 40.0)
+    assert agent.sensors.later_rounds == agent.sensors.first_round
+    assert (agent.sensors.later_rounds.count, agent.sensors.later_rounds.spacing_deg) == (7, 40.0)
     assert [len(observation.views) for observation, _, _ in agent.rounds] == [7] * sum(len(r.trace) for r in records)
     beliefs = [belief for _, _, belief in agent.rounds]
     for before, after in pairwise(beliefs):

@@ -161,7 +161,7 @@ def test_the_last_observation_wins_and_the_map_is_never_cleared(table_moved):
 def test_an_object_is_kept_until_arrival_without_another_question():
     model = scripted(object_if_any)
     agent = Watched(decision=model)
-    agent.sensing = replace(agent.sensing, max_travel_m=0.4)
+    agent.sensors = replace(agent.sensors, max_travel_m=0.4)
     (record,) = run(agent, stage_case(1, "Mug|1"))
     choices = [entry.choice for entry in record.trace]
     assert len(choices) > 2
@@ -286,7 +286,7 @@ def test_an_object_in_unmapped_surroundings_is_gone_to_by_the_planner(monkeypatc
 
 def test_a_clean_up_that_drops_the_chosen_entry_does_not_end_the_commitment(monkeypatch):
     agent = Watched(decision=scripted(object_if_any))
-    agent.sensing = replace(agent.sensing, max_travel_m=0.4)
+    agent.sensors = replace(agent.sensors, max_travel_m=0.4)
     update = ObjectMap.update
 
     def dropping(self, view):

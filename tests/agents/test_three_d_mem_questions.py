@@ -11,13 +11,13 @@ from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.question import AnswerError
 from evonav.decision.text.matcher import TextMatch
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 CLASSES = tuple(sorted(("Apple", "Bed", "Chair", "CounterTop", "DiningTable", "Fridge", "Mug", "Sink")))
 
 
 def goal(text, category):
-    return StageInput(1, category, text, text, text, np.zeros((1, 1, 3), np.uint8))
+    return Goal(1, category, text, text, text, np.zeros((1, 1, 3), np.uint8))
 
 
 MUG_GOAL = goal("Please navigate to the mug in the kitchen on the countertop next to the sink.", "Mug")

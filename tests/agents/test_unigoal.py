@@ -159,10 +159,10 @@ def test_an_obstacle_stays_when_it_is_gone_and_seals_nothing_else():
     before = []
 
     class Remembering(UniGoal):
-        def begin_stage(self, stage):
-            if stage.stage == 2:
+        def begin_stage(self, goal):
+            if goal.stage == 2:
                 before.append(self.belief())
-            super().begin_stage(stage)
+            super().begin_stage(goal)
 
     agent = Remembering()
     # Looking at the table, then with the table gone.
@@ -180,9 +180,9 @@ def test_the_scene_graph_stays_and_the_goal_graph_goes():
     noted = []
 
     class Noting(UniGoal):
-        def begin_stage(self, stage):
-            before = self.entries() if stage.stage == 2 else []
-            super().begin_stage(stage)
+        def begin_stage(self, goal):
+            before = self.entries() if goal.stage == 2 else []
+            super().begin_stage(goal)
             noted.append((before, self.entries()))
 
     model = scripted()

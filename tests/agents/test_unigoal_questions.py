@@ -21,11 +21,11 @@ from evonav.agents.unigoal.scene_questions import (
 )
 from evonav.decision.question import AnswerError
 from evonav.decision.text.matcher import TextMatch
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 
 TEXT = "Please navigate to the small red chair in the bedroom next to the bed and the dining table."
-GOAL = StageInput(1, "Chair", TEXT, TEXT, TEXT, np.zeros((300, 300, 3), np.uint8))
+GOAL = Goal(1, "Chair", TEXT, TEXT, TEXT, np.zeros((300, 300, 3), np.uint8))
 GRAPH = GoalGraph(
     ("chair", "bed", "dining table"),
     (GoalEdge("chair", "next to", "bed"), GoalEdge("chair", "next to", "dining table")),

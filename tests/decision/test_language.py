@@ -4,7 +4,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from evonav.decision.text.language import Goal, Relation, canonical, parse_goal, similarity
+from evonav.decision.text.language import ParsedGoal, Relation, canonical, parse_goal, similarity
 from evonav.generation.instructions.appearance import adjectives_of
 from evonav.generation.instructions.describe import unified_instruction
 from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
@@ -59,13 +59,13 @@ def relation(kind, noun):
         (
             "Please navigate to the mug in the kitchen on the countertop next to the sink.",
             None,
-            Goal("mug", (relation("in", "kitchen"), relation("on", "countertop"), relation("near", "sink"))),
+            ParsedGoal("mug", (relation("in", "kitchen"), relation("on", "countertop"), relation("near", "sink"))),
         ),
         (
             "Please navigate to the small white vase in the living room on the TV stand next to the laptop and the "
             "remote control near the window below the painting.",
             None,
-            Goal(
+            ParsedGoal(
                 "vase",
                 (
                     relation("in", "living room"),
@@ -81,21 +81,21 @@ def relation(kind, noun):
         (
             "Find the tall green potted plant standing beside the couch, near the large window.",
             None,
-            Goal("house plant", (relation("near", "sofa"), relation("near", "window")), ("tall", "green")),
+            ParsedGoal("house plant", (relation("near", "sofa"), relation("near", "window")), ("tall", "green")),
         ),
-        ("Go to the refrigerator.", "Fridge", Goal("fridge")),
+        ("Go to the refrigerator.", "Fridge", ParsedGoal("fridge")),
         (
             "Locate the brown wooden dresser with six drawers against the wall.",
             None,
-            Goal("dresser", (), ("brown", "wooden")),
+            ParsedGoal("dresser", (), ("brown", "wooden")),
         ),
         (
             "Navigate to the trash can inside the washroom, close to the bathtub.",
             None,
-            Goal("garbage can", (relation("in", "bathroom"), relation("near", "bathtub"))),
+            ParsedGoal("garbage can", (relation("in", "bathroom"), relation("near", "bathtub"))),
         ),
-        ("the soap bar in the sink", "SoapBar", Goal("soap bar", (relation("on", "sink"),))),
-        ("", None, Goal("")),
+        ("the soap bar in the sink", "SoapBar", ParsedGoal("soap bar", (relation("on", "sink"),))),
+        ("", None, ParsedGoal("")),
     ],
 )
 def test_reads(text, category, goal):

@@ -22,9 +22,9 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
-GOAL = StageInput(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))
+GOAL = Goal(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Letter(Question[str]):
 
     kind: ClassVar[str] = "letter"
     letters: str = "abcde"
-    goal: StageInput = GOAL
+    goal: Goal = GOAL
 
     def prompt(self) -> Prompt:
         return Prompt.of(Text(f"One of {self.letters}?"))

@@ -11,11 +11,11 @@ from evonav.decision.question import AnswerError, Question
 from evonav.decision.text.matcher import Matcher, TextMatch
 from evonav.decision.text.ranking import rank_by_feature, rank_entries
 from evonav.errors import DecisionError
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 
 def goal(text, category):
-    return StageInput(1, category, text, text, text, np.zeros((1, 1, 3), np.uint8))
+    return Goal(1, category, text, text, text, np.zeros((1, 1, 3), np.uint8))
 
 
 def thing(entry_id, label, x, z, *, y=0.4, size=(0.5, 0.8, 0.5), seen=3):

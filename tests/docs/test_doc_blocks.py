@@ -25,7 +25,7 @@ from evonav.house import bundled_houses
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -230,7 +230,7 @@ def test_the_doubting_agent_of_the_tutorial_forgets_an_object_that_is_gone() -> 
     agent = namespace["Doubter"]()
     agent.begin_task(TaskInfo("a-task", 1, 50, MapFrame(40, 60, 0.1, (-3.0, -1.0)), 0))
     goal = "Please find the mug."
-    agent.begin_stage(StageInput(1, "Mug", goal, goal, goal, np.zeros((8, 8, 3), np.uint8)))
+    agent.begin_stage(Goal(1, "Mug", goal, goal, goal, np.zeros((8, 8, 3), np.uint8)))
 
     target = agent.act(observation_of("Mug"))
     assert len(agent.objects.entries) == 1

@@ -5,7 +5,7 @@ import random
 import sys
 import time
 
-from evonav.agents.agent import EntryBelief, Move, RoundDiagnostics, Sensing, ViewSchedule
+from evonav.agents.agent import EntryBelief, Move, RoundDiagnostics, SensorConfig, ViewSchedule
 from evonav.world.simulator import Action
 
 
@@ -13,15 +13,15 @@ class Turning:
     """Keeps all of it: turns left or right, as its seed says."""
 
     def __init__(self):
-        self.sensing = Sensing(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
+        self.sensors = SensorConfig(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
 
     def begin_task(self, task):
         self.random = random.Random(task.seed)
         frame = task.map_frame
         self.corner_m = (frame.corner_m[0], 0.0, frame.corner_m[1])
 
-    def begin_stage(self, stage):
-        self.category = stage.category
+    def begin_stage(self, goal):
+        self.category = goal.category
 
     def act(self, observation):
         return Move(self.random.choice([Action.TURN_LEFT, Action.TURN_RIGHT]))
@@ -67,7 +67,7 @@ class Scribbling(Turning):
 
 class Greedy(Turning):
     def __init__(self):
-        self.sensing = Sensing(first_round=ViewSchedule(100, 3.6))
+        self.sensors = SensorConfig(first_round=ViewSchedule(100, 3.6))
 
 
 class Displaced(Turning):
@@ -76,10 +76,10 @@ class Displaced(Turning):
 
 
 class Halting(Turning):
-    def begin_stage(self, stage):
-        if stage.stage == 2:
-            raise KeyError(stage.category)
-        super().begin_stage(stage)
+    def begin_stage(self, goal):
+        if goal.stage == 2:
+            raise KeyError(goal.category)
+        super().begin_stage(goal)
 
 
 class Wordless(Turning):
@@ -92,16 +92,21 @@ class Opaque(Turning):
         return RoundDiagnostics(details={"self": self})
 
 
+class Senseless(Turning):
+    def __init__(self):
+        """Set no `sensors`."""
+
+
 class Plain:
     """Explains nothing."""
 
     def __init__(self):
-        self.sensing = Sensing(later_rounds=ViewSchedule(1, 0.0))
+        self.sensors = SensorConfig(later_rounds=ViewSchedule(1, 0.0))
 
     def begin_task(self, task):
         pass
 
-    def begin_stage(self, stage):
+    def begin_stage(self, goal):
         pass
 
     def act(self, observation):

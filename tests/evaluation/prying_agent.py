@@ -8,19 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.agents.agent import NavigateTo, Sensing
+from evonav.agents.agent import NavigateTo, SensorConfig
 
 
 class Prying:
     """Leaves strings, points and all that the system tells of its process in the file named by TOY_LOOT."""
 
-    sensing = Sensing(needs_rgb=True)
+    sensors = SensorConfig(needs_rgb=True)
 
     def begin_task(self, task):
         self.task = task
 
-    def begin_stage(self, stage):
-        self.is_last = stage.stage == 3
+    def begin_stage(self, goal):
+        self.is_last = goal.stage == 3
 
     def act(self, observation):
         if self.is_last:

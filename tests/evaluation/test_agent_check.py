@@ -11,7 +11,7 @@ import evonav
 from evonav.cli import app
 
 CHECKS = [
-    *("importable", "made", "sensing", "begin_task", "begin_stage", "act", "actions", "budget", "observations"),
+    *("importable", "made", "sensors", "begin_task", "begin_stage", "act", "actions", "budget", "observations"),
     *("diagnostics", "entries", "time", "same seed twice", "own process", "memory", "new task"),
 ]
 
@@ -35,7 +35,8 @@ def test_a_good_agent_passes_every_check():
         ("Collective", "same seed twice", "fail", "keep nothing in modules or classes"),
         ("Remembering", "new task", "fail", "must forget everything"),
         ("Scribbling", "observations", "warn", "detections.masks"),
-        ("Greedy", "sensing", "fail", "first_round.count = 100"),
+        ("Greedy", "sensors", "fail", "first_round.count = 100"),
+        ("Senseless", "sensors", "fail", "set `self.sensors = SensorConfig()`"),
         ("Displaced", "entries", "fail", "entry 4 (Mug)"),
         ("Halting", "begin_stage", "fail", "KeyError"),
         ("Wordless", "actions", "fail", "None is no action"),
@@ -82,8 +83,8 @@ def test_classes_and_objects_are_checked_too():
 def test_a_class_of_a_script_is_found_by_its_file(tmp_path):
     script = tmp_path / "an_agent_of_mine.py"
     script.write_text(
-        "import evonav\nfrom evonav.agents.agent import Sensing, Stop\n\n"
-        "class Mine:\n    sensing = Sensing()\n    def begin_task(self, task): pass\n"
+        "import evonav\nfrom evonav.agents.agent import SensorConfig, Stop\n\n"
+        "class Mine:\n    sensors = SensorConfig()\n    def begin_task(self, task): pass\n"
         "    def begin_stage(self, stage): pass\n    def act(self, observation): return Stop()\n\n"
         "if __name__ == '__main__':\n    print(evonav.check_agent(Mine))\n"
     )

@@ -34,7 +34,7 @@ from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -279,7 +279,7 @@ def echo():
     processes = AgentProcesses(AgentHosting(timeout_s=30.0))
     agent = RemoteAgent(processes, "unruly_agents:Echo", Component("evonav.decision.backends:text_match"), 0)
     agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
-    agent.begin_stage(StageInput(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8)))
+    agent.begin_stage(Goal(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8)))
     yield agent
     processes.close()
 
@@ -309,7 +309,7 @@ def test_processes_are_reused_and_agents_are_not():
     nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
     assert first.act(nothing).reason == "nothing left to explore"
     process = processes.process("toy_agents:Explorer")
-    assert second.sensing == first.sensing
+    assert second.sensors == first.sensors
     assert processes.process("toy_agents:Explorer") is process
     with pytest.raises(AgentFailedError, match="begin_task comes first"):
         second.act(nothing)
@@ -331,8 +331,8 @@ def test_agents_are_looked_for_in_a_process_of_their_own():
 def test_an_agent_is_loaded_from_its_file(tasks, tmp_path):
     (tmp_path / "neighbour_of_mine.py").write_text("REASON = 'as the file says'\n")
     (tmp_path / "agent_of_mine.py").write_text(
-        "from evonav.agents.agent import Sensing, Stop\nfrom neighbour_of_mine import REASON\n\n"
-        "class Mine:\n    sensing = Sensing()\n    def begin_task(self, task): pass\n"
+        "from evonav.agents.agent import SensorConfig, Stop\nfrom neighbour_of_mine import REASON\n\n"
+        "class Mine:\n    sensors = SensorConfig()\n    def begin_task(self, task): pass\n"
         "    def begin_stage(self, stage): pass\n    def act(self, observation): return Stop(REASON)\n"
     )
     name = f"{tmp_path}/agent_of_mine.py:Mine"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
-from evonav.agents.agent import NavigateTo, Sensing, Stop, ViewSchedule
+from evonav.agents.agent import NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
@@ -135,20 +135,20 @@ class Told:
 
     def __init__(self, fails_at=None, motion_kind="waypoints"):
         one = ViewSchedule(1, 0.0)
-        self.sensing = Sensing(one, one, motion=motion_kind)
+        self.sensors = SensorConfig(one, one, motion=motion_kind)
         self.fails_at, self.stage, self.seen = fails_at, 0, []
 
     def begin_task(self, task):
         pass
 
-    def begin_stage(self, stage):
-        self.stage = stage.stage
+    def begin_stage(self, goal):
+        self.stage = goal.stage
 
     def act(self, observation):
         self.seen.append((self.stage, observation.is_guided, observation.num_rounds_left, observation.has_arrived))
         if self.fails_at == (self.stage, len([one for one in self.seen if one[0] == self.stage])):
             raise RuntimeError("no")
-        return Stop("enough") if len(self.seen) % 2 or self.sensing.motion == "actions" else NavigateTo((7.0, 4.0))
+        return Stop("enough") if len(self.seen) % 2 or self.sensors.motion == "actions" else NavigateTo((7.0, 4.0))
 
 
 @pytest.mark.parametrize("kind", ["waypoints", "actions"])

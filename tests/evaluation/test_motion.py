@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_house import ToySimulator, episode_spec
 
-from evonav.agents.agent import NavigateTo, Sensing, ViewSchedule
+from evonav.agents.agent import NavigateTo, SensorConfig, ViewSchedule
 from evonav.agents.viewpoint import observation_point
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
@@ -65,16 +65,16 @@ def test_navigation_stops_after_a_metre_and_turns_on_arrival():
 
 
 def test_the_protocol_caps_what_an_agent_may_sense():
-    ProtocolConfig().check(Sensing())
-    for sensing in (
-        Sensing(first_round=ViewSchedule(8, 40.0)),
-        Sensing(later_rounds=ViewSchedule(0, 40.0)),
-        Sensing(max_travel_m=1.5),
-        Sensing(max_travel_m=float("nan")),
-        Sensing(occupancy_range_m=3.5),
+    ProtocolConfig().check(SensorConfig())
+    for sensors in (
+        SensorConfig(first_round=ViewSchedule(8, 40.0)),
+        SensorConfig(later_rounds=ViewSchedule(0, 40.0)),
+        SensorConfig(max_travel_m=1.5),
+        SensorConfig(max_travel_m=float("nan")),
+        SensorConfig(occupancy_range_m=3.5),
     ):
         with pytest.raises(InvalidArgumentError):
-            ProtocolConfig().check(sensing)
+            ProtocolConfig().check(sensors)
 
 
 def test_the_floor_plan_holds_rooms_walls_and_footprints():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_spec, write_tasks
 
-from evonav.agents.agent import NavigateTo, Sensing
+from evonav.agents.agent import NavigateTo, SensorConfig
 from evonav.component import Component
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import OracleBaseline
@@ -43,7 +43,7 @@ def reachable(roots):
 class Hostile:
     """Walks the object graph of all its arguments."""
 
-    sensing = Sensing(needs_rgb=True)
+    sensors = SensorConfig(needs_rgb=True)
 
     def __init__(self):
         self.handed = []
@@ -51,8 +51,8 @@ class Hostile:
     def begin_task(self, task):
         self.handed.append(task)
 
-    def begin_stage(self, stage):
-        self.handed.append(stage)
+    def begin_stage(self, goal):
+        self.handed.append(goal)
 
     def act(self, observation):
         self.handed.append(observation)

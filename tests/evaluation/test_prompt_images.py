@@ -26,14 +26,14 @@ class Recorder:
 
     def __init__(self, agent, model):
         self.agent, self.model = agent, model
-        self.sensing = agent.sensing
+        self.sensors = agent.sensors
         self.views, self.asked = [], []
 
     def begin_task(self, task):
         self.agent.begin_task(task)
 
-    def begin_stage(self, stage):
-        self.agent.begin_stage(stage)
+    def begin_stage(self, goal):
+        self.agent.begin_stage(goal)
 
     def act(self, observation):
         self.views += observation.views

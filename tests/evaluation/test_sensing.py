@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_house import ToySimulator, stage_case
 
-from evonav.agents.agent import Sensing
+from evonav.agents.agent import SensorConfig
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.unigoal.bev import BevMap
 from evonav.component import Component
@@ -94,9 +94,9 @@ def test_views_and_pose_are_as_perceived_and_the_record_tells_the_truth(episode)
 
 def test_a_round_is_one_batch_with_colours_that_only_the_perception_sees(episode):
     agent, perception, _ = episode
-    sensing = Sensing()
-    assert len(perception.batches[0]) == sensing.first_round.count
-    assert len(perception.batches[1]) == sensing.later_rounds.count
+    sensors = SensorConfig()
+    assert len(perception.batches[0]) == sensors.first_round.count
+    assert len(perception.batches[1]) == sensors.later_rounds.count
     assert all(frame.rgb is not None for frames in perception.batches for frame in frames)
     assert all(view.rgb is None for observation in agent.seen for view in observation.views)
 
@@ -126,7 +126,7 @@ def test_memories_place_objects_where_they_are_at_any_camera_height(camera_heigh
     simulator = EmbeddedSimulator(SimulatorConfig(camera_height_m=camera_height_m))
     simulator.reset(next(bundled_houses()).to_json())
     scene = StageScene("a-house", stage_case(1, "Bed|1").public, "an-agent", 0, simulator.objects)
-    observation = Sensors(simulator, GroundTruthPerception(), Sensing(), scene).observe(
+    observation = Sensors(simulator, GroundTruthPerception(), SensorConfig(), scene).observe(
         is_first=True, num_rounds_left=1
     )
     assert observation.pose.y_m == pytest.approx(0.9), "the pose of the body"

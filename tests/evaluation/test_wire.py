@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, Sensing, Stop, ViewSchedule
+from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
 from evonav.agents.hosting import wire
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
@@ -83,10 +83,10 @@ def test_actions_of_another_kind_are_refused() -> None:
 @pytest.mark.parametrize(
     ("part", "value", "message"),
     [
-        (wire.SENSING, None, "sensing = None"),
-        (wire.SENSING, Sensing(first_round=ViewSchedule(2.5, 1.0)), r"sensing\.first_round\.count = 2\.5"),
-        (wire.SENSING, Sensing(motion="flight"), r"sensing\.motion = 'flight'"),
-        (wire.SENSING, Sensing(needs_rgb=1), r"sensing\.needs_rgb = 1"),
+        (wire.SENSORS, None, "sensors = None"),
+        (wire.SENSORS, SensorConfig(first_round=ViewSchedule(2.5, 1.0)), r"sensors\.first_round\.count = 2\.5"),
+        (wire.SENSORS, SensorConfig(motion="flight"), r"sensors\.motion = 'flight'"),
+        (wire.SENSORS, SensorConfig(needs_rgb=1), r"sensors\.needs_rgb = 1"),
         (wire.DIAGNOSTICS, RoundDiagnostics(num_entries=True), r"diagnostics\.num_entries = True"),
         (wire.DIAGNOSTICS, RoundDiagnostics(counters={"a": 0.5}), r"diagnostics\.counters\.a = 0\.5"),
         (wire.ENTRIES, [EntryBelief(1, "Mug", (0.0, 0.0), (1.0, 1.0, 1.0), 1)], r'missing "entries\.0\.centre_m\.2"'),

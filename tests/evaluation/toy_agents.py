@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.agents.agent import NavigateTo, Sensing, Stop
+from evonav.agents.agent import NavigateTo, SensorConfig, Stop
 from evonav.agents.nearest_frontier import NearestFrontier
 
 
@@ -15,9 +15,9 @@ class Explorer(NearestFrontier):
 
     stage = 0
 
-    def begin_stage(self, stage):
-        self.stage = stage.stage
-        super().begin_stage(stage)
+    def begin_stage(self, goal):
+        self.stage = goal.stage
+        super().begin_stage(goal)
 
 
 class Dying(Explorer):
@@ -63,18 +63,18 @@ class Lost(Explorer):
 class FarSighted(Explorer):
     def __init__(self):
         super().__init__()
-        self.sensing = Sensing(occupancy_range_m=100.0)
+        self.sensors = SensorConfig(occupancy_range_m=100.0)
 
 
 class Idle:
     """Stops at once: what comes for free."""
 
-    sensing = Sensing()
+    sensors = SensorConfig()
 
     def begin_task(self, task):
         pass
 
-    def begin_stage(self, stage):
+    def begin_stage(self, goal):
         pass
 
     def act(self, observation):

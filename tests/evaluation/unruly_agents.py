@@ -215,12 +215,12 @@ class Keeping(Explorer):
 class Echo:
     """Says what arrays it was given."""
 
-    sensing = Explorer().sensing
+    sensors = Explorer().sensors
 
     def begin_task(self, task):
         pass
 
-    def begin_stage(self, stage):
+    def begin_stage(self, goal):
         pass
 
     def act(self, observation):

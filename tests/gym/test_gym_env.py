@@ -12,7 +12,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
-from evonav.agents.agent import AgentAction, Move, NavigateTo, Sensing, Stop
+from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig, Stop
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import episode_spec
@@ -66,11 +66,11 @@ class _Replaying:
     """An agent that does what it was handed."""
 
     def __init__(self, actions: list[AgentAction], motion: str) -> None:
-        self.sensing = Sensing(motion=motion)
+        self.sensors = SensorConfig(motion=motion)
         self._actions = iter(actions)
 
     def begin_task(self, task): ...
-    def begin_stage(self, stage): ...
+    def begin_stage(self, goal): ...
     def act(self, observation):
         return next(self._actions)
 

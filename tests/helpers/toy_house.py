@@ -13,7 +13,7 @@ import numpy as np
 
 from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
 from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig
 
@@ -246,7 +246,7 @@ def stage_case(stage, target_id, *, moves=None, before=None, instruction=None, m
     was = {key: (before or {}).get(key, OBJECTS[key][1]) for key in OBJECTS}
     text = instruction or f"Please navigate to the {category}."
     return StageSpec(
-        public=StageInput(stage, category, text, text, text, np.zeros((8, 8, 3), dtype=np.uint8)),
+        public=Goal(stage, category, text, text, text, np.zeros((8, 8, 3), dtype=np.uint8)),
         house_json=house_json(moves),
         target=TargetRecord(
             object_id=target_id,

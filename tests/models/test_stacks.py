@@ -20,7 +20,7 @@ from evonav.perception.vocabulary import PROCTHOR_TYPES
 from evonav.replay.replay import RunReplay
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 
 pytest.importorskip("torch", reason="needs PyTorch: make test-models")
@@ -131,7 +131,7 @@ def test_a_run_is_not_resumed_with_other_weights(tiny_models: Path, tmp_path: Pa
 
 def test_percepts_hold_types_features_and_one_label_a_pixel(tiny_models: Path) -> None:
     perception = predicted_perception("transformers", str(tiny_models), "cpu", min_confidence=0.0)
-    goal = StageInput(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
+    goal = Goal(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
     perception.begin_stage(StageScene("task", goal, "fu", 0, ()))
     simulator = EmbeddedSimulator()
     from evonav.house import bundled_houses

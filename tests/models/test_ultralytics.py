@@ -10,7 +10,7 @@ from evonav.errors import PerceptionError
 from evonav.perception import StageScene
 from evonav.perception.models import libraries, open_clip_models, ultralytics_models
 from evonav.perception.predicted import StackConfig, StackPerception, facts_of
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 
 pytest.importorskip("ultralytics", reason="needs ultralytics: make test-models")
@@ -136,7 +136,7 @@ def test_a_round_with_3d_mems_stack(folder: Path, yolo) -> None:
     assert set(facts["libraries"]) == {"torch", "open_clip_torch", "ultralytics"}
     assert len(facts["weights"]) == 4
     perception = StackPerception("auto", config, str(folder), "cpu")
-    goal = StageInput(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
+    goal = Goal(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
     perception.begin_stage(StageScene("task", goal, "fu", 0, ()))
     (percept,) = perception.perceive([frame])
     assert set(percept.detections.labels) <= {"Bed", "table"}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav.decision.query import QueryLogEntry
 from evonav.sensors.observation import MapFrame, Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Action
 
 
@@ -22,7 +22,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class NavigateTo:
-    """Go towards a point along planner waypoints, at most `Sensing.max_travel_m` this round."""
+    """Go towards a point along planner waypoints, at most `SensorConfig.max_travel_m` this round."""
 
     position_m: tuple[float, float]
     """`(x, z)`; snapped to the nearest free point."""
@@ -50,7 +50,7 @@ class ViewSchedule:
 
 
 @dataclass(frozen=True, slots=True)
-class Sensing:
+class SensorConfig:
     """The sensors that an agent needs (default: 3D-Mem's schedule), within the limits of `ProtocolConfig`."""
 
     first_round: ViewSchedule = ViewSchedule(7, 40.0)
@@ -64,15 +64,16 @@ class Sensing:
 
 
 class Agent(Protocol):
-    """An agent as evonav evaluates it."""
+    """An agent as evonav evaluates it: a subclass, or any class with these methods and `sensors`."""
 
-    sensing: Sensing
+    sensors: SensorConfig = SensorConfig()
+    """The sensors that the agent needs."""
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house and forget everything."""
         ...
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal in the same house, which may have changed."""
         ...
 

@@ -13,7 +13,7 @@ from evonav.agents.agent import (
     FrontierBelief,
     NavigateTo,
     RoundDiagnostics,
-    Sensing,
+    SensorConfig,
     Stop,
 )
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
@@ -25,14 +25,19 @@ from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 class NavigatorAgent(ABC):
     """An agent with a map, object entries, stored views and a decision model."""
 
     def __init__(
-        self, config: NavigatorConfig, decision: DecisionModel | None, *, num_tries: int, sensing: Sensing | None = None
+        self,
+        config: NavigatorConfig,
+        decision: DecisionModel | None,
+        *,
+        num_tries: int,
+        sensors: SensorConfig | None = None,
     ) -> None:
         """Create the agent; its memory is made when a task begins.
 
@@ -40,10 +45,10 @@ class NavigatorAgent(ABC):
             config: Parameters of the navigator.
             decision: Decision model; default: the text matcher.
             num_tries: Number of tries before a question without a valid answer counts as failed.
-            sensing: The sensors that the agent needs, apart from colours.
+            sensors: The sensors that the agent needs, apart from colours.
         """
         model: DecisionModel = decision or TextMatch()
-        self.sensing = replace(sensing or Sensing(), needs_rgb=model.needs_images)
+        self.sensors = replace(sensors or SensorConfig(), needs_rgb=model.needs_images)
         self._navigator_config = config
         self._queries = QuerySession(model, num_tries=num_tries)
         self._counters: Counter[str] = Counter()
@@ -58,10 +63,10 @@ class NavigatorAgent(ABC):
         self._queries.counters.clear()
         self._navigator = Navigator(task.map_frame, self._navigator_config)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; the memory stays."""
-        self._goal = stage
-        self._navigator.begin_stage(stage.stage)
+        self._goal = goal
+        self._navigator.begin_stage(goal.stage)
 
     @abstractmethod
     def act(self, observation: Observation) -> AgentAction:
@@ -70,11 +75,11 @@ class NavigatorAgent(ABC):
     def _heading_view(self) -> Pixels | None:
         """Return the heading view of the last round for a prompt, if the model looks at images."""
         view = self._navigator.round_views[-1]
-        return pixels_of(view, self._navigator.config.image_px) if self.sensing.needs_rgb else None
+        return pixels_of(view, self._navigator.config.image_px) if self.sensors.needs_rgb else None
 
     def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them, with images if the model looks at them."""
-        navigator, with_images = self._navigator, self.sensing.needs_rgb
+        navigator, with_images = self._navigator, self.sensors.needs_rgb
         return [navigator.frontier_candidate(f, here, with_images=with_images) for f in navigator.explorer.frontiers]
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:

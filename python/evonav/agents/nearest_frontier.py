@@ -1,9 +1,9 @@
 """Exploration alone: the agent always goes to the nearest frontier."""
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop
 from evonav.agents.explorer import Explorer, nearest_frontier
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 class NearestFrontier:
@@ -13,7 +13,7 @@ class NearestFrontier:
     """
 
     def __init__(self) -> None:
-        self.sensing = Sensing()
+        self.sensors = SensorConfig()
         self._explorer: Explorer | None = None
         self._choice = ""
 
@@ -21,7 +21,7 @@ class NearestFrontier:
         """Start with a blank map."""
         self._explorer = Explorer(task.map_frame)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Start with a blank map."""
         if self._explorer is not None:
             self._explorer.clear()

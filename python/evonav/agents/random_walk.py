@@ -3,15 +3,15 @@
 import math
 import random
 
-from evonav.agents.agent import AgentAction, NavigateTo, Sensing, ViewSchedule
+from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, ViewSchedule
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 class RandomWalk:
     """Goes straight on, or in a new direction now and then and whenever the way was blocked."""
 
-    sensing = Sensing(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
+    sensors = SensorConfig(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
 
     def __init__(self, turn_probability: float = 0.25) -> None:
         self._turn_probability = turn_probability
@@ -23,7 +23,7 @@ class RandomWalk:
         self._random = random.Random(f"random-walk {task.seed}")  # noqa: S311
         self._heading_rad = self._random.uniform(-math.pi, math.pi)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Ignore the goal."""
 
     def act(self, observation: Observation) -> AgentAction:
@@ -31,7 +31,7 @@ class RandomWalk:
         if not observation.is_action_success or self._random.random() < self._turn_probability:
             self._heading_rad = self._random.uniform(-math.pi, math.pi)
         pose = observation.pose
-        reach_m = self.sensing.max_travel_m
+        reach_m = self.sensors.max_travel_m
         return NavigateTo(
             (pose.x_m + reach_m * math.sin(self._heading_rad), pose.z_m + reach_m * math.cos(self._heading_rad))
         )

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Prompt:
         return Prompt(turns, self.schema)
 
 
-def goal_prompt(goal: StageInput, *contents: str | tuple[str, NDArray[np.uint8] | None]) -> Prompt:
+def goal_prompt(goal: Goal, *contents: str | tuple[str, NDArray[np.uint8] | None]) -> Prompt:
     """Return the prompt of a question about a goal.
 
     The goal is the unified instruction alone, as in the reported experiments (paper, Sec. C.1).

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, Typ
 
 from evonav.decision.prompts import Prompt
 from evonav.errors import DecisionError
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 if TYPE_CHECKING:
     from evonav.decision.text.matcher import Matcher
@@ -54,7 +54,7 @@ class Question(ABC, Generic[A]):
 
     kind: ClassVar[str]
     """The question's name in records, counters and pictures, such as `choose`."""
-    goal: StageInput
+    goal: Goal
 
     @abstractmethod
     def prompt(self) -> Prompt:

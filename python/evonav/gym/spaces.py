@@ -12,7 +12,7 @@ from PIL import Image
 
 from evonav import _core
 from evonav.gym.config import ACTIONS, NavConfig
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 MAX_STAGES = 64
 MAX_INSTRUCTION = 2000
@@ -125,13 +125,13 @@ def waypoint_m(
     return x_m + right_m * cos + ahead_m * sin, z_m - right_m * sin + ahead_m * cos
 
 
-def instruction_text(goal: StageInput) -> str:
+def instruction_text(goal: Goal) -> str:
     """Return the instruction as an element of its space: characters beyond ASCII become `?`."""
     text = goal.unified_instruction[:MAX_INSTRUCTION]
     return "".join(character if character in _CHARACTERS else "?" for character in text)
 
 
-def reference_image(goal: StageInput, side_px: int) -> NDArray[np.uint8]:
+def reference_image(goal: Goal, side_px: int) -> NDArray[np.uint8]:
     """Return the goal's image, `(S, S, 3)`, as a copy."""
     if goal.reference_image.shape[:2] == (side_px, side_px):
         return goal.reference_image.copy()

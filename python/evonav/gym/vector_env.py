@@ -16,7 +16,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.agents.agent import Sensing
+from evonav.agents.agent import SensorConfig
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.gym import spaces
@@ -286,7 +286,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             self._has_succeeded[index] = 0
             return 0.0
         spacing_m = self.config.protocol.waypoint_m
-        points, is_end = motion.waypoints([here, *corners], spacing_m, Sensing().max_travel_m)
+        points, is_end = motion.waypoints([here, *corners], spacing_m, SensorConfig().max_travel_m)
         way = [here, *points]
         stops = [
             (there, math.atan2(there[0] - from_m[0], there[1] - from_m[1]))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.sensors.observation import Detections
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, SceneObject
 
@@ -18,7 +18,7 @@ class StageScene:
     """Input of a perception at the start of a stage. It is on the evaluator's side: the objects are oracle data."""
 
     task_id: str
-    goal: StageInput
+    goal: Goal
     agent: str
     """Name of the agent that is given the percepts: published agents have detectors of their own."""
     seed: int

@@ -79,7 +79,7 @@ class Recorder:
         self.agent = agent
         self._on_round = on_round
         self._losses = losses or {}
-        is_small = agent.sensing.motion == "actions"
+        is_small = agent.sensors.motion == "actions"
         self._sizes = (SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY) if is_small else (HEADING_PX, SIDE_PX, QUALITY)
         if heading_px is not None:
             self._sizes = (heading_px, SIDE_PX, 90)

@@ -91,7 +91,7 @@ class RunReplay:
 
     def budget(self, agent: str) -> int:
         """Return the number of rounds that an agent has in a stage."""
-        return self.protocol.budget(make_agent(agent).sensing)
+        return self.protocol.budget(make_agent(agent).sensors)
 
     def episode(
         self,

@@ -16,7 +16,7 @@ from evonav.agents.agent import (
     Move,
     NavigateTo,
     RoundDiagnostics,
-    Sensing,
+    SensorConfig,
     Stop,
     ViewSchedule,
 )
@@ -30,7 +30,7 @@ from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRec
 from evonav.evaluation.run.components import Backend
 from evonav.perception import Percept, StageScene
 from evonav.sensors.observation import Detections, Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Action, Frame, Simulator
 
 
@@ -39,7 +39,7 @@ class RecordedAgent:
 
     def __init__(self, records: Mapping[int, StageRecord]) -> None:
         """Replay an episode, given its stages by number."""
-        self.sensing = Sensing()
+        self.sensors = SensorConfig()
         self._records = records
         self._record: StageRecord | None = None
         self._num_acted = 0
@@ -47,11 +47,11 @@ class RecordedAgent:
     def begin_task(self, task: TaskInfo) -> None:
         """Do nothing."""
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Turn to the stage's record."""
-        self._record = self._records[stage.stage]
+        self._record = self._records[goal.stage]
         self._num_acted = 0
-        self.sensing = _sensing_of(self._record)
+        self.sensors = _sensing_of(self._record)
 
     def act(self, observation: Observation) -> AgentAction:
         """Return the recorded action of this round."""
@@ -153,11 +153,11 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     return answer
 
 
-def _sensing_of(record: StageRecord) -> Sensing:
+def _sensing_of(record: StageRecord) -> SensorConfig:
     granted = record.sensing
     if granted is None:
         raise InvalidArgumentError(f"{record.task_id} stage {record.stage}: the record has no `sensing`")
-    return Sensing(
+    return SensorConfig(
         first_round=ViewSchedule(*granted.first_round),
         later_rounds=ViewSchedule(*granted.later_rounds),
         motion=granted.motion,

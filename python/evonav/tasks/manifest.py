@@ -17,7 +17,7 @@ from pydantic import (
 
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.parameters import GenerationParameters
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.tasks.records import Id, PoseRecord, Record, Sha256, record_bytes, sha256_of
 from evonav.world.pose import Pose
 
@@ -148,14 +148,14 @@ class Task:
         vars(task)["contents"] = self.contents  # they do not depend on the header
         return task
 
-    def public(self, stage: int) -> StageInput:
+    def public(self, stage: int) -> Goal:
         """Return the agent's input of a stage.
 
         Raises:
             IndexError: The stage does not exist.
         """
         public = self.public_stages[self._index(stage)]
-        return StageInput(
+        return Goal(
             stage=stage,
             category=public.category,
             basic_instruction=public.basic_instruction,

@@ -22,7 +22,7 @@ class TaskInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class StageInput:
+class Goal:
     """The goal input `g_k` (paper, Sec. A.3) without its start pose, which would reveal the previous target.
 
     Instructions follow the grammar of `evonav.tasks.language`.

@@ -8,14 +8,14 @@ without when there is no valid answer. With `--decision vlm` the model is any Op
 import math
 from dataclasses import dataclass
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import ObjectMap, OccupancyMap
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class WhichObject(Question[int]):
     """Which of the remembered objects does the instruction mean? The answer is its number, 0 for none."""
 
     kind = "which_object"
-    goal: StageInput
+    goal: Goal
     labels: tuple[str, ...]
 
     def prompt(self) -> Prompt:
@@ -55,7 +55,7 @@ class AskingAgent:
     """Explores; asks whenever an object of the asked-for category is new; goes where the answer says."""
 
     def __init__(self, decision: DecisionModel | None = None) -> None:
-        self.sensing = Sensing()
+        self.sensors = SensorConfig()
         self.queries = None if decision is None else QuerySession(decision)
 
     def begin_task(self, task: TaskInfo) -> None:
@@ -64,9 +64,9 @@ class AskingAgent:
         if self.queries is not None:
             self.queries.counters.clear()
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """A new goal."""
-        self.goal = stage
+        self.goal = goal
         self.target: tuple[int, tuple[float, float]] | None = None
         self.refused: set[int] = set()
 

@@ -98,7 +98,7 @@ class FrontierUpdate(NavigatorAgent):
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
-            objects=[navigator.with_images(entry) for entry in ranked] if self.sensing.needs_rgb else ranked,
+            objects=[navigator.with_images(entry) for entry in ranked] if self.sensors.needs_rgb else ranked,
             frontiers=self._frontier_candidates(here),
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,

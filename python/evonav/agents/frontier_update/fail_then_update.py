@@ -11,7 +11,7 @@ from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 SAME_PLACE_M = 0.5
 """An entry whose middle is this near that of a rejected one with its label counts as the same."""
@@ -43,9 +43,9 @@ class FailThenUpdate(FrontierUpdate):
         super().begin_task(task)
         self._counters.update(verifications=0, rejected_entries=0)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; entries rejected in the last stage are no longer in memory."""
-        super().begin_stage(stage)
+        super().begin_stage(goal)
         self._rejected.clear()
         self._details = {}
 
@@ -64,7 +64,7 @@ class FailThenUpdate(FrontierUpdate):
         is_present = self._queries.ask(
             VerifyQuestion(
                 goal=self._goal,
-                entry=navigator.with_images(remembered) if self.sensing.needs_rgb else remembered,
+                entry=navigator.with_images(remembered) if self.sensors.needs_rgb else remembered,
                 seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
                 image_share=image_share(observation.views[-1], entry.centre_m, entry.size_m),
                 views=[image for image in images if image is not None],

@@ -11,7 +11,7 @@ from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion,
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import choose_candidate
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
 
@@ -21,7 +21,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
     """Ask where to go next: to one of the objects, or to one of the frontiers."""
 
     kind: ClassVar[str] = "choose"
-    goal: StageInput
+    goal: Goal
     position_m: Point2
     """`(x, z)` of the agent."""
     objects: Sequence[ObjectCandidate]
@@ -100,7 +100,7 @@ class VerifyQuestion(YesNoQuestion):
     """Ask whether the present observation supports that the remembered object is still here."""
 
     kind: ClassVar[str] = "verify"
-    goal: StageInput
+    goal: Goal
     entry: ObjectCandidate
     seen: Sequence[Sighting]
     """Objects in the present views, for models that do not look at images. Not part of the prompt."""

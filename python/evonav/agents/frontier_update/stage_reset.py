@@ -11,7 +11,7 @@ from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.question import DecisionModel
 from evonav.memory.occupancy import FREE
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class StageReset(FrontierUpdate):
         super().__init__(config, decision)
         self._on_nothing_found = config.on_nothing_found
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Forget entries, map, frontiers, views and ids; counters count over the whole task."""
         before = self._navigator.explorer
         self._navigator = Navigator(self._task.map_frame, self.config.navigator)
@@ -38,13 +38,13 @@ class StageReset(FrontierUpdate):
         explorer.num_conflicts = before.num_conflicts
         explorer.num_cells_cleared = before.num_cells_cleared
         explorer.num_frontiers_reset = before.num_frontiers_reset
-        super().begin_stage(stage)
+        super().begin_stage(goal)
 
     def _without_candidates(self, observation: Observation) -> AgentAction:
         """Go where most floor is free if the stage's first look found nothing, as one into a corner does."""
         navigator = self._navigator
         if navigator.round == 0 and self._on_nothing_found == "widest_direction":
-            here, travel_m = (observation.pose.x_m, observation.pose.z_m), self.sensing.max_travel_m
+            here, travel_m = (observation.pose.x_m, observation.pose.z_m), self.sensors.max_travel_m
             occupancy = navigator.explorer.map
             bearing_rad = widest_direction_rad(occupancy.cells == FREE, occupancy.map_frame, here, travel_m)
             if bearing_rad is not None:

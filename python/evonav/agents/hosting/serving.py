@@ -167,17 +167,17 @@ class _Server:
         self._agent = None
         self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
         self._agent = new_agent(self._factory, self._decision)
-        return self._sensing()
+        return self._sensors()
 
     def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
         """Begin a task."""
         self.agent.begin_task(task)
-        return self._sensing()
+        return self._sensors()
 
-    def do_begin_stage(self, stage: Any) -> dict[str, bytes]:  # noqa: ANN401 - `StageInput`
+    def do_begin_stage(self, goal: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Goal`
         """Begin a stage."""
-        self.agent.begin_stage(stage)
-        return self._sensing()
+        self.agent.begin_stage(goal)
+        return self._sensors()
 
     def do_act(self, observation: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Observation`
         """Run a decision round, and return the action and the agent's diagnostics."""
@@ -205,8 +205,8 @@ class _Server:
             costs["agent_peak_rss_mb"] = peak_mb
         return {"costs": wire.COSTS.write(costs)}
 
-    def _sensing(self) -> dict[str, bytes]:
-        return {"sensing": wire.SENSING.write(self.agent.sensing)}
+    def _sensors(self) -> dict[str, bytes]:
+        return {"sensors": wire.write_sensors(self.agent)}
 
 
 def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) -> bytes:

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, to_json, to_jsonable_python
 
-from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
@@ -162,8 +162,24 @@ def _check_depth(value: object, depth: int) -> None:
         _check_depth(part, depth - 1)
 
 
-SENSING = Part("sensing", TypeAdapter(Sensing), MAX_DIAGNOSTICS_BYTES)
+SENSORS = Part("sensors", TypeAdapter(SensorConfig), MAX_DIAGNOSTICS_BYTES)
 """The sensors that an agent needs; the limits of the protocol are not checked here."""
+
+
+def write_sensors(agent: Agent) -> bytes:
+    """Return an agent's sensors as JSON.
+
+    Raises:
+        InvalidArgumentError: The agent has no `sensors`, or they are no `SensorConfig`.
+    """
+    if not hasattr(agent, "sensors"):
+        raise InvalidArgumentError(
+            "the agent has no `sensors`: set `self.sensors = SensorConfig()` in `__init__`,"
+            " or make its class a subclass of `evonav.Agent`"
+        )
+    return SENSORS.write(agent.sensors)
+
+
 DIAGNOSTICS: Part[RoundDiagnostics] = Part(
     "diagnostics", TypeAdapter(Annotated[RoundDiagnostics, AfterValidator(_shallow)]), MAX_DIAGNOSTICS_BYTES
 )

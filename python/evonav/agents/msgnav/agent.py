@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import AgentAction, NavigateTo, Sensing, Stop, ViewSchedule
+from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explorer import ExplorerConfig
 from evonav.agents.msgnav.candidates import GraphObject, PastChoice
 from evonav.agents.msgnav.memory import GraphMemory
@@ -26,7 +26,7 @@ from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class MsgNav(NavigatorAgent):
             self.config.navigator,
             decision,
             num_tries=self.config.num_tries,
-            sensing=Sensing(every_round, every_round),
+            sensors=SensorConfig(every_round, every_round),
         )
 
     def begin_task(self, task: TaskInfo) -> None:
@@ -100,9 +100,9 @@ class MsgNav(NavigatorAgent):
         super().begin_task(task)
         self._memory = GraphMemory(self._navigator, max_edge_m=self.config.max_edge_m)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; graph, images and map stay, target and history do not."""
-        super().begin_stage(stage)
+        super().begin_stage(goal)
         self._target: MsgNavTarget | None = None
         self._history: list[PastChoice] = []
         self._candidates = ()
@@ -145,7 +145,7 @@ class MsgNav(NavigatorAgent):
         navigator = self._navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
-        images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensing.needs_rgb else []
+        images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensors.needs_rgb else []
         self._counters["verifications"] += 1
         is_found = self._queries.ask(
             ArrivalQuestion(
@@ -214,7 +214,7 @@ class MsgNav(NavigatorAgent):
     ) -> GraphQuestion:
         """Return the main question, with as few images as show every edge."""
         memory, config = self._memory, self.config
-        images = memory.images(subgraph.view_ids, config.navigator.image_px if self.sensing.needs_rgb else None)
+        images = memory.images(subgraph.view_ids, config.navigator.image_px if self.sensors.needs_rgb else None)
         number_of = {image.view_id: number for number, image in enumerate(images)}
         shown = set(subgraph.entry_ids)
         edges = []

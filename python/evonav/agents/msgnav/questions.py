@@ -17,10 +17,10 @@ from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesNoQuestion, first_line, lines_of
-from evonav.decision.text.language import Goal, canonical, similarity
+from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher, gap_m
 from evonav.decision.text.ranking import rank_entries
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)
 _OBJECT = re.compile(r"object\s+(\d+)[.]?", re.IGNORECASE)
@@ -34,7 +34,7 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
     """Ask which objects help to find the goal (key subgraph selection)."""
 
     kind: ClassVar[str] = "subgraph"
-    goal: StageInput
+    goal: Goal
     objects: Sequence[GraphObject]
     """The whole graph."""
     position_m: Point2
@@ -108,7 +108,7 @@ class GraphQuestion(Question[GraphChoice]):
     """Ask where to go: to an object of the graph, to something that an image shows, or on exploring."""
 
     kind: ClassVar[str] = "graph"
-    goal: StageInput
+    goal: Goal
     objects: Sequence[GraphObject]
     """Selected objects and their neighbours."""
     edges: Sequence[tuple[int, int, tuple[int, ...]]]
@@ -216,7 +216,7 @@ class GraphQuestion(Question[GraphChoice]):
                 return GraphChoice("object", left[-index].entry_id), f"where the {goal.noun} should be"
         return GraphChoice("explore"), "relations do not hold" if named else "nothing remembered fits"
 
-    def _unmapped(self, matcher: Matcher, goal: Goal, around: Sequence[ObjectCandidate]) -> GraphChoice | None:
+    def _unmapped(self, matcher: Matcher, goal: ParsedGoal, around: Sequence[ObjectCandidate]) -> GraphChoice | None:
         """Choose the largest detection of the goal's category that belongs to no entry and lies at no known place."""
         known_m = [candidate.ground_m for candidate in around if matcher.names_goal(goal, candidate)]
         known_m += [past.place_m for past in self.history if past.place_m is not None]
@@ -249,7 +249,7 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
     """Ask behind which frontier the goal may be; the answer is its place in the list."""
 
     kind: ClassVar[str] = "frontier"
-    goal: StageInput
+    goal: Goal
     frontiers: Sequence[FrontierCandidate]
     surroundings: Sequence[ObjectCandidate]
     """Everything remembered: what the images would show. Not part of the prompt."""
@@ -293,7 +293,7 @@ class ArrivalQuestion(YesNoQuestion):
     """Ask whether the goal is here: at a chosen object, with all that was seen on the last stretch to it."""
 
     kind: ClassVar[str] = "arrival"
-    goal: StageInput
+    goal: Goal
     target: ObjectCandidate
     """The object that the agent went to. Not part of the prompt."""
     seen: Sequence[ObjectCandidate]

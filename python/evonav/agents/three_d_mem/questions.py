@@ -10,7 +10,7 @@ from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import choose_candidate, rank_entries
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
 _FRONTIER = re.compile(r"frontier\s+(\d+)\b[.:]?", re.IGNORECASE)
@@ -40,7 +40,7 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
     """Ask which classes of remembered objects may lead to the goal, the most useful first."""
 
     kind: ClassVar[str] = "prefilter"
-    goal: StageInput
+    goal: Goal
     class_names: Sequence[str]
     """Classes of the objects in snapshots; each once, sorted."""
     max_classes: int = 10
@@ -98,7 +98,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
     """Ask where to go next: to an object in one of the snapshots, or to one of the frontiers."""
 
     kind: ClassVar[str] = "choose_snapshot"
-    goal: StageInput
+    goal: Goal
     position_m: Point2
     """`(x, z)` of the agent."""
     snapshots: Sequence[SnapshotCandidate]

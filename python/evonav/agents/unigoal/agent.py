@@ -19,7 +19,7 @@ from evonav.agents.agent import (
     FrontierBelief,
     Move,
     RoundDiagnostics,
-    Sensing,
+    SensorConfig,
     Stop,
     ViewSchedule,
 )
@@ -34,7 +34,7 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
@@ -60,7 +60,7 @@ class UniGoalConfig:
 class UniGoal:
     """Maps, relates, explores, and walks up to what looks like the goal."""
 
-    sensing = Sensing(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0), motion="actions")
+    sensors = SensorConfig(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0), motion="actions")
 
     def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or UniGoalConfig()
@@ -78,9 +78,9 @@ class UniGoal:
         self._bev: BevMap | None = None
         self._num_given_up = 0
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Drop the goal graph and all goals; map, visited cells, collisions and scene graph stay."""
-        self._graphs.begin_stage(stage)
+        self._graphs.begin_stage(goal)
         self._advice: Advice | None = None
         self._wander_m: Point2 | None = None
         self._num_steps = 0

@@ -25,7 +25,7 @@ from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CODE_CATEGORIES, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 MatchStage = Literal["zero", "partial", "perfect"]
@@ -93,7 +93,7 @@ class GraphReasoner:
         self._queries = queries
         self._matcher = Matcher()
 
-    def begin_stage(self, goal: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Drop the goal graph; the scene graph stays."""
         self._goal = goal
         self.scene.begin_stage(goal.stage)

@@ -15,7 +15,7 @@ from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.language import canonical, parse_goal
 from evonav.decision.text.matcher import Matcher
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 _LIST = re.compile(r"\[([^\[\]]*)\]\.?")
@@ -52,7 +52,7 @@ class DescribeQuestion(Question[str]):
     """Ask what the goal image shows in its middle, and how that relates to its surroundings."""
 
     kind: ClassVar[str] = "describe"
-    goal: StageInput
+    goal: Goal
     image: Pixels = field(compare=False, repr=False)
 
     def prompt(self) -> Prompt:
@@ -80,7 +80,7 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
     """Ask which objects the goal mentions."""
 
     kind: ClassVar[str] = "goal-objects"
-    goal: StageInput
+    goal: Goal
     text: str
     """The goal in words: the instruction, or the description of the goal image."""
 
@@ -119,7 +119,7 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
     """Ask for the relations between the goal's objects."""
 
     kind: ClassVar[str] = "goal-relations"
-    goal: StageInput
+    goal: Goal
     text: str
     objects: tuple[str, ...]
 
@@ -171,7 +171,7 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
     """Ask into which parts the goal graph falls."""
 
     kind: ClassVar[str] = "decompose"
-    goal: StageInput
+    goal: Goal
     graph: GoalGraph
 
     def prompt(self) -> Prompt:
@@ -252,7 +252,7 @@ class CategoryQuestion(ClosedQuestion[str]):
     """Ask which of its detector's categories the goal is."""
 
     kind: ClassVar[str] = "category"
-    goal: StageInput
+    goal: Goal
     text: str
     target: str
     """The object to find, as the goal graph calls it."""

@@ -19,7 +19,7 @@ from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _PLACE = re.compile(rf"(.+?): \(({_NUMBER}), ({_NUMBER})\)\.?")
@@ -71,7 +71,7 @@ class RelationLinesQuestion(LinesQuestion[tuple[str, ...]]):
 
     kind: ClassVar[str] = "scene-relations"
     things: ClassVar[str] = "pairs"
-    goal: StageInput
+    goal: Goal
     pairs: Sequence[tuple[SceneNode, SceneNode]]
 
     @property
@@ -113,7 +113,7 @@ class RoomQuestion(ClosedQuestion[str]):
     """Ask in which room the goal likely is."""
 
     kind: ClassVar[str] = "room"
-    goal: StageInput
+    goal: Goal
     subgraph: GoalGraph
     rooms: tuple[str, ...]
     """Rooms that have nodes."""
@@ -152,7 +152,7 @@ class GroupScoreQuestion(Question[float]):
     """Ask how likely the goal is near this group; the original asks in a dialogue of four turns."""
 
     kind: ClassVar[str] = "group-score"
-    goal: StageInput
+    goal: Goal
     subgraph: GoalGraph
     group: Group
     edges: Sequence[SceneEdge]
@@ -208,7 +208,7 @@ class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
 
     kind: ClassVar[str] = "layout"
     things: ClassVar[str] = "objects"
-    goal: StageInput
+    goal: Goal
     subgraph: GoalGraph
     anchors: Mapping[str, SceneNode]
     """Goal nodes that the scene graph has. Their places are not part of the prompt."""
@@ -268,7 +268,7 @@ class CorrectionQuestion(LinesQuestion[tuple[Verdict, ...]]):
 
     kind: ClassVar[str] = "correction"
     things: ClassVar[str] = "nodes and edges"
-    goal: StageInput
+    goal: Goal
     subgraph: GoalGraph
     nodes: Sequence[SceneNode]
     """Nodes within two hops of the match."""

@@ -109,7 +109,7 @@ class Relation:
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class ParsedGoal:
     """The content of an instruction."""
 
     noun: str
@@ -164,7 +164,7 @@ def similarity(noun: str, label: str) -> float:
 
 
 @lru_cache(maxsize=4096)
-def parse_goal(instruction: str, category: str | None = None) -> Goal:
+def parse_goal(instruction: str, category: str | None = None) -> ParsedGoal:
     """Parse an instruction, each only once.
 
     Args:
@@ -193,7 +193,7 @@ def parse_goal(instruction: str, category: str | None = None) -> Goal:
     appearance = re.split(r"\bwith\b", text[: matches[0].start()] if matches else text)[0]
     tokens = [token for token in re.findall(r"[a-z]+(?:-[a-z]+)?", appearance) if token not in noun.split()]
     adjectives = tuple(dict.fromkeys(_ADJECTIVES[token] for token in tokens if token in _ADJECTIVES))
-    return Goal(noun, tuple(relations), adjectives)
+    return ParsedGoal(noun, tuple(relations), adjectives)
 
 
 def _relation(kind: RelationKind, thing: str) -> Relation | None:

@@ -13,9 +13,9 @@ from typing import TypeVar
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
 from evonav.decision.question import Question, Reply
-from evonav.decision.text.language import Goal, Relation, canonical, parse_goal, similarity
+from evonav.decision.text.language import ParsedGoal, Relation, canonical, parse_goal, similarity
 from evonav.tasks.language import STRUCTURES
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 A = TypeVar("A")
 
@@ -83,15 +83,15 @@ class Matcher:
     def __init__(self, config: TextMatchConfig | None = None) -> None:
         self.config = config or TextMatchConfig()
 
-    def parsed(self, goal: StageInput) -> Goal:
+    def parsed(self, goal: Goal) -> ParsedGoal:
         """Return the parsed instruction."""
         return parse_goal(goal.unified_instruction, goal.category)
 
-    def names_goal(self, goal: Goal, entry: ObjectCandidate) -> bool:
+    def names_goal(self, goal: ParsedGoal, entry: ObjectCandidate) -> bool:
         """Return whether an entry's label is the goal's name for its target."""
         return similarity(goal.noun, entry.label) >= self.config.min_similarity
 
-    def label_score(self, goal: Goal, label: str) -> float:
+    def label_score(self, goal: ParsedGoal, label: str) -> float:
         """Return 1 for the goal's own label, less for part of it, still less for a related object."""
         own = similarity(goal.noun, label)
         if own >= self.config.min_similarity:
@@ -99,7 +99,7 @@ class Matcher:
         related = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *related])
 
-    def relation_share(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+    def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
 
         Adjectives do not count: memory has no colours, and an object that is small for its kind may be the
@@ -151,7 +151,9 @@ class Matcher:
                 votes[room].append(weight)
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
 
-    def frontier_cost_m(self, goal: Goal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]) -> float:
+    def frontier_cost_m(
+        self, goal: ParsedGoal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]
+    ) -> float:
         """Return the distance to travel, less the value of a hint: a mentioned object, or the right type of room."""
         mentioned = {relation.noun for relation in goal.relations if relation.kind != "in"}
         is_lead = any(

@@ -12,15 +12,13 @@ from evonav.decision.question import AnswerError
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 
 _DECIMALS = 4
 """Decimals of a similarity: the number of threads changes a product in the seventh."""
 
 
-def rank_entries(
-    matcher: Matcher, goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2
-) -> list[int]:
+def rank_entries(matcher: Matcher, goal: Goal, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     """Return the indices of all entries, those whose label the instruction mentions first.
 
     Stands for the paper's CLIP similarity (Sec. C.4), which ground-truth perception lacks. Ties go to more detections,
@@ -36,7 +34,7 @@ def rank_entries(
     return _ranked({label: matcher.label_score(parsed, label) for label in _labels(entries)}, entries, position_m)
 
 
-def rank_by_text(goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
+def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     """Rank as `rank_entries` does, by the meaning of labels and instruction (extra `evonav[text]`).
 
     It stands for CLIP's image features where a perception has none; the paper (Sec. C.4) compares images with text.
@@ -108,7 +106,7 @@ def similarity_of_label(instruction: str, label: str) -> float:
 
 def choose_candidate(
     matcher: Matcher,
-    stage: StageInput,
+    stage: Goal,
     objects: Sequence[ObjectCandidate],
     frontiers: Sequence[FrontierCandidate],
     surroundings: Sequence[ObjectCandidate],

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from evonav.decision.text.language import Goal, parse_goal, similarity
+from evonav.decision.text.language import ParsedGoal, parse_goal, similarity
 
 _GOAL = re.compile(r"^(?:Goal of the robot|A robot is told|A robot looks for)(?: for)?:? (.*)$", re.MULTILINE)
 _TITLE = re.compile(r"^((?:Snapshot \d+, )?Object \d+|Frontier \d+):? ?(.*)$", re.MULTILINE)
@@ -40,7 +40,7 @@ def answer_lines(text: str) -> list[str]:
     return ["I cannot tell."]
 
 
-def _candidate(text: str, goal: Goal) -> list[str]:
+def _candidate(text: str, goal: ParsedGoal) -> list[str]:
     """Choose a candidate labelled like the goal; else the first frontier, else anything."""
     titles = _TITLE.findall(text)
     labelled = [title for title, label in titles if _is_goal(goal, label)]
@@ -48,31 +48,31 @@ def _candidate(text: str, goal: Goal) -> list[str]:
     return [*labelled, *frontiers, *(title for title, _ in titles), "Frontier 0"][:1]
 
 
-def _graph_choice(text: str, goal: Goal) -> list[str]:
+def _graph_choice(text: str, goal: ParsedGoal) -> list[str]:
     rejected = set(re.findall(r"chose object (\d+) - not correct", text))
     objects = re.findall(r"^(\d+), ([^,\n]+), [-\d.]+, ", text, re.MULTILINE)
     chosen = [f"Object {number}" for number, label in objects if _is_goal(goal, label) and number not in rejected]
     return [*chosen, "Continue Exploration"][:1]
 
 
-def _ids(text: str, goal: Goal) -> list[str]:
+def _ids(text: str, goal: ParsedGoal) -> list[str]:
     objects = re.findall(r"^(\d+): ([^,\n]+), ", text, re.MULTILINE)
     objects.sort(key=lambda found: -similarity(goal.noun, found[1]))
     return [number for number, _ in objects[:20]] or ["0"]
 
 
-def _names(text: str, goal: Goal) -> list[str]:
+def _names(text: str, goal: ParsedGoal) -> list[str]:
     listed = text.partition("of these classes:\n")[2].partition("\nRank")[0].splitlines()
     nouns = [goal.noun, *(relation.noun for relation in goal.relations)]
     return [name for noun in nouns for name in listed if similarity(noun, name) >= _IS_SAME] or ["none"]
 
 
-def _goal_objects(text: str, goal: Goal) -> list[str]:
+def _goal_objects(text: str, goal: ParsedGoal) -> list[str]:
     nouns = [goal.noun, *(relation.noun for relation in goal.relations if relation.kind != "in")]
     return [f"[{', '.join(list(dict.fromkeys(nouns))[:5])}]"]
 
 
-def _relations(text: str, goal: Goal) -> list[str]:
+def _relations(text: str, goal: ParsedGoal) -> list[str]:
     pairs = text.partition("pairs of objects in a home:\n")[2].partition("\nHow do they")[0]
     if pairs:
         named = [pair.split(" and ") for pair in pairs.splitlines()]
@@ -87,12 +87,12 @@ def _relations(text: str, goal: Goal) -> list[str]:
     return relations or ["none"]
 
 
-def _subgraphs(text: str, goal: Goal) -> list[str]:
+def _subgraphs(text: str, goal: ParsedGoal) -> list[str]:
     graph = text.partition("objects and relations: ")[2].partition("\nDivide")[0]
     return [f'{{"subgraph_1": {graph}}}']
 
 
-def _one_of(text: str, goal: Goal) -> list[str]:
+def _one_of(text: str, goal: ParsedGoal) -> list[str]:
     listed = re.findall(r"\[([^\[\]]*)\]", text)
     names = listed[-1].split(", ") if listed else []
     noun = re.search(r"It is to find: ([^.\n]*)", text)
@@ -100,20 +100,20 @@ def _one_of(text: str, goal: Goal) -> list[str]:
     return [*fitting, *(["none"] if "none of them" in text else names)][:1] or ["none"]
 
 
-def _layout(text: str, goal: Goal) -> list[str]:
+def _layout(text: str, goal: ParsedGoal) -> list[str]:
     listed = re.search(r"objects \[(.*?)\]", text)
     return [f"{name}: ({index}, {index})" for index, name in enumerate(listed[1].split(", ") if listed else [])]
 
 
-def _corrections(text: str, goal: Goal) -> list[str]:
+def _corrections(text: str, goal: ParsedGoal) -> list[str]:
     return [f"{number}: keep" for number in re.findall(r"^(\d+): ", text, re.MULTILINE)]
 
 
-def _is_goal(goal: Goal, label: str) -> bool:
+def _is_goal(goal: ParsedGoal, label: str) -> bool:
     return bool(label) and similarity(goal.noun, label) >= _IS_SAME
 
 
-_RULES: Sequence[tuple[str, Callable[[str, Goal], list[str]]]] = (
+_RULES: Sequence[tuple[str, Callable[[str, ParsedGoal], list[str]]]] = (
     ('"Continue Exploration"', _graph_choice),
     ('"Frontier i"', _candidate),
     ('"yes" or "no"', lambda text, goal: ["yes"]),

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.hosting.error_text import describe
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.hosting.agent import LocalAgent
 from evonav.evaluation.protocol import ProtocolConfig
@@ -35,7 +36,7 @@ def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
         probe: The agent.
         records: The records of the episode's stages.
     """
-    yield _sensing(probe)
+    yield _sensors(probe)
     calls = {"begin_task": "a new house", "begin_stage": "a new goal in the same house", "act": "a decision round"}
     for name, what in calls.items():
         error = probe.errors.get(name)
@@ -62,14 +63,17 @@ def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
             yield Check("time", "warn" if mean_s > SLOW_ROUND_S else "pass", finding)
 
 
-def _sensing(probe: Probe) -> Check:
+def _sensors(probe: Probe) -> Check:
     try:
-        sensing = LocalAgent(probe).sensing
-        PROTOCOL.check(sensing)
+        sensors = LocalAgent(probe).sensors
     except Exception as error:
-        return Check("sensing", "fail", f"{error}; `evonav.evaluation.protocol.ProtocolConfig` has the limits")
-    finding = f"{sensing.first_round.count} views, then {sensing.later_rounds.count}; {sensing.motion}"
-    return Check("sensing", "pass", finding)
+        return Check("sensors", "fail", str(error))
+    try:
+        PROTOCOL.check(sensors)
+    except InvalidArgumentError as error:
+        return Check("sensors", "fail", f"{error}; `evonav.evaluation.protocol.ProtocolConfig` has the limits")
+    finding = f"{sensors.first_round.count} views, then {sensors.later_rounds.count}; {sensors.motion}"
+    return Check("sensors", "pass", finding)
 
 
 def _actions(probe: Probe, records: Sequence[StageRecord]) -> Check:
@@ -89,7 +93,7 @@ def _budget(probe: Probe, records: Sequence[StageRecord]) -> Check:
     if not scored:
         return Check("budget", "skip", "no stage was finished")
     num_stopped = sum(record.has_stopped for record in scored)
-    budget = PROTOCOL.budget(probe.sensing)
+    budget = PROTOCOL.budget(probe.sensors)
     finding = f"the agent ended {num_stopped} of {len(scored)} stages itself, within {budget} rounds"
     if len(scored) > 1 and all(record.num_rounds == 1 for record in scored):
         return Check("budget", "warn", f"{finding}; it never did anything else")

@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, Sensing
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, SensorConfig
 from evonav.agents.hosting import wire
 from evonav.sensors.observation import MapFrame, Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 T = TypeVar("T")
 
@@ -37,23 +37,23 @@ class Probe:
         self._changed = ""
 
     @property
-    def sensing(self) -> Sensing:
+    def sensors(self) -> SensorConfig:
         """The sensors that the agent needs."""
-        return self.agent.sensing
+        return self.agent.sensors
 
-    @sensing.setter
-    def sensing(self, sensing: Sensing) -> None:
-        self.agent.sensing = sensing
+    @sensors.setter
+    def sensors(self, sensors: SensorConfig) -> None:
+        self.agent.sensors = sensors
 
     def begin_task(self, task: TaskInfo) -> None:
         """Begin a task."""
         self._frame = task.map_frame
         self._call("begin_task", lambda: self.agent.begin_task(task))
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Begin a stage."""
-        self._note("reference_image", stage.reference_image)
-        self._call("begin_stage", lambda: self.agent.begin_stage(stage))
+        self._note("reference_image", goal.reference_image)
+        self._call("begin_stage", lambda: self.agent.begin_stage(goal))
 
     def act(self, observation: Observation) -> AgentAction:
         """Run a decision round, and measure its time."""

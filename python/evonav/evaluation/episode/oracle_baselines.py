@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
@@ -17,7 +17,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.records.schema import Point3
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 STOP_DISTANCE_M = 1.0
 """An oracle baseline stops this near the target: well inside the success radius, so that no rounding decides."""
@@ -36,7 +36,7 @@ class OracleBaseline:
     """An agent that the evaluator also gives the target's place, and whether the target is in view."""
 
     description = ""
-    sensing: Sensing = Sensing()
+    sensors: SensorConfig = SensorConfig()
 
     def __init__(self) -> None:
         self._target_m: tuple[float, float] = (math.nan, math.nan)
@@ -58,7 +58,7 @@ class OracleBaseline:
     def begin_task(self, task: TaskInfo) -> None:
         """Do nothing: there is no memory."""
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Do nothing: the goal is not read."""
 
     def act(self, observation: Observation) -> AgentAction:
@@ -90,16 +90,16 @@ class PerfectRecognition(OracleBaseline):
     def __init__(self) -> None:
         super().__init__()
         self._explorer = NearestFrontier()
-        self.sensing = self._explorer.sensing
+        self.sensors = self._explorer.sensors
         self._has_seen_target = False
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget the map."""
         self._explorer.begin_task(task)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Begin with a new target, not yet seen; the map stays."""
-        self._explorer.begin_stage(stage)
+        self._explorer.begin_stage(goal)
         self._has_seen_target = False
 
     def act(self, observation: Observation) -> AgentAction:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from evonav.agents.agent import Sensing, ViewSchedule
+from evonav.agents.agent import SensorConfig, ViewSchedule
 from evonav.evaluation.episode.staleness import StalenessTracker
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.perception import Percept, Perception, StageScene
@@ -35,7 +35,7 @@ class Sensors:
         self,
         simulator: Simulator,
         perception: Perception,
-        sensing: Sensing,
+        sensors: SensorConfig,
         scene: StageScene,
         staleness: StalenessTracker | None = None,
         stopwatch: Stopwatch | None = None,
@@ -45,14 +45,14 @@ class Sensors:
         Args:
             simulator: A simulator with the stage's house.
             perception: The run's perception.
-            sensing: The sensing that the agent was granted.
+            sensors: The sensors that the agent was granted.
             scene: The stage as the perception may know it.
             staleness: Receives every frame.
             stopwatch: Measures rendering and perception.
         """
         self._simulator = simulator
         self._perception = perception
-        self._sensing = sensing
+        self._config = sensors
         self._grid = simulator.occupancy()
         self._staleness = staleness
         self._stopwatch = stopwatch or Stopwatch()
@@ -73,10 +73,10 @@ class Sensors:
     ) -> Observation:
         """Observe from the agent's pose."""
         self.pose = pose = self._simulator.pose
-        schedule = self._sensing.first_round if is_first else self._sensing.later_rounds
+        schedule = self._config.first_round if is_first else self._config.later_rounds
         yaws_rad = view_yaws_rad(schedule, pose.yaw_rad)
         with self._stopwatch.timing("simulation"):
-            rgb = self._sensing.needs_rgb or self._perception.needs_rgb
+            rgb = self._config.needs_rgb or self._perception.needs_rgb
             frames = [
                 self._simulator.render(replace(pose, yaw_rad=yaw_rad), rgb=rgb, instances=True) for yaw_rad in yaws_rad
             ]
@@ -104,8 +104,8 @@ class Sensors:
             intrinsics=frame.intrinsics,
             depth_m=percept.depth_m,
             detections=percept.detections,
-            occupancy=visible_occupancy(self._grid, place, frame.intrinsics, self._sensing.occupancy_range_m),
-            rgb=frame.rgb if self._sensing.needs_rgb else None,
+            occupancy=visible_occupancy(self._grid, place, frame.intrinsics, self._config.occupancy_range_m),
+            rgb=frame.rgb if self._config.needs_rgb else None,
         )
 
 

@@ -18,7 +18,7 @@ from evonav.evaluation.records.schema import (
 from evonav.house import House
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.public import StageInput
+from evonav.tasks.public import Goal
 from evonav.world.pose import Pose
 
 THUMBNAIL_PX = 160
@@ -39,7 +39,7 @@ class GuidedWalk:
 class StageSpec:
     """A stage as the evaluator knows it; only `public` ever reaches an agent."""
 
-    public: StageInput
+    public: Goal
     house_json: str
     target: TargetRecord
     transition: TransitionRecord
@@ -133,7 +133,7 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
     no_image = np.zeros((0, 0, 3), dtype=np.uint8)
     stages = tuple(
         StageSpec(
-            public=StageInput(stage, "", "", "", "", no_image),
+            public=Goal(stage, "", "", "", "", no_image),
             house_json="",
             target=TargetRecord(
                 object_id="",

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, Sensing, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, SensorConfig, Stop
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.observer import EpisodeObserver, StageFailedError, attribute_errors, traceback_of
@@ -87,7 +87,7 @@ class Stage:
         self._stage = self._spec.stages[record.stage - 1]
         self._record = record
         self._requested = requested
-        self._sensing = Sensing()
+        self._sensor_config = SensorConfig()
         self._planner = motion.Planner(self._simulator)
         self._stopwatch = stopwatch
         self._staleness = StalenessTracker((), "", (), state.tracked, 1)
@@ -108,7 +108,7 @@ class Stage:
                     return self._guided(self._stage.guided)
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
-                progress = self._begin(self._protocol.budget(self._sensing), reference_m)
+                progress = self._begin(self._protocol.budget(self._sensor_config), reference_m)
                 stop_reason = self._rounds(progress, self._carry_out)
                 return self._measured(progress, reference_m, stop_reason)
         except StageFailedError as failure:
@@ -150,7 +150,7 @@ class Stage:
                 self._baseline.reveal_stale(self._staleness.stale_ids(beliefs))
                 beliefs = self._entries()
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
-        self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
+        self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensor_config)})
 
     def _is_agent_in_evolved_room(self) -> bool:
         room_id = self._record.transition.room_id
@@ -160,29 +160,29 @@ class Stage:
         return house.room_of(self._requested.x_m, self._requested.z_m) == room_id
 
     def _tell_goal(self) -> None:
-        """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""
-        self._sensing = self._granted()
+        """Tells the agent of the task, if it does not know, and of the stage. Its sensors are held for the stage."""
+        self._sensor_config = self._granted()
         if not self._state.has_begun:
             self._agent.begin_task(
                 TaskInfo(
                     task_id=self._spec.task_id,
                     num_stages=len(self._spec.stages),
-                    max_rounds=self._protocol.budget(self._sensing),
+                    max_rounds=self._protocol.budget(self._sensor_config),
                     map_frame=map_frame(self._simulator.occupancy()),
                     seed=self._seed,
                 )
             )
             self._state.has_begun = True
         self._agent.begin_stage(self._stage.public)
-        self._sensing = self._granted()
+        self._sensor_config = self._granted()
         if self._baseline is not None:
             self._baseline.reveal_target(self._stage.target.position_m)
 
-    def _granted(self) -> Sensing:
+    def _granted(self) -> SensorConfig:
         """Return the agent's sensor settings, checked against the protocol."""
-        sensing = self._agent.sensing
-        self._protocol.check(sensing)
-        return sensing
+        sensors = self._agent.sensors
+        self._protocol.check(sensors)
+        return sensors
 
     def _path_to_target_m(self) -> list[motion.Point2]:
         """Return the planner's path from the agent to the target; empty if there is none."""
@@ -233,7 +233,7 @@ class Stage:
 
     def _guided(self, walk: GuidedWalk) -> StageRecord:
         """Follow the reference path; the agent's actions are recorded but ignored."""
-        is_stepwise = self._sensing.motion == "actions"
+        is_stepwise = self._sensor_config.motion == "actions"
         travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
         legs = motion.legs(walk.path_m, travel_m)
         progress = self._begin(len(legs) + 1, ())
@@ -261,7 +261,9 @@ class Stage:
             objects=self._simulator.objects,
         )
         with attribute_errors(ErrorKind.SIMULATION):
-            return Sensors(self._simulator, self._perception, self._sensing, scene, self._staleness, self._stopwatch)
+            return Sensors(
+                self._simulator, self._perception, self._sensor_config, scene, self._staleness, self._stopwatch
+            )
 
     def _answer(self, observation: Observation) -> AgentAction:
         """Return the agent's action for an observation."""
@@ -273,9 +275,9 @@ class Stage:
                     Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
                 )
             action = self._agent.act(observation)
-            if isinstance(action, NavigateTo) and self._sensing.motion == "actions":
+            if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
                 raise InvalidArgumentError(
-                    "NavigateTo: an agent whose `sensing.motion` is `actions` answers Move or Stop"
+                    "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
                 )
             return action
 
@@ -296,7 +298,7 @@ class Stage:
                 self._planner,
                 action,
                 spacing_m=self._protocol.waypoint_m,
-                max_travel_m=self._sensing.max_travel_m,
+                max_travel_m=self._sensor_config.max_travel_m,
             )
         if isinstance(action, Move):
             return motion.move(self._simulator, action)

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, Sensing
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, SensorConfig
 from evonav.agents.hosting import wire
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
@@ -11,7 +11,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, AgentProcesses, failure_of
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 class HostedAgent(ABC):
@@ -19,7 +19,7 @@ class HostedAgent(ABC):
 
     @property
     @abstractmethod
-    def sensing(self) -> Sensing:
+    def sensors(self) -> SensorConfig:
         """The sensors that the agent needs."""
 
     @property
@@ -32,7 +32,7 @@ class HostedAgent(ABC):
         """Start in a new house."""
 
     @abstractmethod
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
 
     @abstractmethod
@@ -61,17 +61,17 @@ class LocalAgent(HostedAgent):
         self._explaining = agent if isinstance(agent, ExplainingAgent) else None
 
     @property
-    def sensing(self) -> Sensing:
+    def sensors(self) -> SensorConfig:
         """The sensors that the agent needs."""
-        return wire.SENSING.read(wire.SENSING.write(self._agent.sensing))
+        return wire.SENSORS.read(wire.write_sensors(self._agent))
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
         self._agent.begin_task(task)
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
-        self._agent.begin_stage(stage)
+        self._agent.begin_stage(goal)
 
     def act(self, observation: Observation) -> AgentAction:
         """Decide what to do in one decision round."""
@@ -110,7 +110,7 @@ class RemoteAgent(HostedAgent):
         self._decision = decision
         self._seed = seed
         self._process: AgentProcess | None = None
-        self._sensing: Sensing | None = None
+        self._sensors: SensorConfig | None = None
         self._last_parts: Mapping[str, bytes] = {}
         """Parts of the answer to the last `act`."""
         self._label = name
@@ -122,12 +122,12 @@ class RemoteAgent(HostedAgent):
         return self._cpu_s
 
     @property
-    def sensing(self) -> Sensing:
+    def sensors(self) -> SensorConfig:
         """The sensors that the agent needs."""
-        if self._sensing is None:
+        if self._sensors is None:
             self._make()
-        assert self._sensing is not None
-        return self._sensing
+        assert self._sensors is not None
+        return self._sensors
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
@@ -135,10 +135,10 @@ class RemoteAgent(HostedAgent):
         self._describe(self._label)
         self._sense(self._ask("begin_task", task))
 
-    def begin_stage(self, stage: StageInput) -> None:
+    def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
-        self._describe(f"{self._label} stage {stage.stage}")
-        self._sense(self._ask("begin_stage", stage))
+        self._describe(f"{self._label} stage {goal.stage}")
+        self._sense(self._ask("begin_stage", goal))
 
     def act(self, observation: Observation) -> AgentAction:
         """Decide what to do in one decision round."""
@@ -173,7 +173,7 @@ class RemoteAgent(HostedAgent):
         self._sense(self._ask("make", self._decision.path, self._seed, self._decision.keywords))
 
     def _sense(self, parts: Mapping[str, bytes]) -> None:
-        self._sensing = wire.SENSING.read(_part(parts, "sensing"))
+        self._sensors = wire.SENSORS.read(_part(parts, "sensors"))
 
     def _describe(self, label: str) -> None:
         if self._process is not None:
@@ -189,7 +189,7 @@ class RemoteAgent(HostedAgent):
             return process.ask(operation, *arguments)
         except AgentFailedError as error:
             if error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT) or operation == "make":
-                self._process = self._sensing = None
+                self._process = self._sensors = None
             raise
         finally:
             self._cpu_s += process.cpu_s - before_s

@@ -1,6 +1,6 @@
-"""Convert poses, sensing and actions to the parts of records that describe them."""
+"""Convert poses, sensors and actions to the parts of records that describe them."""
 
-from evonav.agents.agent import AgentAction, Move, NavigateTo, Sensing
+from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig
 from evonav.evaluation.records.schema import ActionRecord, PoseRecord, SensingRecord
 from evonav.world.pose import Pose
 
@@ -10,15 +10,15 @@ def pose_record(pose: Pose) -> PoseRecord:
     return PoseRecord(x_m=pose.x_m, y_m=pose.y_m, z_m=pose.z_m, yaw_rad=pose.yaw_rad, horizon_rad=pose.horizon_rad)
 
 
-def sensing_record(sensing: Sensing) -> SensingRecord:
-    """Return the sensing that an agent was granted, for the record."""
-    first, later = sensing.first_round, sensing.later_rounds
+def sensing_record(sensors: SensorConfig) -> SensingRecord:
+    """Return the sensors that an agent was granted, for the record."""
+    first, later = sensors.first_round, sensors.later_rounds
     return SensingRecord(
         first_round=(first.count, first.spacing_deg),
         later_rounds=(later.count, later.spacing_deg),
-        motion=sensing.motion,
-        max_travel_m=sensing.max_travel_m,
-        occupancy_range_m=sensing.occupancy_range_m,
+        motion=sensors.motion,
+        max_travel_m=sensors.max_travel_m,
+        occupancy_range_m=sensors.occupancy_range_m,
     )
 
 

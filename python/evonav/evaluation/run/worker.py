@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from evonav.agents.agent import Agent, Sensing
+from evonav.agents.agent import Agent, SensorConfig
 from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.episode.episode import Episode
@@ -140,7 +140,7 @@ class _FailedAgent(LocalAgent):
         self._error = error
 
     @property
-    def sensing(self) -> Sensing:
+    def sensors(self) -> SensorConfig:
         """The first thing that a stage reads of an agent."""
         raise self._error
 
