@@ -17,6 +17,7 @@ mod extensions;
 mod failures;
 mod houses;
 mod overrides;
+mod refusals;
 mod relations;
 mod sampling;
 mod schema;

@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod masks;
 mod objects;
 mod occupancy;
+mod points;
 mod sight_lines;
 mod snapshots;

@@ -9,10 +9,7 @@ use evonav_core::{
         frontiers::{Frontier, FrontierConfig, Frontiers},
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },
-    sensors::{
-        instance_masks::{MaskFilter, instance_areas, mask_extents, number_instances},
-        visible_cells::{VisibleCells, visible_cells},
-    },
+    sensors::visible_cells::{VisibleCells, visible_cells},
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 
@@ -339,73 +336,6 @@ fn a_frontier_looks_from_the_edge_of_the_explored_into_the_open() {
     panic!("the agent looks at the same unknown cells for ever");
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
-
-    #[test]
-    fn areas_are_counts_of_equal_pixels(image in vec(0..6_i32, 0..60), num_more in 0..3_usize) {
-        let areas = instance_areas(&image, 5 + num_more).unwrap();
-        let expected: Vec<i64> = (1..=5 + num_more as i32)
-            .map(|value| image.iter().filter(|v| **v == value).count() as i64)
-            .collect();
-        prop_assert_eq!(areas, expected);
-        let fits = image.iter().all(|&value| value <= 3);
-        prop_assert_eq!(instance_areas(&image, 3).is_ok(), fits);
-    }
-
-    #[test]
-    fn masks_extend_from_their_first_to_their_last_pixels(
-        stretches in vec((-1..4_i32, 1..9_usize), 80),
-    ) {
-        let stretch = |&(mask, length): &(i32, usize)| std::iter::repeat_n(mask, length);
-        let image: Vec<i32> = stretches.iter().flat_map(stretch).take(80).collect();
-        let extents = mask_extents(&image, 10, 4).unwrap();
-        for (mask, extent) in extents.iter().enumerate() {
-            let pixels: Vec<usize> = (0..80).filter(|&i| image[i] == mask as i32).collect();
-            let range = |f: fn(usize) -> usize| {
-                let values = || pixels.iter().map(|&i| f(i));
-                [values().min().unwrap_or(0), values().max().map_or(0, |last| last + 1)]
-            };
-            prop_assert_eq!(extent.area_px, pixels.len());
-            prop_assert_eq!(extent.rows, range(|i| i / 10));
-            prop_assert_eq!(extent.cols, range(|i| i % 10));
-        }
-    }
-
-    #[test]
-    fn detections_are_the_instances_that_pass_in_the_order_of_their_pixels(
-        image in vec(0..6_i32, 8 * 10),
-        is_detectable in vec(any::<bool>(), 5),
-        min_area_px in 0..25_usize,
-        max_box_fraction in 0.3..=1.0,
-    ) {
-        let filter = MaskFilter { min_area_px, max_box_fraction };
-        let masks = number_instances(&image, 10, &is_detectable, filter).unwrap();
-        let mut expected = Vec::new();
-        for &value in image.iter().filter(|v| **v > 0) {
-            let pixels: Vec<usize> = (0..80).filter(|&i| image[i] == value).collect();
-            let extent = |f: fn(usize) -> usize| {
-                let values = || pixels.iter().map(|&i| f(i));
-                values().max().unwrap() - values().min().unwrap() + 1
-            };
-            let box_px = extent(|i| i / 10) * extent(|i| i % 10);
-            let instance = value as usize - 1;
-            if is_detectable[instance]
-                && pixels.len() >= min_area_px
-                && box_px as f64 <= max_box_fraction * 80.0
-                && !expected.contains(&instance)
-            {
-                expected.push(instance);
-            }
-        }
-        prop_assert_eq!(&masks.instances, &expected);
-        for (label, value) in masks.labels.iter().zip(image) {
-            let number = expected.iter().position(|&i| i as i32 + 1 == value);
-            prop_assert_eq!(*label, number.map_or(-1, |n| n as i32));
-        }
-    }
-}
-
 #[test]
 fn arguments_outside_their_domain_are_named() {
     let names =
@@ -432,12 +362,4 @@ fn arguments_outside_their_domain_are_named() {
         "agent_m",
         extract(&map, [f64::NAN, 0.0], &FrontierConfig::default()).unwrap_err().to_string(),
     );
-    let filter = MaskFilter { min_area_px: 1, max_box_fraction: 1.0 };
-    for image in [[7, 0], [-1, 0], [i32::MAX, 0]] {
-        names("instances", number_instances(&image, 2, &[true], filter).unwrap_err().to_string());
-        names("instances", instance_areas(&image, 1).unwrap_err().to_string());
-    }
-    names("instances", number_instances(&[0, 0, 0], 2, &[], filter).unwrap_err().to_string());
-    names("masks", mask_extents(&[0, 1], 2, 1).unwrap_err().to_string());
-    names("masks", mask_extents(&[0, 0, 0], 2, 1).unwrap_err().to_string());
 }

@@ -4,6 +4,7 @@
 #[path = "../common/scenes.rs"]
 mod scenes;
 
+mod images;
 mod raster;
 mod visible_bodies;
 mod visible_px;
