@@ -49,6 +49,9 @@ CONTAINED = {
     "unruly_agents:Verbose": (ErrorKind.AGENT, "must be at most 1000000"),
     "unruly_agents:Deep": (ErrorKind.AGENT, "deeper than 32"),
     "unruly_agents:Secretive": (ErrorKind.AGENT, "diagnostics: not JSON-ready"),
+    "unruly_agents:Misplaced": (ErrorKind.AGENT, "diagnostics.chosen_entry.centre_m.1 = nan: Input should be a finite"),
+    "unruly_agents:Unlimited": (ErrorKind.AGENT, "entries.0.size_m.1 = inf: Input should be a finite number"),
+    "unruly_agents:Unfocused": (ErrorKind.AGENT, "sensors.first_round.spacing_deg = nan: Input should be a finite"),
     "unruly_agents:Mistaken": (ErrorKind.AGENT, "diagnostics.num_entries = 'many': Input should be a valid integer"),
 }
 """In any process: the agent goes on with the next stage."""
@@ -82,6 +85,7 @@ def run_dir(tasks, tmp_path_factory):
     config = RunConfig(backend=TOY, protocol=SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
     folder = tmp_path_factory.mktemp("run")
     agents = [*CONTAINED, *LOST, *UNHARMED, "unruly_agents:Exotic", "unruly_agents:Unmakeable", "unruly_agents:Hungry"]
+    agents.append("unruly_agents:Farthest")
     evaluate(agents, tasks, folder, config=config, num_workers=2)
     return folder
 
@@ -108,6 +112,10 @@ def test_what_harms_nobody_costs_nothing(run_dir, tasks, tmp_path, agent):
     evaluate(["toy_agents:Explorer"], tasks, tmp_path, config=config, num_workers=0)
     walked = [[entry.path_m for entry in record.trace] for record in records(tmp_path, "toy_agents:Explorer")]
     assert [[entry.path_m for entry in record.trace] for record in records(run_dir, agent)] == walked
+
+
+def test_a_place_beyond_every_house_is_no_failure(run_dir):
+    assert all(record.is_scored for record in records(run_dir, "unruly_agents:Farthest"))
 
 
 def test_an_agent_that_cannot_be_made_is_errored_in_every_stage(run_dir):

@@ -60,7 +60,16 @@ def test_tokens_and_money_are_the_accounts_even_of_a_wrapped_model():
 
 
 @pytest.mark.parametrize(
-    "wrong", ['"cost_usd": NaN', '"input_tokens": -1', '"output_tokens": "9"', '"success": 1.0', '"num_replayed": true']
+    "wrong",
+    [
+        '"cost_usd": NaN',
+        '"cost_usd": 1e300',
+        f'"input_tokens": {10**30}',
+        '"input_tokens": -1',
+        '"output_tokens": "9"',
+        '"success": 1.0',
+        '"num_replayed": true',
+    ],
 )
 def test_costs_that_are_no_numbers_are_refused(wrong):
     assert wire.COSTS.read(b'{"num_questions": 3, "cost_usd": 0.5}') == {"num_questions": 3, "cost_usd": 0.5}

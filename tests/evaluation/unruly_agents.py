@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from toy_agents import Explorer
 
-from evonav.agents.agent import RoundDiagnostics, Stop
+from evonav.agents.agent import EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
 from evonav.errors import DecisionError, SimulatorLostError
 
 
@@ -177,6 +177,33 @@ class Secretive(Telling):
 
 class Mistaken(Telling):
     said = RoundDiagnostics(num_entries="many")
+
+
+class Misplaced(Telling):
+    said = RoundDiagnostics(chosen_entry=EntryBelief(1, "Mug", (0.0, math.nan, 0.0), (1.0, 1.0, 1.0), 1))
+
+
+class Unlimited(Telling):
+    """Remembers an object without a place."""
+
+    def entries(self):
+        size_m = (1.0, math.inf if self.stage == 2 else 1.0, 1.0)
+        return [EntryBelief(1, "Mug", (0.0, 0.0, 0.0), size_m, 1)]
+
+
+class Unfocused(Explorer):
+    """Asks for views without an angle between them."""
+
+    def begin_stage(self, stage):
+        super().begin_stage(stage)
+        self.sensors = SensorConfig(first_round=ViewSchedule(3, math.nan)) if stage.stage == 2 else SensorConfig()
+
+
+class Farthest(Explorer):
+    """Goes where no house is, but the number is finite."""
+
+    def act(self, observation):
+        return NavigateTo((1e300, -1e300)) if self.stage == 2 else super().act(observation)
 
 
 class Exotic(Telling):

@@ -12,10 +12,30 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, FailFast, Field, Tag, TypeAdapter, ValidationError
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    FailFast,
+    Field,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+    with_config,
+)
 from pydantic_core import PydanticSerializationError, to_json, to_jsonable_python
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import (
+    Agent,
+    AgentAction,
+    EntryBelief,
+    Move,
+    NavigateTo,
+    RoundDiagnostics,
+    SensorConfig,
+    Stop,
+    ViewSchedule,
+)
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
@@ -162,6 +182,9 @@ def _check_depth(value: object, depth: int) -> None:
         _check_depth(part, depth - 1)
 
 
+for _kind in (SensorConfig, ViewSchedule, EntryBelief, RoundDiagnostics):  # only `details` may hold NaN or infinity
+    with_config(ConfigDict(allow_inf_nan=False))(_kind)
+
 SENSORS = Part("sensors", TypeAdapter(SensorConfig), MAX_DIAGNOSTICS_BYTES)
 """The sensors that an agent needs; the limits of the protocol are not checked here."""
 
@@ -201,7 +224,11 @@ _CostName = Literal[
     "cost_usd",
     "agent_peak_rss_mb",
 ]
-_Amount = Annotated[int, Field(ge=0)] | Annotated[float, Field(ge=0, allow_inf_nan=False)]
+_MAX_AMOUNT = 1e15
+"""Largest cost; sums of such numbers are still finite, and SQLite can hold them."""
+_Amount = (
+    Annotated[int, Field(ge=0, le=_MAX_AMOUNT)] | Annotated[float, Field(ge=0, le=_MAX_AMOUNT, allow_inf_nan=False)]
+)
 COSTS = Part("costs", TypeAdapter(dict[_CostName, _Amount]), MAX_DIAGNOSTICS_BYTES)
 """Costs of an agent's decision model and process."""
 
@@ -224,7 +251,7 @@ FAILURE = Part("failure", TypeAdapter(Failure), MAX_DIAGNOSTICS_BYTES)
 @dataclass(frozen=True, slots=True)
 class _Head:
     number: int
-    cpu_s: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    cpu_s: Annotated[float, Field(ge=0, le=_MAX_AMOUNT, allow_inf_nan=False)]
     parts: tuple[str, ...]
 
 

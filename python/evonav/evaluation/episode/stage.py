@@ -161,8 +161,8 @@ class Stage:
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensors are held for the stage."""
-        self._sensor_config = self._granted()
         if not self._state.has_begun:
+            self._sensor_config = self._granted()
             self._agent.begin_task(
                 TaskInfo(
                     task_id=self._spec.task_id,
