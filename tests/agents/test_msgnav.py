@@ -6,32 +6,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scripted_model import Scripted
-from toy_house import CHAIR_AWAY, ToySimulator, stage_case
+from toy_episode import START, run
+from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.agent import NavigateTo
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
 from evonav.agents.msgnav.questions import GraphQuestion
-from evonav.agents.msgnav.scene_graph import SceneGraph
-from evonav.agents.msgnav.viewpoint import visible_viewpoint
-from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.memory import ObjectMap
-from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
-from evonav.world.pose import Pose
-from evonav.world.simulator import Intrinsics
-
-START = Pose(1.0, 0.9, 3.0, 0.0)
-
-
-def run(agent, *stages, start=START, protocol=None, seed=7):
-    case = EpisodeSpec("toy", "toy", start, stages)
-    episode = Episode(case, "a", agent, ToySimulator(), GroundTruthPerception(), protocol or ProtocolConfig(), seed)
-    records = [outcome.record for outcome in episode.run()]
-    assert all(record.is_scored for record in records), [record.error for record in records]
-    return records
 
 
 def script(graph, *, subgraph=None, arrival="yes", frontier="Frontier 0", needs_images=False):
@@ -152,42 +134,6 @@ def test_objects_shown_are_the_selected_ones_and_their_neighbours_and_images_cov
         assert {end for a, b, _ in question.edges for end in (a, b)} <= {node.entry_id for node in question.objects}
         assert [image.is_egocentric for image in question.images[-7:]].count(True) >= 1
         assert sum(image.is_egocentric for image in question.images) == 7
-
-
-def test_cover_is_greedy_and_complete():
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        graph = SceneGraph()
-        for view_id in range(20):
-            ids = rng.choice(12, rng.integers(1, 5), replace=False)
-            graph.add_view(view_id, {int(entry_id): (0.0, 0.0) for entry_id in ids})
-        selected = [int(entry_id) for entry_id in rng.choice(12, 4, replace=False)]
-        part = graph.subgraph(selected)
-        assert part.pairs == tuple(p for p in graph.pairs if set(p) & set(selected))
-        left, expected = set(part.pairs), []
-        while left:
-            best = max(range(20), key=lambda view_id: (len(left & set(edges_of(graph, view_id))), -view_id))
-            expected.append(best)
-            left -= set(edges_of(graph, best))
-        assert part.view_ids == tuple(expected)
-
-
-def edges_of(graph, view_id):
-    """Pairs whose edge the view shows, ascending."""
-    return [pair for pair in graph.pairs if view_id in graph.views_of(pair)]
-
-
-def test_edges_join_what_one_view_shows_near_each_other_and_follow_merges():
-    graph = SceneGraph(max_edge_m=3.5)
-    graph.add_view(0, {1: (0.0, 0.0), 2: (3.5, 0.0), 3: (3.6, 0.0)})
-    assert graph.pairs == [(1, 1), (1, 2), (2, 2), (2, 3), (3, 3)]
-    graph.add_view(1, {2: (0.0, 0.0), 3: (0.1, 0.0)})
-    assert (graph.views_of((2, 3)), edges_of(graph, 1)) == ([0, 1], [(2, 2), (2, 3), (3, 3)])
-    graph.follow({3: 2})
-    assert graph.pairs == [(1, 1), (1, 2), (2, 2)]
-    assert (graph.views_of((2, 2)), edges_of(graph, 1)) == ([0, 1], [(2, 2)])
-    graph.prune([2])
-    assert (graph.pairs, edges_of(graph, 0), graph.neighbours()) == ([(2, 2)], [(2, 2)], {2: set()})
 
 
 def test_something_far_away_in_a_kept_view_is_gone_to_without_an_entry():
@@ -327,59 +273,6 @@ def test_no_valid_answer_on_arrival_counts_as_no():
     counters = record.trace[-1].counters
     assert counters["rejected_choices"] == counters["verifications"] >= 1
     assert counters["invalid_answers"] == 3 * counters["verifications"]
-
-
-def test_the_viewpoint_is_on_the_side_that_shows_the_target():
-    frame = MapFrame(60, 60, 0.1, (-3.0, -3.0))
-    is_free = np.ones((60, 60), bool)
-    target = plate((0.0, 0.8, 0.0), 0.15)
-    objects = ObjectMap()
-    objects.update(view_of(plate((0.0, 1.0, 0.35), 0.6)))
-    assert len(objects) == 1
-    found = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
-    assert found.found == "circle"
-    assert found.share > 0.9
-    assert found.position_m[1] < 0.2
-    assert np.hypot(*found.position_m) == pytest.approx(0.75, abs=0.01)
-    # No free floor on the circle: the nearest free cells.
-    is_free[:] = False
-    is_free[5:10, 30] = True  # z = -2.5 .. -2.1 m
-    snapped = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
-    assert snapped.found == "snapped"
-    assert snapped.position_m == pytest.approx((0.05, -2.05))
-    # Nothing shows it: the bottom edge of its box that is nearest to the agent.
-    is_free[:] = False
-    hidden = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
-    assert (hidden.found, hidden.share) == ("box", 0.0)
-    assert hidden.position_m == pytest.approx((0.0, 0.0), abs=0.02)
-    assert visible_viewpoint(objects, target, is_free, frame, (-2.0, 0.0)).position_m[0] == pytest.approx(
-        -0.14, abs=0.02
-    )
-
-
-def plate(centre, half_m):
-    """Points 2 cm apart on a square that faces z."""
-    steps = np.arange(-half_m, half_m, 0.02)
-    x, y = np.meshgrid(centre[0] + steps, centre[1] + steps)
-    return np.stack([x.ravel(), y.ravel(), np.full(x.size, centre[2])], axis=1).astype(np.float32)
-
-
-def view_of(points_m):
-    """A view from z = 2 m, looking along -z, that shows a plate of points as one detection."""
-    depth_m = np.full((200, 200), np.inf, np.float32)
-    masks = np.full((200, 200), -1, np.int32)
-    distance_m = 2.0 - float(points_m[0, 2])
-    cols = np.floor(100.0 - points_m[:, 0] / distance_m * 100.0).astype(int)
-    rows = np.floor(100.0 - (points_m[:, 1] - 1.0) / distance_m * 100.0).astype(int)
-    depth_m[rows.min() : rows.max(), cols.min() : cols.max()] = distance_m
-    masks[rows.min() : rows.max(), cols.min() : cols.max()] = 0
-    return View(
-        pose=Pose(0.0, 1.0, 2.0, np.pi, 0.0),
-        intrinsics=Intrinsics(200, 200, np.pi / 2),
-        depth_m=depth_m,
-        detections=Detections(masks, ("Screen",), np.ones(1, np.float32)),
-        occupancy=VisibleOccupancy(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32)),
-    )
 
 
 def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):

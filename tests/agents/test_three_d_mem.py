@@ -5,22 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import toy_episode
 from scripted_model import Scripted
-from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, stage_case
+from toy_episode import START
+from toy_house import CHAIR_AWAY, OBJECTS, stage_case
 
 from evonav.agents.agent import NavigateTo
 from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
-from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.world.pose import Pose
-
-START = Pose(1.0, 0.9, 3.0, 0.0)
 
 
 class Watched(ThreeDMem):
@@ -47,12 +43,8 @@ class Watched(ThreeDMem):
 
 
 def run(agent, *stages, start=START, max_rounds=50):
-    case = EpisodeSpec("toy", "toy", start, stages)
     protocol = ProtocolConfig(max_rounds=max_rounds)
-    episode = Episode(case, "a", agent, ToySimulator(120, 120), GroundTruthPerception(), protocol, 7)
-    records = [outcome.record for outcome in episode.run()]
-    assert all(record.is_scored for record in records), [record.error for record in records]
-    return records
+    return toy_episode.run(agent, *stages, start=start, protocol=protocol, size_px=120)
 
 
 def scripted(choose, prefilter=lambda question: "\n".join(question.class_names)):

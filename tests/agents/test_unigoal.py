@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import toy_episode
 from scripted_model import scripted
-from toy_house import OBJECTS, ToySimulator, stage_case
+from toy_episode import START
+from toy_house import OBJECTS, stage_case
 
 from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished
 from evonav.agents.unigoal.bev import BevMap
 from evonav.agents.unigoal.scene_questions import GroupScoreQuestion, RelationLinesQuestion
 from evonav.decision.text.matcher import TextMatch
-from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory.occupancy import BLOCKED, FREE
@@ -21,18 +21,12 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 
-START = Pose(1.0, 0.9, 3.0, 0.0)
 SHORT = ProtocolConfig(max_actions=60)
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
 
 
-def run(agent, *stages, start=START, perception=None, protocol=None):
-    case = EpisodeSpec("toy", "toy", start, stages)
-    simulator = ToySimulator(width_px=64, height_px=64)
-    episode = Episode(case, "a", agent, simulator, perception or GroundTruthPerception(), protocol or SHORT, 7)
-    records = [outcome.record for outcome in episode.run()]
-    assert all(record.is_scored for record in records), [record.error for record in records]
-    return records
+def run(agent, *stages, start=START, perception=None, protocol=SHORT):
+    return toy_episode.run(agent, *stages, start=start, perception=perception, protocol=protocol, size_px=64)
 
 
 def choices(record):

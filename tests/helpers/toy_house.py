@@ -269,6 +269,17 @@ def stage_case(stage, target_id, *, moves=None, before=None, instruction=None, m
 
 
 CHAIR_AWAY = {"Chair|1": (7.5, 0.45, 2.0)}
+TABLE_AWAY = {"DiningTable|1": (2.9, 0.4, 3.6), "Mug|1": (2.6, 0.87, 3.6)}
+
+
+def moved_table_stages():
+    """Return stages in which the house is seen, and the table moves while the agent is in the bedroom."""
+    return (
+        stage_case(1, "GarbageCan|1"),
+        stage_case(2, "Fridge|1"),
+        stage_case(3, "DiningTable|1", moves=TABLE_AWAY, mode="SALIENT_OBJECT"),
+    )
+
 
 EPISODES = {
     "toy-static": lambda: (stage_case(1, "Bed|1"), stage_case(2, "Fridge|1"), stage_case(3, "GarbageCan|1")),

@@ -1,0 +1,37 @@
+"""Episodes of an agent in the toy house."""
+
+from toy_house import ToySimulator
+
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.world.pose import Pose
+
+START = Pose(1.0, 0.9, 3.0, 0.0)
+
+
+def run(agent, *stages, start=START, protocol=None, perception=None, seed=7, size_px=48):
+    """Return the records of an episode of these stages; each of them is scored."""
+    spec = EpisodeSpec("toy", "toy", start, stages)
+    simulator = ToySimulator(size_px, size_px)
+    perception = perception or GroundTruthPerception()
+    episode = Episode(spec, "a", agent, simulator, perception, protocol or ProtocolConfig(), seed)
+    records = [outcome.record for outcome in episode.run()]
+    assert all(record.is_scored for record in records), [record.error for record in records]
+    return records
+
+
+def rounds_of(agent, *stages):
+    """Return the records, and each round's stage, belief, diagnostics and action."""
+    rounds, numbers = [], []
+    act, begin_stage = agent.act, agent.begin_stage
+
+    def noting(observation):
+        action = act(observation)
+        rounds.append((numbers[-1], agent.belief(), agent.diagnostics(), action))
+        return action
+
+    agent.act = noting
+    agent.begin_stage = lambda stage: numbers.append(stage.stage) or begin_stage(stage)
+    return run(agent, *stages), rounds
