@@ -3,12 +3,10 @@
 Names are imported when they are first used, so that the package starts fast; `__init__.pyi` says where they are.
 """
 
-import sys
-from importlib import import_module
-
 import lazy_loader
+
+from evonav import _gymnasium_hook
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
-if "gymnasium" in sys.modules:  # which imports this package to look for `evonav:evonav/LifelongNav-v0`
-    import_module("evonav.gym.registration").register()
+_gymnasium_hook.register_when_imported()

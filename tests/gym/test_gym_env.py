@@ -47,19 +47,70 @@ def test_gymnasiums_checker_finds_nothing(settings):
         check_env(gymnasium.make(ENV_ID, **SMALL, **settings).unwrapped)
 
 
-def test_importing_the_package_registers_the_id():
-    code = (
-        "import gymnasium; env = gymnasium.make('evonav:evonav/LifelongNav-v0', width_px=8, height_px=8);"
-        "env.reset(seed=0); print(type(env.unwrapped).__name__)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import sys, evonav, evonav.cli; assert 'gymnasium' not in sys.modules;"
+        "import importlib.util; importlib.util.find_spec('gymnasium');"  # looking is not importing
+        "import gymnasium; num_finders = len(sys.meta_path); from gymnasium import spaces;"
+        "make, name = gymnasium.make, 'evonav/LifelongNav-v0';"
+        "assert gymnasium.make_vec(name, num_envs=2, width_px=8, height_px=8).num_envs == 2;"
+        "assert not any('evonav' in type(finder).__module__ for finder in sys.meta_path)",
+        "import gymnasium; import evonav; make, name = gymnasium.make, 'evonav/LifelongNav-v0'",
+        "from gymnasium import make; name = 'evonav:evonav/LifelongNav-v0'",
+    ],
+)
+def test_the_environment_can_be_made_whatever_was_imported_first(code):
+    made = "env = make(name, width_px=8, height_px=8); env.reset(seed=0); print(type(env.unwrapped).__name__)"
+    done = subprocess.run([sys.executable, "-c", f"{code}\n{made}"], capture_output=True, text=True, check=True)
     assert done.stdout == "LifelongNavEnv\n"
 
 
-def test_importing_evonav_leaves_gymnasium_alone():
-    code = "import sys, evonav, evonav.cli; print('gymnasium' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"
+def test_observations_for_learning_are_a_flat_dict_of_boxes_and_discretes_from_zero():
+    """What stable-baselines3 2.9 requires in `check_env` and of its image networks."""
+    env = gymnasium.make(ENV_ID, observations="learn").unwrapped
+    seen, _ = env.reset(seed=0)
+    image, state, category = (env.observation_space[name] for name in ("image", "state", "category"))
+    assert set(env.observation_space) == {"image", "state", "category"}
+    assert (image.shape, image.dtype, image.low.min(), image.high.max()) == ((84, 84, 4), np.uint8, 0, 255)
+    assert (state.shape, state.dtype) == ((6,), np.float32)
+    assert (category.start, category.n) == (0, len(vocabulary()))
+    assert seen["state"].tolist() == [0, 0, 0, 1, 1, 1]
+    wide = NavConfig(observations="learn", width_px=100)
+    assert (wide.width_px, wide.height_px) == (100, 84)
+    flat = gymnasium.wrappers.FlattenObservation(env)
+    assert flat.observation_space.shape == (84 * 84 * 4 + 6 + len(vocabulary()),)
+
+
+def test_the_image_for_learning_is_colours_and_depth():
+    names = ("image", "rgb", "depth", "state", "pose")
+    seen, _ = LifelongNavEnv(observations=names, **SMALL).reset(seed=3)
+    assert list(seen) == list(names)
+    assert np.array_equal(seen["image"][..., :3], seen["rgb"])
+    near = seen["depth"] < 9.9
+    assert np.abs(seen["image"][..., 3][near] / 25.5 - seen["depth"][near]).max() < 0.04
+    alone, _ = LifelongNavEnv(observations=("image",), **SMALL).reset(seed=3)
+    assert np.array_equal(alone["image"], seen["image"])
+
+
+@pytest.mark.parametrize("mode", ["actions", "waypoints"])
+def test_an_automatic_stop_ends_a_stage_within_the_success_radius(mode):
+    env = LifelongNavEnv(observations=("pose",), stop="automatic", action_mode=mode, success_radius_m=3.0, max_steps=60)
+    env.action_space.seed(0)
+    env.reset(seed=1)
+    results = []
+    for _ in range(400):
+        _, _, is_over, _, info = env.step(env.action_space.sample())
+        results += [info["stage_result"]] if "stage_result" in info else []
+        if is_over:
+            env.reset()
+    stopped = [result for result in results if result["has_stopped"]]
+    assert stopped
+    assert all(result["success"] == (result["terminal_distance_m"] < 3.0) for result in stopped)
+    assert all(result["num_steps"] == 60 for result in results if not result["has_stopped"])
+    if mode == "actions":
+        with pytest.raises(InvalidArgumentError, match="expected 0 to 2"):
+            env.step(3)
 
 
 class _Replaying:

@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
 
 from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.gym import ENV_ID, OBSERVATIONS, NavConfig, VectorEnv
@@ -25,6 +26,8 @@ def _require_same(ours, theirs, at=""):
     elif isinstance(ours, tuple):
         for index, (a, b) in enumerate(zip(ours, theirs, strict=True)):
             _require_same(a, b, f"{at}[{index}]")
+    elif isinstance(ours, np.ndarray) and ours.dtype == object:
+        _require_same(tuple(ours), tuple(theirs), at)
     elif isinstance(ours, np.ndarray):
         assert (ours.dtype, ours.shape) == (theirs.dtype, theirs.shape), at
         assert np.array_equal(ours, theirs, equal_nan=ours.dtype.kind == "f"), at
@@ -59,6 +62,25 @@ def test_a_batch_is_as_many_environments_alone(settings):
         num_over += mine[2].sum()
     assert num_over > 3
     ours.close()
+
+
+def test_episodes_can_restart_in_the_step_that_ends_them():
+    """As Gymnasium's own environments do with `SAME_STEP`, final observations and infos included."""
+    kwargs = {"vector_kwargs": {"autoreset_mode": AutoresetMode.SAME_STEP}}
+    ours = _make("vector_entry_point", 3, observations=OBSERVATIONS, max_steps=3, copy=False, autoreset_mode="SameStep")
+    theirs = _make("sync", 3, observations=OBSERVATIONS, max_steps=3, **kwargs)
+    _require_same(ours.reset(seed=5), theirs.reset(seed=5), "reset")
+    num_over = 0
+    for step in range(30):
+        actions = np.full(3, step % 3)
+        mine = ours.step(actions)
+        _require_same(mine, theirs.step(actions), str(step))
+        num_over += "final_info" in mine[4]
+    assert num_over > 1
+    assert ours.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert VectorEnv.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    with pytest.raises(InvalidArgumentError, match="'NextStep' or 'SameStep'"):
+        VectorEnv(autoreset_mode="Disabled")
 
 
 def test_it_is_a_gymnasium_vector_environment():

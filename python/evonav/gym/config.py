@@ -13,6 +13,7 @@ from evonav.world.simulator import Action, SimulatorConfig
 ActionMode = Literal["actions", "waypoints"]
 WaypointFrame = Literal["relative", "polar", "start"]
 Reward = Literal["sparse", "spl", "progress"]
+StopMode = Literal["explicit", "automatic"]
 
 ObservationName = Literal[
     "depth",
@@ -26,9 +27,16 @@ ObservationName = Literal[
     "steps_left",
     "is_action_success",
     "has_arrived",
+    "image",
+    "state",
 ]
 OBSERVATIONS: tuple[ObservationName, ...] = get_args(ObservationName)
 """Keys that an observation may have; docs/gym.md describes them."""
+DEFAULT_OBSERVATIONS = tuple(name for name in OBSERVATIONS if name not in ("semantic", "image", "state"))
+LEARN_OBSERVATIONS: tuple[ObservationName, ...] = ("image", "state", "category")
+"""Meaning of `observations="learn"`: what learning libraries take without wrappers."""
+LEARN_IMAGE_PX = 84
+"""Width and height of the images of `observations="learn"`, unless they are given: the size of Atari's networks."""
 ACTIONS = (Action.MOVE_FORWARD, Action.TURN_LEFT, Action.TURN_RIGHT, Action.STOP)
 """Discrete actions by number: AI2-THOR's MoveAhead, RotateLeft and RotateRight, and the end of the stage."""
 STOP = ACTIONS.index(Action.STOP)
@@ -49,9 +57,14 @@ class NavConfig(BaseModel):
     """Meaning of the point's two numbers; see `evonav.gym.spaces.waypoint_m`."""
     waypoint_range_m: float = Field(5.0, ge=0.01, le=100.0)
     """Length in metres of a number of 1."""
-    observations: tuple[ObservationName, ...] = Field(
-        tuple(name for name in OBSERVATIONS if name != "semantic"), min_length=1
-    )
+    stop: StopMode = "explicit"
+    """Way in which a stage ends before its steps are used up.
+
+    `explicit`: the agent has an action for it, as in the benchmark. `automatic`: there is no such action, and a stage ends
+    when the agent is within the success radius. That tells where the target is: for training only.
+    """
+    observations: tuple[ObservationName, ...] = Field(DEFAULT_OBSERVATIONS, min_length=1)
+    """Keys of an observation, or `learn` for `LEARN_OBSERVATIONS` in images of `LEARN_IMAGE_PX`."""
     width_px: int = Field(128, ge=1, le=8192)
     height_px: int = Field(128, ge=1, le=8192)
     hfov_deg: float = Field(90.0, ge=1.0, le=170.0)
@@ -76,6 +89,9 @@ class NavConfig(BaseModel):
         Raises:
             InvalidArgumentError: A setting does not exist, or is out of range.
         """
+        if settings.get("observations") == "learn":
+            side_px = {"width_px": LEARN_IMAGE_PX, "height_px": LEARN_IMAGE_PX}
+            settings = side_px | settings | {"observations": LEARN_OBSERVATIONS}
         try:
             super().__init__(**settings)
         except ValidationError as error:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav import _core
-from evonav.gym.config import ACTIONS, NavConfig
+from evonav.gym.config import ACTIONS, STOP, NavConfig
 from evonav.tasks.public import Goal
 
 MAX_STAGES = 64
@@ -20,6 +20,11 @@ MAX_INSTRUCTION = 2000
 _CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " "
 _REACH_M = 1000.0
 """Bound of positions in metres: larger than any house."""
+IMAGE_DEPTH_M = 10.0
+"""Depth in metres that the fourth channel of `image` shows as 255, as all larger ones."""
+STATE_POSITION_M = 10.0
+"""Length in metres of a position of 1 in `state`."""
+_STATE_BOUNDS = np.array([_REACH_M / STATE_POSITION_M] * 2 + [1.0] * 4, np.float32)
 _STRUCTURE = ("Doorframe", "Doorway", "Window")
 
 
@@ -66,15 +71,18 @@ def observation_space(config: NavConfig) -> spaces.Dict:
         "steps_left": spaces.Discrete(config.budget + 1),
         "is_action_success": spaces.Discrete(2),
         "has_arrived": spaces.Discrete(2),
+        "image": spaces.Box(0, 255, (*image, 4), np.uint8),
+        "state": spaces.Box(-_STATE_BOUNDS, _STATE_BOUNDS),
     }
     return spaces.Dict({name: all_spaces[name] for name in config.observations})
 
 
 def action_space(config: NavConfig) -> spaces.Space[Any]:
     """Return the action space of one environment."""
+    has_stop = config.stop == "explicit"
     if config.action_mode == "actions":
-        return spaces.Discrete(len(ACTIONS))
-    return spaces.Box(-1.0, 1.0, (3,), np.float32)
+        return spaces.Discrete(len(ACTIONS) if has_stop else STOP)
+    return spaces.Box(-1.0, 1.0, (3 if has_stop else 2,), np.float32)
 
 
 def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -94,6 +102,26 @@ def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> 
     return np.stack(columns, axis=1).astype(np.float32)
 
 
+def rgbd(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return colours `(..., H, W, 3)` and depth `(..., H, W)` as one image `(..., H, W, 4)`: `image`."""
+    depth = np.minimum(depth_m * np.float32(255.0 / IMAGE_DEPTH_M), np.float32(255.0)).astype(np.uint8)
+    return np.concatenate((rgb, depth[..., None]), axis=-1)
+
+
+def states(
+    poses: NDArray[np.float32], steps_left: NDArray[np.float64], is_action_success: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Return `state`, `(B, 6)`: the pose, the share of the stage's steps that is left, success of the last action.
+
+    Args:
+        poses: `(B, 4)` of `relative_poses`; positions are divided by `STATE_POSITION_M`.
+        steps_left: `(B,)` in 0..1.
+        is_action_success: `(B,)` of 0 and 1.
+    """
+    positions = poses[:, :2] / np.float32(STATE_POSITION_M)
+    return np.column_stack((positions, poses[:, 2:], steps_left, is_action_success)).astype(np.float32)
+
+
 def waypoint_m(
     config: NavConfig, action: NDArray[np.float32], pose: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> tuple[float, float] | None:
@@ -104,15 +132,15 @@ def waypoint_m(
         action: `(3,)` in -1..1. The stage ends if the third is above 0. The first two are multiplied by the range.
             `relative`: metres to the right and ahead of the agent. `start`: the same relative to the task's start.
             `polar`: distance, from -1 for zero to 1 for the range, and bearing, from -1 for half a turn to the left to
-            1 for half a turn to the right.
+            1 for half a turn to the right. With `stop="automatic"` the action is `(2,)`.
         pose: `(5,)`: the agent's x, y, z, yaw, horizon.
         origin: `(5,)`: the start pose of the task.
 
     Returns:
         `(x, z)`, or `None` to stop. Numbers outside the range are clipped, and NaN counts as 0.
     """
-    a, b, stop = np.nan_to_num(np.clip(action.astype(np.float64), -1.0, 1.0)).tolist()
-    if stop > 0.0:
+    a, b, *stop = np.nan_to_num(np.clip(action.astype(np.float64), -1.0, 1.0)).tolist()
+    if stop and stop[0] > 0.0:
         return None
     frame = origin if config.waypoint_frame == "start" else pose
     x_m, z_m, yaw_rad = float(frame[0]), float(frame[2]), float(frame[3])

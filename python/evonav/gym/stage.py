@@ -60,6 +60,10 @@ class RewardedStage:
         self.distance_m = distance_m
         return reward
 
+    def is_within_radius(self, end: Pose) -> bool:
+        """Return whether the stage would be a success if it ended at `end`."""
+        return self.progress.score((end.x_m, end.z_m)).is_success
+
     def result(self, stage: int, end: Pose) -> dict[str, Any]:
         """Return the stage's metrics, equal to what `evonav evaluate` records for the same steps.
 

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -47,7 +48,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     """B environments of `LifelongNavEnv`, each with a seed of its own.
 
     An episode that has ended restarts at the next step (`AutoresetMode.NEXT_STEP`), whose action is ignored and whose
-    reward is 0. A background thread builds the next houses in the meantime.
+    reward is 0, or in the same step (`SAME_STEP`). A background thread builds the next houses in the meantime.
 
     Example:
         >>> import evonav.gym, gymnasium
@@ -74,6 +75,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         num_threads: int | None = None,
         copy: bool = True,
         cache_mb: int = 512,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         **settings: Any,  # noqa: ANN401 - fields of NavConfig
     ) -> None:
         """Make environments over some tasks.
@@ -88,13 +90,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             copy: Whether every step returns arrays of its own. Otherwise a step overwrites the images of the previous
                 one, which saves the allocation of their memory.
             cache_mb: Memory for houses without an agent.
+            autoreset_mode: Step that begins the next episode, `NEXT_STEP` or `SAME_STEP`. With the latter the last
+                observation and info of an episode are `final_obs` and `final_info` of the infos.
             **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
             InvalidArgumentError: A setting is out of range.
             TaskError: The folder has no tasks, or not the subset.
         """
-        self.config = NavConfig(**(dict(config or NavConfig()) | settings))
+        given = {name: getattr(config, name) for name in config.model_fields_set} if config else {}
+        self.config = NavConfig(**(given | settings))
+        mode = _autoreset_mode(autoreset_mode)
+        self.metadata = self.metadata | {"autoreset_mode": mode}  # type: ignore[misc]
         self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
         self.single_observation_space = spaces.observation_space(self.config)
         self.single_action_space = spaces.action_space(self.config)
@@ -167,7 +174,20 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             ResetNeeded: No task was begun.
         """
         rewards, terminations, ended = self.advance(np.asarray(actions))
+        if self.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP and terminations.any():
+            self._restart(np.flatnonzero(terminations).tolist(), ended)
         return self.observations(), rewards, terminations, np.zeros(self.num_envs, np.bool_), self._infos(ended)
+
+    def _restart(self, indices: list[int], ended: dict[int, Infos]) -> None:
+        """Begin new episodes where one ended; `ended` receives how it ended."""
+        last = self.observations()
+        for index in indices:
+            final_obs = {name: deepcopy(values[index]) for name, values in last.items()}
+            ended[index] = {"final_obs": final_obs, "final_info": self.info(index) | ended[index]}
+            episode = self._episodes[index]
+            self._episodes[index] = self._begin_task(index, episode.next_number, episode.random)
+            self._has_succeeded[index], self._has_arrived[index] = 1, 0
+        self._poses = self._batch.poses()
 
     def advance(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], dict[int, Infos]]:
         """Execute an action in every environment; see `step`.
@@ -179,9 +199,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             raise ResetNeeded("no task was begun: call reset first")
         if len(actions) != self.num_envs:
             raise InvalidArgumentError(f"argument `actions` has {len(actions)} elements, expected {self.num_envs}")
-        is_reset = [episode.is_over for episode in self._episodes]
+        is_reset = np.array([episode.is_over for episode in self._episodes])
         move = self._move if self.config.action_mode == "actions" else self._navigate
         lengths_m, distances_m, is_stop = move(actions, is_reset)
+        is_automatic = self.config.stop == "automatic"
         rewards = np.zeros(self.num_envs)
         terminations = np.zeros(self.num_envs, np.bool_)
         ended: dict[int, Infos] = {}
@@ -191,11 +212,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 self._has_succeeded[index], self._has_arrived[index] = 1, 0
                 continue
             end = self._pose(index)
-            rewards[index] = episode.rewarded.advance(end, lengths_m[index], distances_m[index], is_stop=is_stop[index])
+            stops = is_stop[index] or (is_automatic and episode.rewarded.is_within_radius(end))
+            rewards[index] = episode.rewarded.advance(end, lengths_m[index], distances_m[index], is_stop=stops)
             if episode.rewarded.progress.is_over:
                 ended[index] = self._end_stage(index, episode, end)
                 terminations[index] = episode.is_over
-        if ended or any(is_reset):
+        if ended or is_reset.any():
             self._poses = self._batch.poses()
         return rewards, terminations, ended
 
@@ -252,11 +274,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         self._has_succeeded[index], self._has_arrived[index] = 1, 0
         return ended
 
-    def _move(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
+    def _move(self, actions: NDArray[Any], is_reset: NDArray[np.bool_]) -> tuple[list[float], list[float], list[bool]]:
         """Execute discrete actions; return path lengths, remaining distances, and who stopped."""
+        largest = STOP if self.config.stop == "explicit" else STOP - 1
+        if not (is_reset | (actions >= 0) & (actions <= largest)).all():
+            raise InvalidArgumentError(f"argument `actions` holds {actions.tolist()}, expected 0 to {largest}")
         numbers = np.where(is_reset, STOP, actions)
-        if not ((numbers >= 0) & (numbers <= STOP)).all():
-            raise InvalidArgumentError(f"argument `actions` holds {numbers.tolist()}, expected 0 to {STOP}")
         before = self._poses[:, [0, 2]].tolist()
         is_success, distances_m = self._batch.step(numbers.astype(np.uint8))
         self._poses = self._batch.poses()
@@ -265,7 +288,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         lengths_m = [0.0 if a == b else math.dist(a, b) for a, b in zip(before, after, strict=True)]
         return lengths_m, distances_m.tolist(), (numbers == STOP).tolist()
 
-    def _navigate(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
+    def _navigate(
+        self, actions: NDArray[Any], is_reset: NDArray[np.bool_]
+    ) -> tuple[list[float], list[float], list[bool]]:
         """Execute waypoint actions: Rust finds the paths, which agents follow as in an evaluation."""
         targets_m = [
             None if skips else spaces.waypoint_m(self.config, action, pose, origin)
@@ -310,6 +335,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         steps = [config.budget - episode.rewarded.progress.num_steps for episode in self._episodes]
         seen["steps_left"] = np.array(steps, np.int64)
         seen["is_action_success"] = self._has_succeeded.copy()
+        if config.has("image"):
+            seen["image"] = spaces.rgbd(seen["rgb"], seen["depth"])
+        if config.has("state"):
+            seen["state"] = spaces.states(seen["pose"], seen["steps_left"] / config.budget, self._has_succeeded)
         seen["has_arrived"] = self._has_arrived.copy()
         if config.has("instruction"):
             seen["instruction"] = tuple(spaces.instruction_text(goal) for goal in goals)
@@ -322,7 +351,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """Render the images of all agents directly into the returned arrays."""
         shape = (self.num_envs, self.config.height_px, self.config.width_px)
         kinds = {"depth": (shape, np.float32), "rgb": ((*shape, 3), np.uint8), "semantic": (shape, np.uint8)}
-        wanted = {name: kind for name, kind in kinds.items() if self.config.has(name)}
+        names = {*self.config.observations, *(("rgb", "depth") if self.config.has("image") else ())}
+        wanted = {name: kind for name, kind in kinds.items() if name in names}
         if not wanted:
             return {}
         if self._copies or not self._images:
@@ -350,6 +380,15 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 "reference_length_m": math.nan if length_m is None else length_m,
             }
         return info
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    expected = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+    for known in expected:
+        if mode in (known, known.value):
+            return known
+    names = " or ".join(repr(known.value) for known in expected)
+    raise InvalidArgumentError(f"argument `autoreset_mode` is {mode!r}, expected {names}")
 
 
 def _num_cores() -> int:
