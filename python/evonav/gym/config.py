@@ -60,8 +60,8 @@ class NavConfig(BaseModel):
     stop: StopMode = "explicit"
     """Way in which a stage ends before its steps are used up.
 
-    `explicit`: the agent has an action for it, as in the benchmark. `automatic`: there is no such action, and a stage ends
-    when the agent is within the success radius. That tells where the target is: for training only.
+    `explicit`: the agent has an action for it, as in the benchmark. `automatic`: there is no such action, and a stage
+    ends when the agent is within the success radius. That tells where the target is: for training only.
     """
     observations: tuple[ObservationName, ...] = Field(DEFAULT_OBSERVATIONS, min_length=1)
     """Keys of an observation, or `learn` for `LEARN_OBSERVATIONS` in images of `LEARN_IMAGE_PX`."""
