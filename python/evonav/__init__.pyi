@@ -1,10 +1,12 @@
-from ._core import __version__
+from ._core import House, __version__
 from .agents.agent import Agent, Move, NavigateTo, SensorConfig, Stop
+from .api.evaluate import evaluate
+from .api.loading import generate_tasks, load_houses, load_tasks
+from .api.run import Run, load_run
 from .errors import EvonavError
 from .evaluation.contract.check import check_agent
 from .memory.objects import ObjectMap
 from .memory.occupancy import OccupancyMap
-from .report.notebook import load
 from .sensors.observation import Observation
 from .tasks.public import Goal, TaskInfo
 from .world.pose import Pose
@@ -15,16 +17,22 @@ __all__ = [
     "Agent",
     "EvonavError",
     "Goal",
+    "House",
     "Move",
     "NavigateTo",
     "ObjectMap",
     "Observation",
     "OccupancyMap",
     "Pose",
+    "Run",
     "SensorConfig",
     "Stop",
     "TaskInfo",
     "__version__",
     "check_agent",
-    "load",
+    "evaluate",
+    "generate_tasks",
+    "load_houses",
+    "load_run",
+    "load_tasks",
 ]

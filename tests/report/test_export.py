@@ -62,13 +62,13 @@ def test_a_row_a_round(write_run: WriteRun, tmp_path: Path) -> None:
 
 
 def test_a_notebook_gets_columns_in_one_line(tmp_path: Path) -> None:
-    run = evonav.load(lettered_run(tmp_path / "run", {"fu": "sfse", "ftu": "sf"}))
-    assert run.agents == ("ftu", "fu")
+    run = evonav.load_run(lettered_run(tmp_path / "run", {"fu": "sfse", "ftu": "sf"}))
+    assert run.agents == ("fu", "ftu")
     assert run.config["seed"] == 3
     assert list(run.stages) == list(stage_columns())
     assert run.stages["success"] == [True, False, True, False, True, None]
     assert len(run.rounds["round"]) == 6 * 4
-    assert "LoadedRun(" in repr(run)
+    assert "Run(" in repr(run)
     try:
         import pandas  # noqa: F401
     except ImportError:
@@ -77,7 +77,7 @@ def test_a_notebook_gets_columns_in_one_line(tmp_path: Path) -> None:
     else:
         assert list(run.to_pandas().columns) == list(stage_columns())
     with pytest.raises(StoreError, match="no run here"):
-        evonav.load(tmp_path)
+        evonav.load_run(tmp_path)
 
 
 def test_what_cannot_be_written_is_said_and_leaves_nothing(tmp_path: Path) -> None:

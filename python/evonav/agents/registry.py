@@ -1,6 +1,7 @@
 """Agents by name: evonav's own, those of installed packages, and any class by its import path or file."""
 
 import inspect
+import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any
@@ -41,12 +42,35 @@ BUILT_IN: dict[str, tuple[str, str]] = {
 }
 """Import path and description of each built-in agent, by name."""
 
+_REGISTERED: dict[str, Callable[..., Agent]] = {}
+"""Agents of this process that other processes cannot import, by name."""
+
+
+def register(name: str, factory: Callable[..., Agent]) -> None:
+    """Let `agent_factory` find a class or function by a name, in this process.
+
+    Raises:
+        InvalidArgumentError: The name is a built-in agent's.
+    """
+    if name in BUILT_IN:
+        raise InvalidArgumentError(f"a built-in agent is called `{name}`: give the class another name")
+    _REGISTERED[name] = factory
+
+
+def import_name(factory: Callable[..., Agent]) -> str | None:
+    """Return `package.module:Class` if other processes can import a class or function by it, else `None`."""
+    module, name = getattr(factory, "__module__", None), getattr(factory, "__qualname__", "")
+    found = sys.modules.get(module or "")
+    if found is None or module == "__main__" or getattr(found, "__file__", None) is None:
+        return None
+    return f"{module}:{name}" if getattr(found, name, None) is factory else None
+
 
 def agent_factory(name: str) -> Callable[..., Agent]:
     """Return the class or function that makes an agent.
 
     Args:
-        name: A built-in name, an entry point of the group `evonav.agents`, `package.module:Class`, or
+        name: A built-in or registered name, an entry point of the group `evonav.agents`, `package.module:Class`, or
             `path/to/file.py:Class`.
 
     Raises:
@@ -54,6 +78,8 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     """
     if name in BUILT_IN:
         return import_callable(BUILT_IN[name][0], "agent")
+    if name in _REGISTERED:
+        return _REGISTERED[name]
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         if entry.name == name:
             return import_callable(entry.value, "agent")

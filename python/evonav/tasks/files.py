@@ -110,6 +110,7 @@ def load_task(root: Path | str) -> Task:
         ),
         oracle_stages=tuple(parse_record(OracleStage, read_file(path), path) for path in oracle),
         houses_json=tuple(read_house(root / f"houses/stage_{number}.json.gz") for number in numbers),
+        root=root,
     )
     for found in inconsistencies(task, root):
         raise found.error

@@ -1,8 +1,9 @@
 """Define a task: header, public stages, oracle stages, stage houses. `evonav.tasks.files` reads and writes it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -91,7 +92,7 @@ class PublicStage(Record):
     """Author of the appearance and unified instructions: `evonav-describer 1`, or `vlm:` and a model's name."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Task:
     """A task in memory; its stages count from 1."""
 
@@ -102,6 +103,13 @@ class Task:
     oracle_stages: tuple[OracleStage, ...]
     houses_json: tuple[str, ...]
     """The complete house of each stage, as ProcTHOR JSON."""
+    root: Path | None = field(default=None, compare=False)
+    """The folder from which the task was read, if it was."""
+
+    def __repr__(self) -> str:
+        """Return the id and the categories of the goals."""
+        goals = ", ".join(stage.category for stage in self.public_stages)
+        return f"Task(id={self.task_id!r}, num_stages={self.num_stages}, goals=[{goals}])"
 
     @property
     def task_id(self) -> str:

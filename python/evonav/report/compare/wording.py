@@ -95,6 +95,23 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
 
 
+def comparison_table(one: Comparison) -> Table:
+    """Build a table of one pair with one row per metric, on all stages that both finished."""
+    effects = one.all.effects
+    rows = tuple(
+        (
+            measure_name(field),
+            *(f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_b, effect.mean_a)),
+            *effect_cells(effect, scale_of(field)),
+            says(one, field),
+        )
+        for field, effect in effects.items()
+    )
+    columns = ("%", one.b, one.a, "difference [95% CI]", "p", "verdict")
+    only = f"Only {one.b} succeeded in {one.all.num_only_b} stages, only {one.a} in {one.all.num_only_a}."
+    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD))
+
+
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
     """Return the tables that fit eighty columns; the files contain the rest."""
     fields = list(dict.fromkeys(field for one in comparisons for field in one.all.effects))

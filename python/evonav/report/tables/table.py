@@ -4,11 +4,16 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 *incomplete* in words, since its rates are not final.
 """
 
+import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
+from shutil import get_terminal_size
 
 from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -26,7 +31,7 @@ VERDICTS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Table:
     """Rows of text under headers; the first column is left-aligned, the others right-aligned."""
 
@@ -67,6 +72,29 @@ class Table:
             lines.append(" & ".join(cells) + r" \\")
         lines += [r"\bottomrule", r"\end{tabular}}", "", *(f"% {_one_line(note)}" for note in self.notes)]
         return "\n".join(lines) + "\n"
+
+    def __repr__(self) -> str:
+        """Return the table as text, as wide as the terminal."""
+        table, text = self.rich(), io.StringIO()
+        width = get_terminal_size((120, 24)).columns
+        least = Measurement.get(console := Console(file=text, width=width), console.options, table).minimum
+        Console(file=text, width=max(least, width)).print(table)
+        return "\n".join(line.rstrip() for line in text.getvalue().splitlines())
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(column)}</th>" for column in self.columns)
+        body = "".join(
+            "<tr>"
+            + "".join(
+                f"<td><b>{escape(cell)}</b></td>" if (i, j) in self.best else f"<td>{escape(cell)}</td>"
+                for j, cell in enumerate(row)
+            )
+            + "</tr>"
+            for i, row in enumerate(self.rows)
+        )
+        notes = "".join(f"<p><small>{escape(note)}</small></p>" for note in self.notes)
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f"<p><b>{escape(self.title)}</b></p>{table}{notes}"
 
     def rich(self) -> RichTable:
         """Return the table for `rich.print`."""

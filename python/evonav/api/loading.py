@@ -1,0 +1,262 @@
+"""Load houses and tasks, and generate tasks: `evonav.load_houses`, `load_tasks`, `generate_tasks`."""
+
+import atexit
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from functools import cache
+from importlib.resources import as_file, files
+from itertools import islice
+from pathlib import Path
+from typing import Any, Generic, TypeVar, overload
+
+from evonav._core import House
+from evonav.api.progress import progress_bar
+from evonav.errors import HouseError, InvalidArgumentError, TaskError
+from evonav.evaluation.run.run_settings import RunSettings
+from evonav.generation.dataset import generate_dataset, inherited_names
+from evonav.generation.worker import GenerationOptions
+from evonav.house.files import HouseText, HouseTexts
+from evonav.parallel.folders import write_atomically
+from evonav.parallel.worker import Workforce
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.files import load_task, write_task
+from evonav.tasks.listing import TaskFile, task_file, task_files
+from evonav.tasks.manifest import Task
+
+BUNDLED = "bundled"
+"""Names the houses and tasks that come with evonav."""
+
+T = TypeVar("T")
+S = TypeVar("S")
+
+
+class LazyList(Sequence[T], Generic[S, T]):
+    """A list whose items are read when they are first used, each once."""
+
+    def __init__(self, sources: Sequence[S], read: Callable[[S], T]) -> None:
+        """Remember where the items are.
+
+        Args:
+            sources: The source of each item.
+            read: Reads an item from its source.
+        """
+        self.sources = tuple(sources)
+        self._read = read
+        self._items: dict[int, T] = {}
+
+    def __len__(self) -> int:
+        """Return the number of items."""
+        return len(self.sources)
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "LazyList[S, T]": ...
+
+    def __getitem__(self, index: int | slice) -> "T | LazyList[S, T]":
+        """Return an item, or a part of the list."""
+        if isinstance(index, slice):
+            return LazyList(self.sources[index], self._read)
+        place = range(len(self.sources))[index]
+        if place not in self._items:
+            self._items[place] = self._read(self.sources[place])
+        return self._items[place]
+
+    def __repr__(self) -> str:
+        """Return the first items."""
+        shown = ", ".join(repr(item) for item in islice(self, 3))
+        more = f", ... {len(self) - 3} more" if len(self) > 3 else ""
+        return f"[{shown}{more}]"
+
+
+TaskList = LazyList[TaskFile, Task]
+HouseList = LazyList[HouseText, House]
+HouseSource = str | Path | House | Sequence[House]
+TaskSource = str | Path | Task | TaskFile | Sequence[Any]
+
+
+def load_houses(source: str | Path | Iterable[str | Path] = BUNDLED, limit: int | None = None) -> HouseList:
+    """Return houses as a list, each parsed when it is first used.
+
+    Args:
+        source: `"bundled"`, a file of houses (JSON, JSONL, either with `.gz`), a folder of such files, a fetched split
+            (`"procthor-10k:val"`), or a list of these.
+        limit: Number of houses to take, from the first. Default: all.
+
+    Returns:
+        The houses; indexing, slicing and `len` work. A malformed house raises `HouseError` when it is used.
+
+    Raises:
+        HouseError: There is no such file, or it cannot be read.
+
+    Example:
+        >>> import evonav
+        >>> house = evonav.load_houses("bundled")[0]
+        >>> house.name
+        'bundled:1'
+    """
+    sources = [source] if isinstance(source, str | Path) else list(source)
+    texts = (text for one in sources for text in _texts(one))
+    return LazyList(tuple(islice(texts, limit)), lambda text: House(text.text, name=text.name))
+
+
+def _texts(source: str | Path) -> Iterator[HouseText]:
+    if source != BUNDLED:
+        yield from _house_texts(source)
+        return
+    for number, (_, text) in enumerate(_house_texts(_bundled_houses()), start=1):
+        yield HouseText(f"{BUNDLED}:{number}", text)
+
+
+def _house_texts(source: str | Path) -> HouseTexts:
+    try:
+        return HouseTexts(source)
+    except HouseError as error:
+        if Path(source).exists() or ":" in str(source):
+            raise
+        raise HouseError(f"{source}: no such file or folder of houses; `bundled` names those of evonav") from error
+
+
+def load_tasks(source: str | Path = BUNDLED, limit: int | None = None) -> TaskList:
+    """Return tasks as a list, each read and checked when it is first used.
+
+    Args:
+        source: `"bundled"`, a folder of tasks, or the folder of one task.
+        limit: Number of tasks to take, from the first. Default: all.
+
+    Returns:
+        The tasks, in order of their ids; indexing, slicing and `len` work.
+
+    Raises:
+        TaskError: The folder holds no task.
+
+    Example:
+        >>> import evonav
+        >>> tasks = evonav.load_tasks("bundled")
+        >>> tasks[0].public(stage=1).category
+        'Vase'
+    """
+    return LazyList(_files_of(source, limit), lambda file: load_task(file.path))
+
+
+def generate_tasks(
+    houses: HouseSource = BUNDLED,
+    out: str | Path | None = None,
+    seed: int = 0,
+    limit: int | None = None,
+    workers: int | None = None,
+    allow_unknown_assets: bool = False,
+) -> TaskList:
+    """Generate a task from every house that gives one; call it again with the same `out` to resume.
+
+    Args:
+        houses: Houses, a house, or where they are, as for `load_houses`.
+        out: Folder for the tasks. Default: a new temporary folder.
+        seed: Seed of every random choice.
+        limit: Number of tasks, from the first houses that give one. Default: all.
+        workers: Number of worker processes; 0 runs in this process. Default: one per core.
+        allow_unknown_assets: Give assets that are missing from the catalogue the usual size of their category.
+
+    Returns:
+        The tasks, in the order of their houses.
+
+    Raises:
+        HouseError: The houses cannot be read.
+        TaskError: No house gives a task; says why.
+        StoreError: `out` holds other tasks, or cannot be written.
+
+    Example:
+        >>> import evonav
+        >>> tasks = evonav.generate_tasks("bundled", limit=1, workers=0)
+        >>> tasks[0].num_stages
+        4
+    """
+    folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
+    texts = _house_texts(_house_path(houses, folder))
+    dataset, split = inherited_names(texts)
+    options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
+    with progress_bar("tasks") as show:
+        found = generate_dataset(
+            texts,
+            folder,
+            options=options,
+            limit=limit,
+            workforce=Workforce(RunSettings(workers=workers).num_workers),
+            on_progress=lambda state: show(state.share, 1.0, f"{state.num_tasks} tasks"),
+        )
+    return LazyList([task_file(root) for root in found.roots], lambda file: load_task(file.path))
+
+
+def _house_path(houses: HouseSource, folder: Path) -> str | Path:
+    """Return the path of houses; houses in memory are written beside their tasks."""
+    if isinstance(houses, str | Path):
+        return _bundled_houses() if houses == BUNDLED else houses
+    listed = [houses] if isinstance(houses, House) else list(houses)
+    wrong = next((house for house in listed if not isinstance(house, House)), None)
+    if wrong is not None or not listed:
+        raise InvalidArgumentError(f"houses = {wrong!r}: expected `bundled`, a path, or a list of `evonav.House`")
+    return write_atomically(folder / "houses.jsonl", "".join(f"{house.to_json()}\n" for house in listed))
+
+
+def task_list(tasks: TaskSource, limit: int | None, out: Path) -> list[TaskFile]:
+    """Return the files of tasks; tasks in memory are written to `out`/tasks.
+
+    Raises:
+        InvalidArgumentError: An entry is no task, or a task is given twice.
+        TaskError: A folder holds no task.
+    """
+    found = list(islice(_each_file(tasks, limit, out), limit))
+    ids = [file.task_id for file in found]
+    twice = next((name for i, name in enumerate(ids) if name in ids[:i]), None)
+    if twice is not None:
+        raise InvalidArgumentError(f"two tasks have the id {twice!r}: evaluate them in runs of their own")
+    return found
+
+
+def _each_file(tasks: Any, limit: int | None, out: Path) -> Iterator[TaskFile]:  # noqa: ANN401 - whatever was given
+    if isinstance(tasks, str | Path):
+        yield from _files_of(tasks, limit)
+    elif isinstance(tasks, TaskFile):
+        yield tasks
+    elif isinstance(tasks, Task):
+        yield task_file(tasks.root or write_task(tasks, out / "tasks"))
+    elif isinstance(tasks, LazyList):
+        yield from tasks.sources
+    elif isinstance(tasks, Iterable):
+        for task in tasks:
+            yield from _each_file(task, None, out)
+    else:
+        raise InvalidArgumentError(
+            f"tasks = {tasks!r}: expected `bundled`, a folder of tasks, a task, or a list of tasks"
+        )
+
+
+def _files_of(source: str | Path, limit: int | None) -> list[TaskFile]:
+    if source == BUNDLED:
+        return task_files(_bundled_tasks(), limit)
+    path = Path(source)
+    if (path / "task.json").is_file():
+        return [task_file(path)]
+    if not path.exists():
+        raise TaskError(f"{path}: no such folder of tasks; `bundled` names those of evonav")
+    return task_files(path, limit)
+
+
+@cache
+def _lent() -> ExitStack:
+    """Return what holds the bundled files until this process ends."""
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack
+
+
+@cache
+def _bundled_tasks() -> Path:
+    return _lent().enter_context(bundled_tasks())
+
+
+@cache
+def _bundled_houses() -> Path:
+    return _lent().enter_context(as_file(files("evonav") / "data" / "houses.jsonl.gz"))

@@ -1,0 +1,80 @@
+"""Replay episodes of a run and write their pages, as `evonav view` and `Run.view` do."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from evonav.errors import TaskError
+from evonav.evaluation.records.store import RunStore
+from evonav.replay.pages import write_episode, write_index
+from evonav.replay.replay import RunReplay
+from evonav.report.maps.stage_map import VIEW_DIR
+from evonav.report.pages.replays import ListedPage
+from evonav.report.run import Run
+from evonav.tasks.bundled import bundled_tasks
+
+
+def write_pages(
+    run: Run,
+    episodes: Sequence[tuple[str, str]],
+    *,
+    stage: int | None = None,
+    tasks: Path | None = None,
+    exchanges: Path | None = None,
+    out: Path | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> tuple[list[ListedPage], Path]:
+    """Replay episodes and write their pages and the index.
+
+    Args:
+        run: A run.
+        episodes: Agent and task id of each.
+        stage: The only stage to show.
+        tasks: Folder of the run's tasks; default: where the run found them.
+        exchanges: File of a model's answers; default: the run's.
+        out: Folder to write; default: `view` in the run's folder.
+        tell: Told what is being replayed.
+
+    Returns:
+        The pages, and the path of the index.
+
+    Raises:
+        TaskError: A task is not there.
+    """
+    replay = RunReplay(run.run_dir, task_path(run.run_dir, tasks), exchanges)
+    out_dir = out or run.run_dir / VIEW_DIR
+    pages = []
+    for agent, task_id in episodes:
+        stages = list(replay.episode(agent, task_id, _teller(tell, agent, task_id), last_stage=stage))
+        pages += write_episode(
+            stages,
+            out_dir,
+            budget=replay.budget(agent),
+            success_radius_m=run.success_radius_m,
+            only=stage,
+            records_sha256=run.episodes_sha256[agent, task_id],
+        )
+    return pages, write_index(pages, out_dir, run.run_dir.resolve().name)
+
+
+def _teller(tell: Callable[[str], None], agent: str, task_id: str) -> Callable[[int, int], None]:
+    return lambda stage, round_: tell(f"{agent} in {task_id}, stage {stage}, round {round_ + 1}")
+
+
+def task_path(run: Path, tasks: Path | None) -> Callable[[str], Path]:
+    """Return a function that finds a task: in `tasks`, the run's folder, where the run found it, or among the bundled.
+
+    The function raises a `TaskError` where there is no such task.
+    """
+    with RunStore(run) as store:
+        noted = store.meta("tasks_dir")
+    with bundled_tasks() as bundled:
+        places = [tasks] if tasks is not None else [run / "tasks", *([Path(noted)] if noted else []), bundled]
+
+    def find(task_id: str) -> Path:
+        found = next((place / task_id for place in places if (place / task_id / "task.json").is_file()), None)
+        if found is None:
+            looked = ", ".join(str(place) for place in places)
+            raise TaskError(f"no task {task_id!r} in {looked}; name the folder of the run's tasks with --tasks")
+        return found
+
+    return find
