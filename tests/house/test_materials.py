@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from build_asset_catalogue import materials_named
+from asset_materials import materials_named
 
 ASSETS = Path(__file__).parents[2] / "rust" / "evonav-core" / "data" / "assets.json"
 
