@@ -1,0 +1,32 @@
+"""Fixtures of the tests of generation."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from evonav.generation import GenerationParameters, generate_task
+from evonav.house import bundled_houses
+from evonav.tasks import write_task
+
+
+@pytest.fixture(scope="session")
+def sound_task(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A task that changes before every stage but the first, by shuffling a room."""
+    config = GenerationParameters(
+        num_stages=(3,),
+        evolve_probability=1.0,
+        salient_object_probability=0.0,
+        retain_group_probability=0.0,
+        full_shuffle_probability=1.0,
+    )
+    house = list(bundled_houses(2))[1]
+    task = generate_task(house, seed=4, config=config)
+    assert all(stage.evolution.changes for stage in task.oracle_stages[1:])
+    return write_task(task, tmp_path_factory.mktemp("sound"))
+
+
+@pytest.fixture
+def root(sound_task: Path, tmp_path: Path) -> Path:
+    """A copy of the sound task, to be damaged."""
+    return Path(shutil.copytree(sound_task, tmp_path / sound_task.name))
