@@ -4,8 +4,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from generated_folder import OPTIONS, write_houses
 
 from evonav.generation import GenerationParameters, generate_task
+from evonav.generation.dataset import generate_dataset
 from evonav.house import bundled_houses
 from evonav.tasks import write_task
 
@@ -30,3 +32,23 @@ def sound_task(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def root(sound_task: Path, tmp_path: Path) -> Path:
     """A copy of the sound task, to be damaged."""
     return Path(shutil.copytree(sound_task, tmp_path / sound_task.name))
+
+
+@pytest.fixture(scope="session")
+def house_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten small houses, of which two give no task."""
+    return write_houses(tmp_path_factory.mktemp("houses") / "small.jsonl", 8)
+
+
+@pytest.fixture(scope="session")
+def clean_folder(house_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of an uninterrupted run in one process."""
+    out = tmp_path_factory.mktemp("clean")
+    generate_dataset(house_file, out, options=OPTIONS)
+    return out
+
+
+@pytest.fixture(scope="session")
+def large_house_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """52 small houses, of which two give no task."""
+    return write_houses(tmp_path_factory.mktemp("many") / "small.jsonl", 50)

@@ -162,12 +162,3 @@ def test_a_circle_through_a_re_export_is_found() -> None:
     }
     assert circles(graph) == [["a.rs", "b/deep.rs", "b/side.rs"]]
     assert circles(siblings(graph, ())) == [["a.rs", "b"]]
-
-
-@pytest.mark.parametrize("crate", ["evonav-core", "evonav-py"])
-def test_files_and_folders_stay_small(crate: str) -> None:
-    source = SOURCE.parents[1] / crate / "src"
-    lengths = {path: path.read_text("utf-8").count("\n") for path in source.rglob("*.rs")}
-    assert not {path.name: length for path, length in lengths.items() if length > 400}
-    numbers = {folder.name: len(list(folder.glob("*.rs"))) for folder in {path.parent for path in lengths}}
-    assert not {name: number for name, number in numbers.items() if number > 15}
