@@ -11,8 +11,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.drawing.files import ZOOM, write_picture
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.report.maps.files import ZOOM, write_picture
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20" width="40" height="20">'

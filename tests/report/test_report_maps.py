@@ -8,12 +8,13 @@ from made_up_run import NEW_TABLE_M, WriteRun, entry, record_run, stage_map, sta
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.drawing.floor_plan import label_point
+from evonav.drawing.style import file_css, map_css
+from evonav.drawing.svg import Point, polyline, simplified, slug
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import EndState
-from evonav.report.maps.floor_plan import label_point
-from evonav.report.maps.stage_map import file_css, map_css, stage_svg
+from evonav.report.maps.stage_map import stage_svg
 from evonav.report.maps.strip import best_highlight, write_strip
-from evonav.report.maps.svg import Point, polyline, simplified, slug
 from evonav.report.maps.trajectory import rounds as choices
 from evonav.report.run import load_run
 

@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.drawing.floor_plan import Frame, item_labels, label_point
+from evonav.drawing.svg import cm
 from evonav.evaluation.records.schema import ObjectFootprint
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
-from evonav.report.maps.floor_plan import Frame, item_labels, label_point
-from evonav.report.maps.svg import cm
 from evonav.report.tasks.floor_plans import TaskDrawing, _groups, change_frame, task_drawing
 from evonav.report.tasks.pages import stage_svg, write_task_page
 from evonav.report.tasks.wording import change_sentence, move_rows

@@ -9,12 +9,12 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.drawing.style import light_css
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import ReplayedStage
 from evonav.replay.video import write_video
 from evonav.replay.video_frames import LEFTS, MAP_PX, SIZE, TOP, episode_frame, stage_frames
-from evonav.report.maps.stage_map import light_css
 from evonav.tasks.bundled import bundled_tasks
 
 pytest.importorskip("resvg_py", reason="resvg is not installed")

@@ -18,6 +18,8 @@ from typer.testing import CliRunner
 from viewer_run import MARKUP
 
 from evonav.cli import app
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.svg import cm
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
@@ -25,9 +27,7 @@ from evonav.replay.page_data import PageData, cells_text
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage, Truth
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import page_name
-from evonav.report.maps.svg import cm
 from evonav.report.pages.run_page import write_report
 from evonav.tasks.bundled import bundled_tasks
 

@@ -22,12 +22,13 @@ from evonav.controlled.paired_maps import (
 )
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import rate_tables
+from evonav.drawing.files import SUFFIXES
+from evonav.drawing.floor_plan import furniture, ground, labels, moving_ids
+from evonav.drawing.style import map_css
+from evonav.drawing.svg import join, slug
 from evonav.parallel.folders import write_atomically
-from evonav.report.maps.files import SUFFIXES
-from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
 from evonav.report.maps.legend import legend
-from evonav.report.maps.stage_map import map_css, outcome_words
-from evonav.report.maps.svg import join, slug
+from evonav.report.maps.stage_map import outcome_words
 from evonav.report.maps.trajectory import change
 from evonav.report.pages.task_cards import stage_cell
 from evonav.report.pages.template import page_text, picture_uri, text_of

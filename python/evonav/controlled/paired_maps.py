@@ -7,14 +7,14 @@ from pathlib import Path
 
 from evonav.controlled.analysis import SPLITS, Analysis, Key, has_moved_far, split_of
 from evonav.controlled.layout import run_of
+from evonav.drawing.files import check_picture, write_picture
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.maps.files import check_picture, write_picture
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
 from evonav.report.maps.stage_map import change_words, house_drawing, success_radius_of, task_frame
-from evonav.report.maps.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.report.maps.trajectory import course
 from evonav.report.tables.causes import sentence
 

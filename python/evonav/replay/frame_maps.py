@@ -8,11 +8,11 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.svg import cm, cross, escape, join, polyline
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import house_drawing
-from evonav.report.maps.svg import cm, cross, escape, join, polyline
 from evonav.report.maps.trajectory import ring, start_mark, target_mark
 from evonav.tasks.language import noun_of
 

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import FrontierBelief
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.svg import clean, cm, polyline, simplified
 from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
 from evonav.replay.types import (
     ReplayedEntry,
@@ -25,9 +27,7 @@ from evonav.replay.types import (
     ReplayedStage,
     Truth,
 )
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, outcome_words
-from evonav.report.maps.svg import clean, cm, polyline, simplified
 from evonav.report.maps.trajectory import choice_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of

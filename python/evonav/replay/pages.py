@@ -10,15 +10,15 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from evonav.drawing.floor_plan import Frame, floors, furniture, item_labels, labels, structure
+from evonav.drawing.svg import cm
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import FloorPlan
 from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
-from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.report.maps.legend import entries_of, legend
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
-from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
 from evonav.report.pages.template import page_text, text_of

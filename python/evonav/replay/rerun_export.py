@@ -13,12 +13,12 @@ import numpy as np
 from PIL import Image
 
 from evonav.component import optional_module
+from evonav.drawing.files import check_suffix
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.parallel.folders import replacing
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
-from evonav.report.maps.files import check_suffix
 from evonav.report.maps.stage_map import outcome_words
 from evonav.report.maps.trajectory import choice_words
 from evonav.report.tables.causes import sentence

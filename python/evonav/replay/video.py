@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from evonav.component import optional_module
+from evonav.drawing.files import check_suffix, resvg
 from evonav.errors import InvalidArgumentError
 from evonav.parallel.folders import replacing
-from evonav.report.maps.files import check_suffix, resvg
 
 SUFFIX = ".mp4"
 MIN_WIDTH_PX = 320

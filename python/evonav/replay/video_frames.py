@@ -5,14 +5,15 @@ from io import BytesIO
 
 from PIL import Image
 
+from evonav.drawing.files import png_of
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.style import light_css
+from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.schema import EndState, FloorPlan
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import ReplayedRound, ReplayedStage
-from evonav.report.maps.files import png_of
-from evonav.report.maps.floor_plan import Frame
-from evonav.report.maps.stage_map import change_words, light_css, outcome_words, task_frame
-from evonav.report.maps.svg import escape, join, text_lines
+from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.trajectory import choice_words
 from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence

@@ -67,7 +67,7 @@ def show(
     limit: Limit = None,
 ) -> None:
     """Draw tasks with their hidden changes and answers: a page for a task, or a gallery for a dataset."""
-    from evonav.report.maps.files import SUFFIXES
+    from evonav.drawing.files import SUFFIXES
     from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from evonav.report.maps.svg import arrow_head, escape, join, star
+from evonav.drawing.svg import arrow_head, escape, join, star
 
 Entry = tuple[str, str, int]
 """A mark's meaning, its drawing in a box 24 px high, and the width of the box in pixels."""

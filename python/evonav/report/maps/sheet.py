@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.style import file_css
+from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.legend import legend_row
-from evonav.report.maps.stage_map import file_css, outcome_words
-from evonav.report.maps.svg import escape, join, text_lines
+from evonav.report.maps.stage_map import outcome_words
 
 
 def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, *, foot: str = "", foot_px: int) -> str:

@@ -1,45 +1,19 @@
 """Draw the map of a stage, and say in words what happened before it and how it ended."""
 
-import re
 from collections.abc import Mapping, Sequence
 
-from markupsafe import Markup
-
+from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
+from evonav.drawing.style import file_css
+from evonav.drawing.svg import escape, slug
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
-from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
-from evonav.report.maps.svg import escape, slug
 from evonav.report.maps.trajectory import change, course
-from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900
 VIEW_DIR = "view"
 """Folder of a run with the pages of `evonav view`."""
-
-
-def map_css() -> Markup:
-    """Return colours and fonts of maps on a page: custom properties, light and dark."""
-    return text_of("map.css")
-
-
-def file_css() -> str:
-    """Return the same for a file of its own: colours written out, since few programs know custom properties."""
-    _, dark, rules = str(map_css()).split("/* --- */")
-    return f"{light_css()}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
-
-
-def light_css(more: str = "") -> str:
-    """Return the colours of a light page written out, with further rules that may have custom properties, too."""
-    light, _, rules = str(map_css()).split("/* --- */")
-    return _inlined(rules + more, light + more)
-
-
-def _inlined(rules: str, properties: str) -> str:
-    """Return rules with every `var(--name)` replaced by its value."""
-    values = dict(re.findall(r"--(\w+):(#\w+)", properties))
-    return re.sub(r"var\(--(\w+)\)", lambda match: values[match[1]], rules)
 
 
 def stage_svg(

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from evonav.drawing.files import check_picture, write_picture
+from evonav.drawing.svg import escape, join, text_lines
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
 from evonav.report.maps.stage_map import change_words, stage_drawing, success_radius_of, task_frame
-from evonav.report.maps.svg import escape, join, text_lines
 from evonav.report.pages.highlights import best_highlight
 from evonav.report.run import load_run
 from evonav.report.tables.causes import sentence

@@ -4,6 +4,8 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
+from evonav.drawing.floor_plan import Frame, distance_m, furniture
+from evonav.drawing.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
 from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
@@ -14,8 +16,6 @@ from evonav.evaluation.records.schema import (
     StageRecord,
     TargetRecord,
 )
-from evonav.report.maps.floor_plan import Frame, distance_m, furniture
-from evonav.report.maps.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
 from evonav.tasks.language import noun_of
 
 NUM_TIMES = 10

@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.report.maps.stage_map import map_css
+from evonav.drawing.style import map_css
 from evonav.report.pages.template import text_of
 
 LIST_NAME = "pages.json"

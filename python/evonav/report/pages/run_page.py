@@ -7,11 +7,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from evonav.drawing.style import map_css
+from evonav.drawing.svg import slug
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
-from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
-from evonav.report.maps.svg import slug
+from evonav.report.maps.stage_map import VIEW_DIR, map_name, outcome_words, stage_svg
 from evonav.report.pages.highlights import highlights_first
 from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import filter_data, task_view

@@ -5,10 +5,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from evonav.drawing.floor_plan import furniture, ground, item_labels, labels, moving_ids
+from evonav.drawing.svg import clean, join, slug
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.report.maps.floor_plan import furniture, ground, item_labels, labels, moving_ids
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
-from evonav.report.maps.svg import clean, join, slug
 from evonav.report.maps.trajectory import change, course, rounds
 from evonav.report.run import Run, Task
 from evonav.report.tables.causes import sentence

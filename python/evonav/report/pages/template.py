@@ -8,7 +8,7 @@ from importlib.resources import files
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from evonav.report.maps.svg import clean
+from evonav.drawing.svg import clean
 
 
 def text_of(name: str) -> Markup:

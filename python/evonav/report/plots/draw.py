@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from evonav.report.maps.svg import clean
+from evonav.drawing.svg import clean
 from evonav.report.plots.specs import BarPlot, ConfusionPlot, CurvePlot, Gap, GapPlot, GroupPlot, Line, Plot, Series
 from evonav.report.plots.style import BAND, COLOURS, INK, PALE, PAPER, REFERENCE, SOFT
 from evonav.report.tables.numbers import number

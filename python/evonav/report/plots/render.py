@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 
+from evonav.drawing.files import SUFFIXES, check_suffix
+from evonav.drawing.svg import escape, title
 from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
-from evonav.report.maps.files import SUFFIXES, check_suffix
-from evonav.report.maps.svg import escape, title
 from evonav.report.plots.draw import TOOLTIP, draw, size_in
 from evonav.report.plots.specs import Plot
 from evonav.report.plots.style import RC, plot_css

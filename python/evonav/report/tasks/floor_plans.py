@@ -5,11 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evonav.evaluation.records.floor_plan import door_ends, floor_plan_of, image_uri
-from evonav.evaluation.records.oracle import target_record, transition_record
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
-from evonav.house import House
-from evonav.report.maps.floor_plan import (
+from evonav.drawing.floor_plan import (
     FLAT_CATEGORIES,
     Frame,
     floors,
@@ -21,7 +17,12 @@ from evonav.report.maps.floor_plan import (
     outline,
     structure,
 )
-from evonav.report.maps.svg import Point, cm, join, polyline, title
+from evonav.drawing.plan import door_ends
+from evonav.drawing.svg import Point, cm, join, polyline, title
+from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
+from evonav.evaluation.records.oracle import target_record, transition_record
+from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
+from evonav.house import House
 from evonav.report.maps.trajectory import relocation_arrows, start_mark, target_mark
 from evonav.tasks import Task
 from evonav.tasks.language import noun_of

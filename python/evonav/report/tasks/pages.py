@@ -6,12 +6,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from evonav.drawing.files import check_picture, write_picture
+from evonav.drawing.floor_plan import Frame
+from evonav.drawing.style import file_css, map_css
+from evonav.drawing.svg import escape, join, slug
 from evonav.parallel.folders import write_atomically
-from evonav.report.maps.files import check_picture, write_picture
-from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.legend import TASK_ENTRIES, legend
-from evonav.report.maps.stage_map import file_css, map_css
-from evonav.report.maps.svg import escape, join, slug
 from evonav.report.pages.template import page_text, text_of
 from evonav.report.tasks.floor_plans import (
     TaskDrawing,

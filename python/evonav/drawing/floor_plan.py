@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
-from evonav.report.maps.svg import Point, cm, escape, join, polyline, title
+from evonav.drawing.plan import ObjectPlan, Plan, RoomPlan
+from evonav.drawing.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
 
 MARGIN_CM = 40
@@ -76,7 +76,7 @@ class Frame:
         return Frame(left, top, max(xs) + MARGIN_CM - left, max(ys) + MARGIN_CM - top)
 
 
-def frame_of(maps: Iterable[FloorPlan]) -> Frame:
+def frame_of(maps: Iterable[Plan]) -> Frame:
     """Return the frame that all stages of a task share."""
     maps = list(maps)
     points: list[Point] = [point for m in maps for room in m.rooms for point in room.polygon_m]
@@ -84,7 +84,7 @@ def frame_of(maps: Iterable[FloorPlan]) -> Frame:
     return Frame.around(points)
 
 
-def moving_ids(maps: Sequence[FloorPlan]) -> frozenset[str]:
+def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
     """Return the ids of objects that do not stand in the same place in all of the stages."""
     places: dict[str, set[tuple[tuple[int, int], ...]]] = {}
     seen: dict[str, int] = {}
@@ -95,13 +95,13 @@ def moving_ids(maps: Sequence[FloorPlan]) -> frozenset[str]:
     return frozenset(name for name, found in places.items() if len(found) > 1 or seen[name] != len(maps))
 
 
-def ground(stage_map: FloorPlan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
+def ground(stage_map: Plan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
     """Draw floors, furniture, walls and openings; `without` names objects to leave out."""
     items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
     return floors(stage_map) + items + structure(stage_map, frame)
 
 
-def floors(stage_map: FloorPlan) -> str:
+def floors(stage_map: Plan) -> str:
     """Draw rooms, coloured by type."""
     return join(
         f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
@@ -109,7 +109,7 @@ def floors(stage_map: FloorPlan) -> str:
     )
 
 
-def structure(stage_map: FloorPlan, frame: Frame) -> str:
+def structure(stage_map: Plan, frame: Frame) -> str:
     """Draw walls, doors and windows."""
     u = frame.unit
     doors = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "door"]
@@ -122,14 +122,14 @@ def structure(stage_map: FloorPlan, frame: Frame) -> str:
     )
 
 
-def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
+def furniture(items: Iterable[ObjectPlan], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
     """Draw footprints, lower ones first, each with its category as tooltip; `has_parts` draws large ones in detail."""
     ordered = sorted(items, key=lambda item: (item.centre_m[1] + item.size_m[1] / 2, item.object_id))
     drawn = join(_footprint(item, has_parts=has_parts) for item in ordered)
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
-def labels(stage_map: FloorPlan, frame: Frame) -> str:
+def labels(stage_map: Plan, frame: Frame) -> str:
     """Write the names of rooms where there is least furniture."""
     u = frame.unit
     taken = [_box(item) for item in stage_map.objects if item.category not in FLAT_CATEGORIES]
@@ -138,7 +138,7 @@ def labels(stage_map: FloorPlan, frame: Frame) -> str:
 
 
 def item_labels(
-    items: Iterable[ObjectFootprint], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
+    items: Iterable[ObjectPlan], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
 ) -> str:
     """Write the names of the furniture that is large enough to hold them, none over another.
 
@@ -197,7 +197,7 @@ def label_point(
     return (float(points[best, 0]), float(points[best, 1]))
 
 
-def _footprint(item: ObjectFootprint, *, has_parts: bool) -> str:
+def _footprint(item: ObjectPlan, *, has_parts: bool) -> str:
     css = "item flat" if item.category in FLAT_CATEGORIES else "item"
     if max(item.size_m[0], item.size_m[2]) < SMALL_M:
         css = "item small"
@@ -211,7 +211,7 @@ def _footprint(item: ObjectFootprint, *, has_parts: bool) -> str:
     return f'<path class="{css}" d="{outline(item.polygon_m)}">{hint}</path>'
 
 
-def _shape(item: ObjectFootprint, css: str, hint: str, *, has_parts: bool) -> str:
+def _shape(item: ObjectPlan, css: str, hint: str, *, has_parts: bool) -> str:
     """Draw all parts as one outline, and in a large object the parts themselves, higher ones over lower ones."""
     parts = [outline(part) for part in item.outlines_m]
     # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
@@ -221,7 +221,7 @@ def _shape(item: ObjectFootprint, css: str, hint: str, *, has_parts: bool) -> st
     return union + join(f'<path class="part" d="{part}"/>' for part in dict.fromkeys(parts))
 
 
-def _room_label(room: RoomFootprint, unit: float, taken_m: Sequence[Box]) -> str:
+def _room_label(room: RoomPlan, unit: float, taken_m: Sequence[Box]) -> str:
     if len(room.polygon_m) < 3:
         return ""
     name = noun_of(room.room_type)
@@ -236,7 +236,7 @@ def _room_label(room: RoomFootprint, unit: float, taken_m: Sequence[Box]) -> str
     return f'<text{size} x="{x}" y="{y + 0.3 * font_cm:.0f}">{escape(name)}</text>'
 
 
-def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None:
+def _item_label(item: ObjectPlan, font_cm: float) -> tuple[Box, str] | None:
     """Return box and text of a label that fits into the largest part of an object."""
     x0, z0, x1, z1 = max((_box_of(part) for part in item.outlines_m), key=_area_m2, default=_box(item))
     name = noun_of(item.category)
@@ -253,7 +253,7 @@ def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None
     return None
 
 
-def _box(item: ObjectFootprint) -> Box:
+def _box(item: ObjectPlan) -> Box:
     """Return the box around an object, in metres."""
     (x, _, z), (width_m, _, depth_m) = item.centre_m, item.size_m
     return (x - width_m / 2, z - depth_m / 2, x + width_m / 2, z + depth_m / 2)

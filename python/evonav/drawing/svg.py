@@ -1,7 +1,7 @@
 """Write small pieces of SVG: escaped text, numbers, paths, marks.
 
 Drawings are in centimetres seen from above, x to the right and z up the page, so that coordinates are short integers.
-Colours are CSS classes (`templates/map.css`); only geometry is written here.
+Colours are CSS classes (`map.css`); only geometry is written here.
 """
 
 import hashlib

@@ -1,0 +1,1 @@
+"""Draw floor plans from above as SVG: houses, maps of cells, object entries and paths."""

@@ -1,0 +1,30 @@
+"""Provide the colours and fonts of maps, light and dark, as CSS."""
+
+import re
+from importlib.resources import files
+
+from markupsafe import Markup
+
+
+def map_css() -> Markup:
+    """Return the style of maps on a page: custom properties, light and dark, then rules."""
+    text = (files("evonav.drawing") / "map.css").read_text(encoding="utf-8")
+    return Markup(text)  # noqa: S704 - our own file
+
+
+def file_css() -> str:
+    """Return the same for a file of its own: colours written out, since few programs know custom properties."""
+    _, dark, rules = str(map_css()).split("/* --- */")
+    return f"{light_css()}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
+
+
+def light_css(more: str = "") -> str:
+    """Return the colours of a light page written out, with further rules that may have custom properties, too."""
+    light, _, rules = str(map_css()).split("/* --- */")
+    return _inlined(rules + more, light + more)
+
+
+def _inlined(rules: str, properties: str) -> str:
+    """Return rules with every `var(--name)` replaced by its value."""
+    values = dict(re.findall(r"--(\w+):(#\w+)", properties))
+    return re.sub(r"var\(--(\w+)\)", lambda match: values[match[1]], rules)
