@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -63,12 +64,36 @@ def import_callable(path: str, kind: str = "") -> Callable[..., Any]:
     module, _, name = path.rpartition(":")
     shown = f"{kind} `{path}`".strip()
     try:
-        found = getattr(_file_module(module) if module.endswith(".py") else import_module(module), name)
+        loaded = _file_module(module) if module.endswith(".py") else import_module(module)
     except Exception as error:  # importing runs other people's code, which may raise anything
-        raise InvalidArgumentError(f"{shown} cannot be imported: {type(error).__name__}: {error}") from error
+        hint = _file_hint(error, module, name)
+        raise InvalidArgumentError(f"{shown} cannot be imported: {type(error).__name__}: {error}{hint}") from error
+    try:
+        found = getattr(loaded, name)
+    except AttributeError as error:
+        raise InvalidArgumentError(f"{shown} cannot be imported: {_missing_name(loaded, name)}") from error
     if not callable(found):
         raise InvalidArgumentError(f"{shown} is not callable: name a class or a function")
     return cast("Callable[..., Any]", found)
+
+
+def _file_hint(error: Exception, module: str, name: str) -> str:
+    """Return a hint at the file `module.py` of this folder, if the module was not found and such a file is here."""
+    file = Path(f"{module.replace('.', '/')}.py")
+    if isinstance(error, ModuleNotFoundError) and error.name == module.partition(".")[0] and file.is_file():
+        return f"; did you mean `./{file.as_posix()}:{name}`?"
+    return ""
+
+
+def _missing_name(module: ModuleType, name: str) -> str:
+    """Say that a module lacks a name, and name the classes that it defines or the nearest of its names."""
+    own = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
+    near = get_close_matches(name, own, 1)
+    known = ", ".join(own[:10])
+    hint = (
+        f"did you mean `{near[0]}`?" if near else f"it defines {known}" if known else "it defines no class or function"
+    )
+    return f"`{module.__name__}` has no `{name}`; {hint}"
 
 
 def _file_module(path: str) -> ModuleType:

@@ -97,6 +97,14 @@ class Senseless(Turning):
         """Set no `sensors`."""
 
 
+class Colourful(Turning):
+    """Looks at colours that it did not ask for."""
+
+    def act(self, observation):
+        image = observation.views[0].rgb
+        return Move(Action.TURN_LEFT if image.mean() > 100 else Action.TURN_RIGHT)
+
+
 class Plain:
     """Explains nothing."""
 

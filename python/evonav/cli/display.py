@@ -81,9 +81,9 @@ def print_failures(run: Path) -> None:
     with RunStore(run) as store:
         failures = store.failures()
     for is_retried, what in ((True, "tried again"), (False, "errored")):
-        kinds = Counter(failure.kind.value for failure in failures if failure.is_retried is is_retried)
-        if kinds:
-            typer.echo(f"stages {what}: {', '.join(f'{count} after {kind}' for kind, count in sorted(kinds.items()))}")
+        kinds = Counter(failure.kind.phrase for failure in failures if failure.is_retried is is_retried)
+        for phrase, count in sorted(kinds.items()):
+            typer.echo(f"{count} {'stage' if count == 1 else 'stages'} {what}: {phrase}")
     if failures:
         typer.echo(f"why: evonav failures {run}")
 

@@ -11,6 +11,8 @@ MAX_TRACEBACK = 20_000
 NUM_FRAMES = 3
 """Number of places of a traceback, the innermost ones."""
 
+COLOURS_HINT = "`view.rgb` is None unless the agent asks for colours: `SensorConfig(needs_rgb=True)`"
+
 _OURS = ("evonav.agents.hosting.",)
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
 
@@ -30,6 +32,8 @@ def describe(error: BaseException, *, caller: str | None = None) -> str:
         text = "(its message cannot be read)"
     text = _ADDRESS.sub("0x...", f"{type(error).__name__}: {text}")
     text = clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
+    if "NoneType" in text and _reads_colours(error.__traceback__):
+        text += f" ({COLOURS_HINT})"
     places = _places(error.__traceback__, _OURS if caller is None else (*_OURS, f"{caller}."))
     return f"{text} [{' > '.join(places)}]" if places else text
 
@@ -55,3 +59,12 @@ def _places(trace: TracebackType | None, outside: tuple[str, ...]) -> list[str]:
             places.append(clean(f"{module}:{trace.tb_lineno} in {trace.tb_frame.f_code.co_name}"))
         trace = trace.tb_next
     return places[-NUM_FRAMES:]
+
+
+def _reads_colours(trace: TracebackType | None) -> bool:
+    """Return true if a function of the traceback reads an attribute `rgb`."""
+    while trace is not None:
+        if "rgb" in trace.tb_frame.f_code.co_names:
+            return True
+        trace = trace.tb_next
+    return False

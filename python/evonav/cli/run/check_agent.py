@@ -27,7 +27,7 @@ def check_agent(
     seed: Seed = 0,
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for an answer of the agent.")] = 60.0,
 ) -> None:
-    """Check that an agent keeps the contract, in a bundled house that changes; exit code 1 if it does not."""
+    """Check that an agent keeps the contract, and force situations in which agents crash; exit code 1 if one fails."""
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
@@ -39,7 +39,7 @@ def check_agent(
         )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     print_checks(
-        f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}",
+        report.conclusion,
         ((check.name, check.verdict, _STYLES[check.verdict], check.finding) for check in report.checks),
     )
     if not report.is_ok:

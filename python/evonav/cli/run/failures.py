@@ -19,7 +19,7 @@ def failures(
         rows = [row for row in store.failures() if agent in (None, row.agent)]
     for row in rows:
         what = "tried again" if row.is_retried else "errored"
-        typer.echo(f"{row.agent} {row.task_id} stage {row.stage}: {what} after {row.kind.value}: {row.message}")
+        typer.echo(f"{row.agent} {row.task_id} stage {row.stage}: {what}, since {row.kind.phrase}: {row.message}")
         if row.traceback and not brief:
             typer.echo("".join(f"    {line}\n" for line in row.traceback.rstrip().splitlines()))
     if not rows:

@@ -4,10 +4,12 @@ The agent first runs in a process of its own, where it can do no harm, and then 
 its calls.
 """
 
+import inspect
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from evonav.agents.hosting.error_text import describe
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
 from evonav.evaluation.contract.probe import Probe
+from evonav.evaluation.contract.situations import check_situations
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.spec import EpisodeSpec
@@ -26,6 +29,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks
 
 LARGE_MEMORY_MB = 2000.0
+ADVICE = "function without arguments that returns the agent, and name that"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +44,17 @@ class AgentReport:
         """True if no check failed; there may be warnings."""
         return not any(check.verdict == "fail" for check in self.checks)
 
+    @property
+    def conclusion(self) -> str:
+        """The result in one line: whether the agent keeps the contract, breaks it, or could not be run at all."""
+        if any(check.name == "importable" and check.verdict == "fail" for check in self.checks):
+            return f"{self.agent}: cannot be checked"
+        return f"{self.agent}: {'keeps the contract' if self.is_ok else 'breaks the contract'}"
+
     def __str__(self) -> str:
         width = max(len(check.name) for check in self.checks)
         lines = [f"{check.verdict:4}  {check.name:{width}}  {check.finding}" for check in self.checks]
-        return "\n".join([f"{self.agent}: {'keeps the contract' if self.is_ok else 'breaks the contract'}", *lines])
+        return "\n".join([self.conclusion, *lines])
 
 
 def check_agent(
@@ -96,13 +107,14 @@ class _Examination:
         if self._name in ORACLE_BASELINES:
             yield Check("importable", "fail", "an oracle baseline: it knows the target, and is no agent")
             return
-        with bundled_tasks() as directory:
-            yield from self._examine(*_changing_tasks(self._backend, directory))
+        with bundled_tasks() as directory, closing(AgentProcesses(self._hosting)) as processes:
+            yield from self._examine(directory, processes)
 
-    def _examine(self, spec: EpisodeSpec, other: EpisodeSpec) -> Iterator[Check]:
+    def _examine(self, tasks: Path, processes: AgentProcesses) -> Iterator[Check]:
+        spec, other = _changing_tasks(self._backend, tasks)
         remote: _Run | None = None
         if self._factory is None or _is_importable(self._name, self._factory):
-            remote = self._remote_run(spec)
+            remote = self._remote_run(spec, processes)
             first_check = self._check_remote(remote)
             yield first_check
             if first_check.verdict == "fail":
@@ -113,38 +125,42 @@ class _Examination:
             yield Check("own process", "warn", finding)
         try:
             factory = self._factory or agent_factory(self._name)
+            if needed := _needed_arguments(factory):
+                yield Check("made", "fail", f"it needs the arguments {needed}: give them defaults, or make a {ADVICE}")
+                return
             probe = self._probe(factory)
             first = self._run(probe, spec)
         except BaseException as error:  # the code of others may raise SystemExit, too
-            finding = f"making it raises {describe(error, caller=PACKAGE)}; it must do without arguments"
-            yield Check("made", "fail", finding)
+            yield Check("made", "fail", f"making it raises {describe(error, caller=PACKAGE)}")
             return
         yield Check("made", "pass", "without arguments, or with `decision` alone")
         yield from points_of(probe, first.records)
         if not any(record.error is not None and record.error.kind.is_agents for record in first.records):
             yield from self._compare(factory, spec, other, first, remote)
+            makes: Callable[[], Agent | HostedAgent] = partial(self._probe, factory)
+            if remote is not None:
+                makes = partial(RemoteAgent, processes, self._name, self._backend.decision, self._seed)
+            yield from check_situations(self._backend, tasks, self._name, makes, self._seed)
 
-    def _remote_run(self, spec: EpisodeSpec) -> _Run:
+    def _remote_run(self, spec: EpisodeSpec, processes: AgentProcesses) -> _Run:
         """Run an episode in a process of its own, until that process is lost."""
         run = _Run()
-        with closing(AgentProcesses(self._hosting)) as processes:
-            agent = RemoteAgent(processes, self._name, self._backend.decision, self._seed)
-            for record in self._episode(agent, spec):
-                run.records.append(record)
-                if record.error is not None and record.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
-                    break
-                used_mb = processes.process(self._name).memory_mb if record.num_rounds else None
-                run.memory_mb = used_mb or run.memory_mb
+        agent = RemoteAgent(processes, self._name, self._backend.decision, self._seed)
+        for record in self._episode(agent, spec):
+            run.records.append(record)
+            if record.error is not None and record.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
+                break
+            used_mb = processes.process(self._name).memory_mb if record.num_rounds else None
+            run.memory_mb = used_mb or run.memory_mb
         return run
 
     def _check_remote(self, run: _Run) -> Check:
         last, error = run.records[-1], run.records[0].error
         if last.error is not None and last.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
             return Check("own process", "fail", f"stage {last.stage}: {last.error.message}")
-        if error is not None and not run.records[0].trace and "cannot be imported" in error.message:
-            return Check("importable", "fail", error.message)
-        if error is not None and "no agent `" in error.message:
-            return Check("importable", "fail", error.message)
+        is_unknown = error is not None and any(part in error.message for part in ("cannot be imported", "no agent `"))
+        if error is not None and is_unknown and not run.records[0].trace:
+            return Check("importable", "fail", error.message.removeprefix("InvalidArgumentError: ").partition(" [")[0])
         return Check("importable", "pass", f"a process of its own can import `{self._name}`")
 
     def _probe(self, factory: Callable[..., Agent]) -> Probe:
@@ -204,6 +220,16 @@ def _named(agent: str | Callable[..., Agent] | Agent) -> tuple[str, Callable[...
     if module == "__main__":
         module = getattr(sys.modules["__main__"], "__file__", None) or module
     return f"{module}:{name}", factory
+
+
+def _needed_arguments(factory: Callable[..., Agent]) -> str:
+    """Return the arguments without which an agent cannot be made, other than `decision`."""
+    try:
+        parameters = inspect.signature(factory).parameters.values()
+    except (TypeError, ValueError):  # builtins and some extension types tell nothing
+        return ""
+    named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    return ", ".join(f"`{p.name}`" for p in named if p.default is p.empty and p.name != "decision")
 
 
 def _is_importable(name: str, factory: Callable[..., Agent]) -> bool:

@@ -43,7 +43,8 @@ def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
         if error is not None:
             yield Check(name, "fail", f"raises {describe(error, caller=PACKAGE)}")
         elif probe.calls[name]:
-            yield Check(name, "pass", f"called {probe.calls[name]} times: {what}")
+            count = "once" if probe.calls[name] == 1 else f"{probe.calls[name]} times"
+            yield Check(name, "pass", f"called {count}: {what}")
         else:
             yield Check(name, "skip", "not reached")
     if probe.calls["act"]:

@@ -64,9 +64,26 @@ class ErrorKind(str, Enum):
     """Anything else: a task that cannot be read, a bug in evonav."""
 
     @property
+    def phrase(self) -> str:
+        """The cause in words, such as `the agent failed`."""
+        return _PHRASES[self]
+
+    @property
     def is_agents(self) -> bool:
         """True if the agent caused the error: such a failure costs its stage, and the episode continues."""
         return self in (ErrorKind.AGENT, ErrorKind.DECISION, ErrorKind.CRASH, ErrorKind.TIMEOUT)
+
+
+_PHRASES = {
+    ErrorKind.AGENT: "the agent failed",
+    ErrorKind.DECISION: "the decision model gave no valid answer",
+    ErrorKind.SIMULATION: "the simulator failed",
+    ErrorKind.SIMULATOR_LOST: "the simulator's process was lost",
+    ErrorKind.REFERENCE: "there is no path to the target",
+    ErrorKind.CRASH: "the agent's process died",
+    ErrorKind.TIMEOUT: "no answer came in time",
+    ErrorKind.HARNESS: "the task cannot be read, or evonav failed",
+}
 
 
 class StageError(_Record):

@@ -1,0 +1,93 @@
+"""`check_agent` forces the situations in which agents under development crash."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from evonav.agents.nearest_frontier import NearestFrontier
+from evonav.evaluation.contract.situations import check_situations, place_of
+from evonav.evaluation.run.components import Backend
+from evonav.tasks.bundled import bundled_tasks
+
+TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial-agent.md"
+
+
+def situations(agent):
+    with bundled_tasks() as directory:
+        return {found.name: found for found in check_situations(Backend(), directory, "mine", agent, 0)}
+
+
+@pytest.fixture(scope="module")
+def tutorial():
+    blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
+    return "\n".join(block for block in blocks if block.startswith("# my_agent.py"))
+
+
+def test_an_agent_that_handles_every_situation_passes(tutorial):
+    names = {}
+    exec(tutorial, names)
+    found = situations(names["Doubter"])
+    assert {check.verdict for check in found.values()} == {"pass"}, found
+
+
+def test_a_fault_in_the_branch_of_a_remembered_entry_is_found(tutorial, tmp_path):
+    """The line that the tutorial once had: no stage of an easy task reaches it."""
+    faulty = tutorial.replace("self.objects.remove(entry.id)", "self.objects.remove(entry.entry_id)")
+    assert faulty != tutorial
+    line = next(number for number, text in enumerate(faulty.splitlines(), 1) if "entry.entry_id" in text)
+    names = {}
+    exec(compile(faulty, tmp_path / "my_agent.py", "exec"), names)
+    found = situations(names["Doubter"])
+    assert {"target gone", "failed search"} <= {name for name, check in found.items() if check.verdict == "fail"}
+    assert found["target gone"].finding.startswith(f"my_agent.py:{line}: AttributeError: ")
+    assert "has no attribute 'entry_id'" in found["target gone"].finding
+
+
+class Fragile(NearestFrontier):
+    """Raises in each of the branches that easy stages do not reach."""
+
+    def act(self, observation):
+        is_first = observation.num_rounds_left == 12
+        sees_nothing = not any(view.detections.labels for view in observation.views)
+        self.raise_if(observation.is_guided, "guided")
+        self.raise_if(not observation.is_action_success, "failed action")
+        self.raise_if(is_first and sees_nothing, "nothing there")
+        action = super().act(observation)
+        self.raise_if(not is_first and self.diagnostics().num_frontiers == 0, "no frontier")
+        self.raise_if(observation.num_rounds_left == 1, "no rounds left")
+        return action
+
+    def raise_if(self, is_wrong, reason):
+        if is_wrong:
+            raise LookupError(reason)
+
+
+def test_each_situation_is_reached():
+    found = situations(Fragile)
+    reasons = {"guided stage": "guided", "failed actions": "failed action", "no detections": "nothing there"}
+    reasons |= {"never found": "no rounds left", "all explored": "no frontier"}
+    for name, reason in reasons.items():
+        assert found[name].verdict == "fail"
+        assert f"LookupError: {reason}" in found[name].finding
+        assert re.match(r"test_agent_situations\.py:\d+: ", found[name].finding)
+
+
+def test_what_the_agents_own_choices_do_not_reach_is_said():
+    class Resting(NearestFrontier):
+        def act(self, observation):
+            from evonav.agents.agent import Stop
+
+            return Stop()
+
+    found = situations(Resting)
+    assert found["target gone"].verdict == "skip"
+    assert found["target gone"].finding == "not reached: the agent did not go back to where it had seen the target"
+    assert found["failed actions"].finding == "not reached: the agent did not try to move"
+    assert found["guided stage"].verdict == "pass"
+
+
+def test_the_place_of_a_traceback_is_the_agents_own():
+    trace = 'Traceback\n  File "/home/me/mine.py", line 7, in act\n    x\n  File "<string>", line 2, in f\nError'
+    assert place_of(trace) == "mine.py:7"
+    assert place_of("no traceback") == ""
