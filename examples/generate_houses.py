@@ -3,7 +3,7 @@
     python examples/generate_houses.py --executable "$(which evonav-thor)" --seeds 0:10 --out houses.jsonl.gz
 
 docs/procthor.md says what to install. The same seed gives the same house, whichever seeds are made before it; houses
-that fail the generator's own validation are left out. `evonav generate --houses houses.jsonl.gz` makes tasks of them.
+that fail the generator's own validation are left out. `evonav tasks generate --houses houses.jsonl.gz` makes tasks.
 """
 
 import argparse

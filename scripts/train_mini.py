@@ -2,8 +2,8 @@
 
     python scripts/train_mini.py --tasks TRAIN_TASKS --out mini.pt --steps 3000
 
-`--tasks` are folders of tasks made from houses of the *train* split with `evonav generate` (ours: the 1,000 houses of
-`attr-onav-1k-train-1000.jsonl.gz`, the bundled houses of the train split and 17 of `tiny-train.jsonl.gz`, see
+`--tasks` are folders of tasks made from houses of the *train* split with `evonav tasks generate` (ours: 1,000 houses
+of `attr-onav-1k-train-1000.jsonl.gz`, the bundled houses of the train split and 17 of `tiny-train.jsonl.gz`, see
 CONTRIBUTING.md on data sets; houses of ProcTHOR-10k do as well). Needs torch. Prints the loss every 50 steps and
 saves every 250; the same arguments, machine and torch give the same weights. `export_mini.py` makes what ships.
 """

@@ -1,6 +1,7 @@
 """Every command says by examples how it is used; the shell completes; neither slows the command's start."""
 
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -80,7 +81,7 @@ def test_runs_and_subsets_are_completed(tmp_path, monkeypatch):
 def test_the_shell_gets_its_answers():
     """As bash asks: the words so far in the environment."""
     code = "from evonav.cli import app; app(prog_name='evonav')"
-    asked = {"_EVONAV_COMPLETE": "complete_bash", "COMP_WORDS": "evonav evaluate --agents stag", "COMP_CWORD": "3"}
+    asked = {"_EVONAV_COMPLETE": "complete_bash", "COMP_WORDS": "evonav evaluate --agent stag", "COMP_CWORD": "3"}
     done = subprocess.run([sys.executable, "-c", code], env={"PATH": "", **asked}, capture_output=True, text=True)
     assert done.stdout.split() == ["stage-reset"], done.stderr
 
@@ -91,3 +92,63 @@ def test_completion_does_not_slow_the_start():
     code = f"import sys, evonav.cli; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
+
+
+def test_old_names_still_work(tmp_path):
+    """For one version: the note says the new name, and the help does not show the old one."""
+    out = str(tmp_path / "run")
+    run = CliRunner().invoke(
+        app, ["evaluate", "--agents=shortest-path", "--limit", "1", "--workers", "0", "--out", out]
+    )
+    assert run.exit_code == 0
+    assert "note: --agents is now --agent" in run.stderr
+    old = CliRunner().invoke(app, ["measures", out, "--agents", "shortest-path", "--out", str(tmp_path / "old.md")])
+    new = CliRunner().invoke(app, ["report", out, "--text", "--md", str(tmp_path / "new.md")])
+    assert (old.exit_code, new.exit_code) == (0, 0)
+    assert (tmp_path / "old.md").read_text() == (tmp_path / "new.md").read_text()
+    assert "`evonav measures` is now `evonav report --text`" in old.stderr
+    task = next(line.split()[0] for line in CliRunner().invoke(app, ["tasks", "list"]).stdout.splitlines()[1:])
+    for words in (["strip", out, task, "--agents", "shortest-path", "--stages", "1"], ["generate", "--help"]):
+        assert CliRunner().invoke(app, words).exit_code == 0, words
+    assert (tmp_path / "run/strip.svg").is_file()
+    for words in ([], ["strip"], ["evaluate"]):
+        shown = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "160"}).stdout
+        assert not re.search(r"measures|--agents|--stages|\[TASK\]", shown)
+
+
+def test_every_help_is_short_plain_and_complete():
+    """Flags have no type, brackets are not taken for styles, and each purpose fits on a line."""
+    shown = CliRunner().invoke(app, ["-h"], env={"COLUMNS": "80"}).stdout
+    assert CliRunner().invoke(app, ["--version"]).stdout == CliRunner().invoke(app, ["version"]).stdout
+    places = [shown.index(f"│ {name} ") for name in ("demo", "evaluate", "report", "houses", "paper", "pack", "video")]
+    assert places == sorted(places)
+    group_context = GROUP.make_context("evonav", ["agents"])
+    for name in COMMANDS:
+        *groups, last = name.split()
+        parent = GROUP
+        for group in groups:
+            parent = parent.commands[group]
+        _, command, _ = parent.resolve_command(group_context, [last])
+        help_ = CliRunner().invoke(app, [*name.split(), "-h"], env={"COLUMNS": "120"}).stdout
+        assert "<bool>" not in help_, name
+        for param in command.params:
+            text = param.help or ""
+            assert text or param.hidden, f"{name}: {param.name} has no help"
+            assert not re.search(r"\[[a-z#/@]", text), f"{name}: {param.name}: rich would take the bracket for a style"
+            assert "docs/" not in text, f"{name}: {param.name}: an installed package has no docs"
+
+
+def test_options_that_mean_the_same_are_declared_once():
+    """One help and one default for an option, but where it says what this very command works on."""
+    own = {"out", "seed", "houses", "agent", "task", "tasks", "exchanges", "perceptions", "measure", "latex", "split"}
+    own |= {"agent_timeout", "json", "as_json", "json_file"}
+    texts = {}
+    for name in set(COMMANDS) - {"sweep", "paper"}:  # whose options change a file, and name the paper's tables
+        *groups, last = name.split()
+        parent = GROUP.commands[groups[0]] if groups else GROUP
+        _, command, _ = parent.resolve_command(GROUP.make_context("evonav", ["agents"]), [last])
+        for param in command.params:
+            if param.param_type_name == "option" and not param.hidden and param.name not in own:
+                texts.setdefault(param.opts[0], {}).setdefault((param.help, str(param.default)), []).append(name)
+    differing = {option: found for option, found in texts.items() if len(found) > 1}
+    assert differing == {}, differing

@@ -9,7 +9,7 @@ from evonav.cli import main
 from evonav.evaluation.records.store import RunStore
 from evonav.tasks.bundled import bundled_tasks
 
-ONE = "--agents shortest-path --limit 1 --workers 0"
+ONE = "--agent shortest-path --limit 1 --workers 0"
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(place)
         for words in (
-            "evaluate --agents shortest-path --limit 1 --workers 0 --out run",
+            "evaluate --agent shortest-path --limit 1 --workers 0 --out run",
             "sweep sweep.toml --out sweep",
         ):
             patch.setattr(sys, "argv", ["evonav", *words.split()])
@@ -45,21 +45,21 @@ MISTAKES = {
     # a command or an option
     "evaluate": "Missing option '--out'",
     "evalaute --out out": "Did you mean 'evaluate'?",
-    f"{EVALUATE} --agnets fu": "--agents",
+    f"{EVALUATE} --agnets fu": "--agent",
     f"{EVALUATE} --limit none": "'--limit'",
     f"{EVALUATE} --limit 2 --subset test-90": "give --limit or --subset, not both",
     f"{EVALUATE} --ray-address auto": "--ray-address is for engine ray",
     # an agent
-    f"{EVALUATE} --agents ftuu": "did you mean `ftu`?",
-    f"{EVALUATE} --agents fu --agents fu": "an agent is named twice: fu, fu",
+    f"{EVALUATE} --agent ftuu": "did you mean `ftu`?",
+    f"{EVALUATE} --agent fu --agent fu": "an agent is named twice: fu, fu",
     f"{EVALUATE} --agent ./agent.py": "such as `./agent.py:MyAgent`",
     f"{EVALUATE} --agent ./agent.py:Agent": "no file ./agent.py",
     # tasks and houses
-    f"{EVALUATE} --tasks nowhere": "there is no such folder; `evonav generate` makes one",
+    f"{EVALUATE} --tasks nowhere": "there is no such folder; `evonav tasks generate` makes one",
     f"{EVALUATE} --tasks empty": "expected */task.json",
     f"{EVALUATE} --tasks file": "it is a file: name a folder of tasks",
     f"{EVALUATE} --tasks tasks/ONE": "is a task itself: name the folder that holds it, tasks",
-    f"{EVALUATE} --tasks tasks --subset test-90": "has no dataset.json, which `evonav generate` writes",
+    f"{EVALUATE} --tasks tasks --subset test-90": "has no dataset.json, which `evonav tasks generate` writes",
     f"{EVALUATE} --tasks tasks --subset test90": "expected SPLIT-N, such as test-90",
     f"{EVALUATE} --houses nowhere.json": "nowhere.json: cannot be read: no such file",
     f"{EVALUATE} --houses procthor-10k:test": "evonav houses fetch procthor-10k",
@@ -73,7 +73,7 @@ MISTAKES = {
     "view begun": "nothing was run yet: `evonav evaluate` goes on",
     "view run --agent fu": "it has some of shortest-path",
     "view run --task bundled": "there is ONE",
-    "paper begun": "no stage of it is scored yet",
+    "paper begun": "no stage is scored yet",
     "compare run fu ftu": "it has shortest-path",
     # a model
     f"{EVALUATE} --decision vlm": "--model is needed to ask a model (or EVONAV_VLM_MODEL",
@@ -83,7 +83,7 @@ MISTAKES = {
     "evaluate --out new --decision vlm --model m --vlm-mode replay": "no exchanges here to replay",
     f"{EVALUATE} --noise wrong=often": "--noise wrong=often: expected a number",
     # a sweep
-    "sweep": "name a sweep file, such as examples/sweeps/noise.toml",
+    "sweep": "name a sweep file",
     "sweep nowhere.toml": "nowhere.toml: cannot be read: No such file",
     "sweep sweep.toml --set agents=ftuu --dry-run": "did you mean `ftu`?",
     "sweep typo.toml": "typo.toml: task: no such key; did you mean tasks?",
@@ -118,7 +118,7 @@ def test_a_mistake_is_told_with_what_to_do(folder, monkeypatch, capsys, tmp_path
     [
         (f"{EVALUATE} --decision vlm --model m --base-url http://127.0.0.1:9/v1", "openai", "vlm"),
         (f"{EVALUATE} --simulator ai2thor", "ai2thor", "thor"),
-        ("evaluate --workers 1 --limit 1 --agents fu --out out-ray --engine ray", "ray", "ray"),
+        ("evaluate --workers 1 --limit 1 --agent fu --out out-ray --engine ray", "ray", "ray"),
     ],
 )
 def test_an_extra_that_is_not_installed_is_named(folder, monkeypatch, capsys, words, module, extra):

@@ -17,7 +17,7 @@ from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.records.store import RunStore
 from vlm_stub import KEY, check_request, serving
 
-COMMON = ("--agents", "fu", "--limit", "1", "--workers", "0", "--in-process")
+COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--in-process")
 
 
 def run(*arguments: object) -> tuple[int, str]:

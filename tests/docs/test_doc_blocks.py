@@ -39,7 +39,7 @@ PARSED_ONLY = {
     "test-90": "needs a whole dataset",
     "--simulator ai2thor": "AI2-THOR: tests/world, tests/thor",
     "--decision vlm": "a model: tests/decision, with a stand-in",
-    "--vlm-model": "a model: tests/decision, with a stand-in",
+    "evonav tasks write": "a model: tests/decision, with a stand-in",
     "--perception predicted": "weights: tests/models",
     "evonav mock-vlm": "serves until it is stopped: tests/decision",
     "my_package": "a package that is not there",
@@ -47,7 +47,7 @@ PARSED_ONLY = {
     "delay=": "waits",
 }
 """Commands with these words are not run here, only parsed."""
-LIMITED = ("evaluate", "generate", "perception")
+LIMITED = ("evaluate", "tasks generate", "perception")
 """Commands that get one task, one or two agents and this process: the words are tested, not the machine."""
 
 
@@ -173,7 +173,7 @@ def run_evonav(line: str, words: list[str], environment: dict[str, str], place: 
         parse(words)
         return
     parse(words)
-    if words[0] in LIMITED:
+    if words[0] in LIMITED or " ".join(words[:2]) in LIMITED:
         words = made_small(words, place)
     result = CliRunner().invoke(app, words)
     error = result.exception if not isinstance(result.exception, SystemExit) else None
@@ -184,14 +184,13 @@ def made_small(words: list[str], place: Path) -> list[str]:
     options = {"--limit": "1", "--workers": "0"}
     if "--subset" in words:
         del options["--limit"]
-    if "--agents" in words:
-        at = words.index("--agents") + 1
-        names = words[at].split(",")
+    if words.count("--agent") == 1:
+        names = words[words.index("--agent") + 1].split(",")
         for name in names:
             check_agent_name(name)
-        options["--agents"] = ",".join(names if len(names) == 1 else [names[0], names[-1]])
+        options["--agent"] = ",".join(names if len(names) == 1 else [names[0], names[-1]])
     elif words[0] == "evaluate" and "--agent" not in words:
-        options["--agents"] = "ftu" if "--perception" in words else "fu,ftu"
+        options["--agent"] = "ftu" if "--perception" in words else "fu,ftu"
     for option, value in options.items():
         if option in words:
             words[words.index(option) + 1] = value

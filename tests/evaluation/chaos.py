@@ -104,7 +104,7 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
     evonav = str(Path(sys.executable).with_name("evonav"))
-    command = [evonav, "evaluate", "--agents", options.agents, "--tasks", options.tasks, "--limit", str(options.limit)]
+    command = [evonav, "evaluate", "--agent", options.agents, "--tasks", options.tasks, "--limit", str(options.limit)]
     command += ["--workers", options.workers, "--out"]
     whole, disturbed = options.out / "whole", options.out / "disturbed"
     began_s = time.monotonic()

@@ -16,7 +16,7 @@ def run(*arguments):
 
 
 def test_evaluates_bundled_tasks_and_resumes(tmp_path):
-    arguments = ("evaluate", "--agents", "shortest-path, random-walk", "--limit", 1, "--workers", 0, "--out", tmp_path)
+    arguments = ("evaluate", "--agent", "shortest-path, random-walk", "--limit", 1, "--workers", 0, "--out", tmp_path)
     first = run(*arguments)
     assert first.exit_code == 0, first.output
     assert "shortest-path" in first.stdout
@@ -40,7 +40,7 @@ def test_lists():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("evaluate", "--agents", "nobody", "--out", "OUT"), "no agent `nobody`"),
+        (("evaluate", "--agent", "nobody", "--out", "OUT"), "no agent `nobody`"),
         (("evaluate", "--tasks", "OUT", "--out", "OUT"), "holds no task"),
         (("evaluate", "--houses", "OUT/none.json", "--out", "OUT"), "none.json"),
         (("report", "OUT"), "no run here"),
@@ -63,7 +63,7 @@ def test_contradicting_options_are_wrong_usage(tmp_path):
 
 
 def test_an_incomplete_run_says_so(tmp_path):
-    result = run("evaluate", "--agents", "toy_agents:Raising", "--limit", 1, "--workers", 0, "--out", tmp_path)
+    result = run("evaluate", "--agent", "toy_agents:Raising", "--limit", 1, "--workers", 0, "--out", tmp_path)
     assert result.exit_code == 3
     assert "incomplete" in result.stdout
 
@@ -78,14 +78,14 @@ def test_importing_is_quick():
 def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
     pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
     monkeypatch.setenv("HOME", str(tmp_path))
-    options = ("--simulator", "ai2thor", "--thor-executable", "evonav", "--agents", "shortest-path", "--limit", 2)
+    options = ("--simulator", "ai2thor", "--thor-executable", "evonav", "--agent", "shortest-path", "--limit", 2)
     out = tmp_path / "run"
     done = run("evaluate", *options, "--workers", 2, "--out", out)
     assert done.exit_code == 0, done.output
     assert json.loads((out / "summary.json").read_text())["agents"]["shortest-path"]["sr"] == 1.0
     # Timeouts may change, the simulator may not.
     assert run("evaluate", *options, "--thor-timeout", 50, "--out", out).exit_code == 0
-    other = run("evaluate", "--agents", "shortest-path", "--limit", 2, "--out", out)
+    other = run("evaluate", "--agent", "shortest-path", "--limit", 2, "--out", out)
     assert "another configuration" in str(other.exception)
 
 

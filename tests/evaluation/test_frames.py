@@ -23,7 +23,7 @@ def test_few_functions_lie_between_the_command_and_an_agent(tmp_path, monkeypatc
         raise KeyboardInterrupt
 
     monkeypatch.setattr(FrontierUpdate, "act", act)
-    options = ["--agents", "fu", "--limit", "1", "--workers", "0", "--out", str(tmp_path / "run")]
+    options = ["--agent", "fu", "--limit", "1", "--workers", "0", "--out", str(tmp_path / "run")]
     monkeypatch.setattr(sys, "argv", ["evonav", "evaluate", *options])
     with pytest.raises(SystemExit):
         main()

@@ -188,7 +188,18 @@ def test_the_command_says_what_it_made_and_what_is_missing(tmp_path):
     config = tmp_path / "small.toml"
     config.write_text("reference_image_px = 64\nreference_min_visible_px = 10\n")
     out = tmp_path / "out"
-    command = ["controlled", "generate", str(houses), "--out", str(out), "--config", str(config), "--workers", "0"]
+    command = [
+        "controlled",
+        "generate",
+        "--houses",
+        str(houses),
+        "--out",
+        str(out),
+        "--config",
+        str(config),
+        "--workers",
+        "0",
+    ]
     made = runner.invoke(app, command, catch_exceptions=False)
     assert "1 tasks in each arm (fixed, evolved)" in made.output
     with pytest.raises(StoreError, match="evonav controlled evaluate"):

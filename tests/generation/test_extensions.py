@@ -60,7 +60,7 @@ def test_the_command_takes_parameters_from_a_file_and_options(tmp_path: Path, ho
     houses, config, out = tmp_path / "houses.json", tmp_path / "theta.toml", tmp_path / "tasks"
     houses.write_text(house.to_json())
     config.write_text("evolve_probability = 0.25\nextensions.removal = {probability = 1.0, max_count = 3}\n")
-    arguments = ["generate", "--houses", str(houses), "--config", str(config), "--workers", "0"]
+    arguments = ["tasks", "generate", "--houses", str(houses), "--config", str(config), "--workers", "0"]
     done = CliRunner().invoke(app, [*arguments, "--num-stages", "6", "--out", str(out)])
     assert done.exit_code == 0, done.output
     (task,) = load_tasks(out)

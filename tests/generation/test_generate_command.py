@@ -19,7 +19,7 @@ from evonav.tasks import load_task
 def command(house_file, out, *more):
     config = house_file.parent / "theta.toml"
     config.write_text("reference_image_px = 64\nreference_min_visible_px = 4\n")
-    arguments = ("generate", "--houses", house_file, "--out", out, "--config", config, *more)
+    arguments = ("tasks", "generate", "--houses", house_file, "--out", out, "--config", config, *more)
     return [sys.executable, "-m", "evonav", *map(str, arguments)]
 
 
@@ -144,7 +144,7 @@ def test_the_command_tells_what_it_did(house_file, tmp_path):
     )
     assert "8 tasks in" in done.stdout
     assert "from 10 houses; 8 new in" in done.stdout
-    assert "1 houses without a task: too_few_rooms" in done.stdout
+    assert "1 house without a task: too_few_rooms" in done.stdout
     done = subprocess.run(command(house_file, tmp_path / "out", "--seed", 1), capture_output=True, text=True)
     assert done.returncode == 1
     assert "options.seed: there 0, asked 1" in done.stderr

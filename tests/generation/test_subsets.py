@@ -91,7 +91,7 @@ def test_a_subset_of_something_else_is_refused(houses: list[str], tmp_path: Path
 def test_the_commands_take_subsets(houses: list[str], tmp_path: Path) -> None:
     file, out = write(houses[1:5], tmp_path / "a.jsonl"), tmp_path / "out"
     run = CliRunner().invoke
-    made = run(app, ["generate", "--houses", str(file), "--out", str(out), "--split", "val", "--workers", "0",
+    made = run(app, ["tasks", "generate", "--houses", str(file), "--out", str(out), "--split", "val", "--workers", "0",
                      "--num-stages", "1"])  # fmt: skip
     assert made.exit_code == 0, made.output
     chosen = [root.name for root in subset_roots(out, "val-2")]
@@ -102,7 +102,7 @@ def test_the_commands_take_subsets(houses: list[str], tmp_path: Path) -> None:
     assert (tmp_path / "list.txt").read_text(encoding="utf-8").split() == chosen
     assert isinstance(run(app, ["tasks", "subset", str(out), "test-2"]).exception, SubsetError)
     assert isinstance(run(app, ["tasks", "subset", str(tmp_path), "test-2"]).exception, TaskError)
-    arguments = ["evaluate", "--tasks", str(out), "--agents", "random-walk", "--workers", "0", "--out"]
+    arguments = ["evaluate", "--tasks", str(out), "--agent", "random-walk", "--workers", "0", "--out"]
     evaluated = run(app, [*arguments, str(tmp_path / "run"), "--subset", "val-2"])
     assert evaluated.exit_code == 0, evaluated.output
     summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))

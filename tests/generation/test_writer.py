@@ -278,7 +278,16 @@ def test_marks_around_an_answer_go() -> None:
 def test_the_command(stub: Stub, folder: Path, tmp_path: Path) -> None:
     prices = tmp_path / "prices.json"
     prices.write_text('{"gpt-4o": {"input_usd": 2.5, "output_usd": 10}}')
-    options = ["--vlm-base-url", stub.url, "--prices", str(prices), "--vlm-exchanges", str(tmp_path / "kept.sqlite")]
+    options = [
+        "--model",
+        "gpt-4o",
+        "--base-url",
+        stub.url,
+        "--prices",
+        str(prices),
+        "--exchanges",
+        str(tmp_path / "kept.sqlite"),
+    ]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "evonav", "tasks", "write", str(folder), *options, *more]
@@ -300,7 +309,7 @@ def test_the_command(stub: Stub, folder: Path, tmp_path: Path) -> None:
     assert "stages written" in done.stdout
     assert len(stub.requests) == 2 * stages
     assert {stage.writer for task in load_tasks(folder) for stage in task.public_stages} == {"vlm:gpt-4o"}
-    wrong = run("--vlm-model", "unpriced")
+    wrong = run("--model", "unpriced")
     assert (wrong.returncode, wrong.stderr.count("\n")) == (1, 1)
     assert "unpriced" in wrong.stderr
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and KEY.encode() in path.read_bytes()]

@@ -64,7 +64,7 @@ def differences(part: str, found: Digests) -> list[str]:
 
 
 def _six_agents(out: Path) -> Iterator[tuple[str, str]]:
-    _evonav("evaluate", "--agents", SIX_AGENTS, "--limit", 2, "--workers", 2, "--out", out)
+    _evonav("evaluate", "--agent", SIX_AGENTS, "--limit", 2, "--workers", 2, "--out", out)
     yield from _run(out)
     packed = out.with_suffix(".zip")
     _evonav("pack", out, "--out", packed)
@@ -77,16 +77,18 @@ def _six_agents(out: Path) -> Iterator[tuple[str, str]]:
 def _imperfect(out: Path) -> Iterator[tuple[str, str]]:
     options = ("--perception", "noisy:poor", "--noise", "wrong=0.1", "--seed", 3, "--in-process")
     agents = "random-walk,nearest-frontier,stay-still,oracle-memory,shortest-path,oracle-flags,fu,msgnav"
-    _evonav("evaluate", "--agents", agents, "--limit", 1, "--workers", 1, *options, "--out", out)
+    _evonav("evaluate", "--agent", agents, "--limit", 1, "--workers", 1, *options, "--out", out)
     yield from _run(out)
 
 
 def _generation(out: Path) -> Iterator[tuple[str, str]]:
     houses = Path(__file__).parents[2] / "python/evonav/data/houses.jsonl.gz"
-    _evonav("generate", "--houses", houses, "--limit", 3, "--seed", 1, "--workers", 2, "--out", out / "paper")
+    _evonav("tasks", "generate", "--houses", houses, "--limit", 3, "--seed", 1, "--workers", 2, "--out", out / "paper")
     config = out / "extensions.toml"
     config.write_text(EXTENSIONS, encoding="utf-8")
-    _evonav("generate", "--houses", houses, "--limit", 3, "--config", config, "--workers", 1, "--out", out / "more")
+    _evonav(
+        "tasks", "generate", "--houses", houses, "--limit", 3, "--config", config, "--workers", 1, "--out", out / "more"
+    )
     for path in sorted(out.rglob("*")):
         if path.suffix in _READERS:
             yield str(path.relative_to(out)), _READERS[path.suffix](path.read_bytes())

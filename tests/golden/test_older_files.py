@@ -34,7 +34,7 @@ def older_run(tmp_path: Path) -> Path:
 
 
 def test_commands_show_an_older_run(older_run: Path) -> None:
-    assert re.search(r"success \(paper\), % +50.0 +0.0", _evonav("measures", older_run))
+    assert re.search(r"success \(paper\), % +50.0 +0.0", _evonav("report", older_run, "--text"))
     assert re.search(r"random-walk less fu: -50.0 points", _evonav("compare", older_run, "fu", "random-walk"))
     assert "50.0" in _evonav("breakdown", older_run)
     assert "50.0" in _evonav("paper", older_run)
@@ -47,7 +47,7 @@ def test_commands_show_an_older_run(older_run: Path) -> None:
 
 def test_an_older_run_is_resumed(older_run: Path) -> None:
     """Another agent is added to it; what is there is not run again."""
-    _evonav("evaluate", "--agents", "fu,random-walk,stay-still", *OPTIONS, "--workers", 0, "--out", older_run)
+    _evonav("evaluate", "--agent", "fu,random-walk,stay-still", *OPTIONS, "--workers", 0, "--out", older_run)
     summary = json.loads((older_run / "summary.json").read_bytes())
     assert {agent: row["sr"] for agent, row in summary["agents"].items()} == {
         "fu": 0.5,

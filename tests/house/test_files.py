@@ -64,7 +64,7 @@ def test_one_document_and_directories(tmp_path: Path, houses: list[House]) -> No
     ("name", "content", "said"),
     [
         ("no.json", None, "cannot be read"),
-        ("h.txt", b"{}", "expected a directory or a file"),
+        ("h.txt", b"{}", "expected a folder, a file"),
         ("h.json", b"", "EOF"),
         ("h.json", b"\xff\xfe", "cannot be read"),
         ("h.json", b"[" * 100_000, "h.json:1"),
@@ -177,3 +177,8 @@ def test_incomplete_houses_are_read_or_refused() -> None:
                 list(load_houses(path))
         else:
             assert len(list(load_houses(path))) == 1
+
+
+def test_the_word_bundled_stands_for_the_bundled_houses() -> None:
+    assert [house.name for house in load_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
+    assert next(load_houses("bundled")) == next(bundled_houses())

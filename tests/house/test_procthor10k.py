@@ -122,7 +122,9 @@ def test_a_split_is_read_wherever_houses_are(remote, tmp_path) -> None:
     assert loaded[1].name == f"{name}:2"
     listed = CliRunner().invoke(app, ["houses", name, "--limit", "1"])
     assert listed.stdout.startswith(f"{name}:1\t"), listed.output
-    made = CliRunner().invoke(app, ["generate", "--houses", name, "--out", str(tmp_path / "tasks"), "--limit", "1"])
+    made = CliRunner().invoke(
+        app, ["tasks", "generate", "--houses", name, "--out", str(tmp_path / "tasks"), "--limit", "1"]
+    )
     assert made.exit_code == 0, made.output
     header = next((tmp_path / "tasks").glob("*/task.json"))
     assert json.loads(header.read_text())["dataset"] == "procthor-10k"

@@ -114,10 +114,10 @@ def test_strip_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path) -> None:
 
 def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
     run_dir, out = write_run(), tmp_path / "strip.svg"
-    arguments = ["strip", str(run_dir), "task-0", "--out", str(out), "--agents", "fu,ftu"]
-    assert CliRunner().invoke(app, [*arguments, "--stages", "1,2"]).exit_code == 0
+    arguments = ["strip", str(run_dir), "--task", "task-0", "--out", str(out), "--agent", "fu,ftu"]
+    assert CliRunner().invoke(app, [*arguments, "--stage", "1,2"]).exit_code == 0
     assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4
-    assert CliRunner().invoke(app, [*arguments, "--stages", "x"]).exit_code == 2
+    assert CliRunner().invoke(app, [*arguments, "--stage", "x"]).exit_code == 2
     assert CliRunner().invoke(app, ["strip", str(run_dir), "--out", str(out)]).exit_code == 0
     assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 2
 

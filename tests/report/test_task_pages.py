@@ -219,7 +219,7 @@ def test_the_command_draws_a_task_a_stage_and_a_gallery(task: Task, tmp_path: Pa
     [
         (["{set}", "--task", "nope"], "holds no task 'nope'"),
         (["{set}", "--task", "../x"], "holds no task"),
-        (["{root}", "--stage", "4"], "argument `stage` is 4, expected 1 to 3"),
+        (["{root}", "--stage", "4"], "no stage 4; it has stages 1 to 3"),
         (["{set}/nothing"], "holds no task"),
         (["{broken}"], "task.json: field"),
     ],

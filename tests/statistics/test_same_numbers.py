@@ -39,11 +39,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "tasks").mkdir()
     for seed, limit in ((0, NUM_HOUSES), (1, NUM_HOUSES_WITH_TWO_TASKS)):
         options = ("--houses", HOUSES, "--limit", limit, "--seed", seed, "--workers", 0)
-        command("generate", *options, "--out", folder / f"seed-{seed}")
+        command("tasks", "generate", *options, "--out", folder / f"seed-{seed}")
         for task in (folder / f"seed-{seed}").glob("houses-*"):
             shutil.move(task, folder / "tasks" / task.name)
     command(
-        *("evaluate", "--tasks", folder / "tasks", "--agents", ",".join(AGENTS), "--workers", 2),
+        *("evaluate", "--tasks", folder / "tasks", "--agent", ",".join(AGENTS), "--workers", 2),
         *("--out", folder / "run"),
     )
     command("report", folder / "run")
@@ -120,7 +120,7 @@ def test_unrounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, 
 
 
 def test_rounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, Any], tmp_path: Path) -> None:
-    command("measures", run, "--out", tmp_path / "measures.md")
+    command("report", run, "--text", "--md", tmp_path / "measures.md")
     command("paper", run, "--out", tmp_path / "paper.md", "--latex", tmp_path / "paper.tex")
     measures = {row[0]: row[1:] for row in table_rows((tmp_path / "measures.md").read_text())}
     heads = next(row for row in table_rows((tmp_path / "measures.md").read_text()) if row[0] == "Measure")[1:]

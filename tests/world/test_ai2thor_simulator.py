@@ -233,7 +233,7 @@ def test_nothing_outlives_an_evaluation_that_is_killed(tmp_path: Path, number: i
     temporary.mkdir()
     command = ["-m", "evonav", "evaluate", "--simulator", "ai2thor", "--thor-executable", "evonav", "--limit", "1"]
     evonav = subprocess.Popen(
-        [sys.executable, *command, "--agents", "ftu", "--workers", "1", "--out", str(tmp_path / "run")],
+        [sys.executable, *command, "--agent", "ftu", "--workers", "1", "--out", str(tmp_path / "run")],
         env=os.environ | {"TMPDIR": str(temporary)},
         stderr=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

@@ -8,18 +8,18 @@ import typer
 
 from evonav.cli.doctor.doctor import doctor
 from evonav.cli.examples import add_examples
+from evonav.cli.group import HELP_NAMES, Command, Group, add_commands
 from evonav.cli.mock_vlm import mock_vlm
-from evonav.cli.options.settings import SettingsGroup
 from evonav.cli.results.breakdown import breakdown
 from evonav.cli.results.compare import compare
 from evonav.cli.results.export import export
-from evonav.cli.results.measures import measures
 from evonav.cli.results.paper import paper
 from evonav.cli.results.perception import perception
 from evonav.cli.results.report import report, strip
 from evonav.cli.results.submission import pack, verify
 from evonav.cli.results.video import rerun, video
 from evonav.cli.results.view import view
+from evonav.cli.run.agents import agents
 from evonav.cli.run.check_agent import check_agent
 from evonav.cli.run.controlled import controlled_app
 from evonav.cli.run.demo import demo
@@ -27,74 +27,66 @@ from evonav.cli.run.evaluate import evaluate
 from evonav.cli.run.failures import failures
 from evonav.cli.run.sweep import sweep
 from evonav.cli.tasks.app import tasks_app
-from evonav.cli.tasks.generate import generate
 from evonav.cli.tasks.houses import houses_app
 
 EXIT_ERROR = 1
 DEBUG_VARIABLE = "EVONAV_DEBUG"
+PANELS = {
+    "Start": (demo, doctor),
+    "Run": (evaluate, sweep, check_agent, agents),
+    "Results": (report, view, compare, breakdown, failures, export),
+    "Data": (houses_app, tasks_app),
+    "Study": (paper, controlled_app, perception),
+    "Submit": (pack, verify),
+    "Tools": (video, strip, rerun, mock_vlm),
+}
+"""Commands and groups of commands under their headings in the help."""
+GROUP_NAMES = {houses_app: "houses", tasks_app: "tasks", controlled_app: "controlled"}
+
+
+class _Panels(Group):
+    """The command `evonav`, whose help has the panels in order."""
+
+    order = tuple(
+        GROUP_NAMES[command] if isinstance(command, typer.Typer) else command.__name__.replace("_", "-")
+        for panel in PANELS.values()
+        for command in panel
+    )
+
 
 app = typer.Typer(
     name="evonav",
-    cls=SettingsGroup,
-    help="EvoNav-Bench: lifelong navigation in homes that change.",
+    cls=_Panels,
+    help="EvoNav-Bench: lifelong navigation in homes that change. Begin with `evonav demo`.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    context_settings=HELP_NAMES,
 )
-COMMANDS = (
-    evaluate,
-    sweep,
-    demo,
-    failures,
-    report,
-    compare,
-    breakdown,
-    export,
-    measures,
-    paper,
-    perception,
-    strip,
-    view,
-    video,
-    rerun,
-    generate,
-    check_agent,
-    pack,
-    verify,
-    mock_vlm,
-    doctor,
-)
-for command in COMMANDS:
-    app.command()(command)
-app.add_typer(houses_app, name="houses")
-app.add_typer(tasks_app, name="tasks")
-app.add_typer(controlled_app, name="controlled")
+
+
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        version()
+        raise typer.Exit
 
 
 @app.callback()
 def options(
+    print_version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
     debug: Annotated[
-        bool, typer.Option("--debug", help=f"Show the traceback of an error; as {DEBUG_VARIABLE}=1 does.")
+        bool,
+        typer.Option("--debug", help=f"Show the traceback of an error, as the variable {DEBUG_VARIABLE}=1 does."),
     ] = False,
 ) -> None:
-    """EvoNav-Bench: lifelong navigation in homes that change."""
+    """EvoNav-Bench: lifelong navigation in homes that change. Begin with `evonav demo`."""
+    del print_version  # its callback has printed it
     if debug:
         os.environ[DEBUG_VARIABLE] = "1"
 
 
-@app.command(name="agents")
-def list_agents() -> None:
-    """List agents and baselines by name."""
-    from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
-
-    baselines = {name: f"oracle baseline: {kind.description}" for name, kind in ORACLE_BASELINES.items()}
-    for name, description in {**agent_descriptions(), **baselines}.items():
-        typer.echo(f"{name:18}{description}")
-    typer.echo(f"{'./file.py:Class':18}any class of yours, by its file")
-    typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")
-
-
-@app.command()
+@app.command(cls=Command, hidden=True)
 def version() -> None:
     """Print the version."""
     from evonav import __version__
@@ -102,6 +94,12 @@ def version() -> None:
     typer.echo(__version__)
 
 
+for heading, members in PANELS.items():
+    for member in members:
+        if isinstance(member, typer.Typer):
+            app.add_typer(member, name=GROUP_NAMES[member], rich_help_panel=heading)
+        else:
+            add_commands(app, member, panel=heading)
 add_examples(app)
 
 

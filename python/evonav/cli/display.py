@@ -37,6 +37,11 @@ def show(table: "Table") -> None:
     Console(width=max(console.width, width)).print(table)
 
 
+def counted_as(number: int, noun: str) -> str:
+    """Return a number with its noun: `1 agent`, `2 agents`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def write_texts(*texts: "tuple[Path | None, Callable[[], str]]", label: str = "written") -> None:
     """Write the files whose paths are given, and print the paths after a label."""
     from evonav.parallel.folders import write_atomically

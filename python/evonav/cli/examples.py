@@ -1,32 +1,39 @@
-"""Keep the examples that are shown below the `--help` of every command."""
+"""Keep what is shown below the `--help` of every command: examples, and the address of its documentation."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import typer
 
+DOCS = "https://github.com/evonav/evonav/blob/main/docs"
+"""Address of the pages of the documentation, which an installed package does not have."""
+
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "evaluate": (
         "evonav evaluate --limit 5 --out out/first",
-        "evonav evaluate --agents fu,ftu,msgnav --tasks tasks --subset test-90 --out out/run",
-        "evonav evaluate --agent ./examples/own_agent.py:OwnAgent --agent fu --out out/mine",
+        "evonav evaluate --agent fu,ftu,msgnav --tasks tasks --subset test-90 --out out/run",
+        "evonav evaluate --agent ./my_agent.py:MyAgent --agent fu --out out/mine",
+        "evonav evaluate --houses bundled --limit 10 --out out/houses",
         "evonav evaluate --perception noisy:poor,miss_rate=0.3 --out out/poor",
         "evonav evaluate --decision vlm --model gpt-4o --dry-run --out out/gpt",
     ),
     "sweep": (
-        "evonav sweep examples/sweeps/noise.toml",
-        "evonav sweep examples/sweeps/noise.toml --dry-run",
+        "evonav sweep sweep.toml --dry-run",
+        "evonav sweep sweep.toml",
         "evonav sweep sweep.toml --set 'seeds=[0,1,2]' --only '*__s0' --workers 8",
     ),
     "demo": ("evonav demo", "evonav demo --limit 4 --out out/short"),
     "failures": ("evonav failures out/run", "evonav failures out/run --agent fu --brief"),
-    "report": ("evonav report out/run", "evonav report out/run --replays all"),
+    "report": (
+        "evonav report out/run",
+        "evonav report out/run --replays all",
+        "evonav report out/run --text --agent fu,ftu",
+    ),
     "compare": (
-        "evonav compare out/run fu ftu",
+        "evonav compare out/run ftu fu",
         "evonav compare out/gpt-4o out/rules --html out/compare.html",
         "evonav compare out/run --baseline fu",
     ),
-    "measures": ("evonav measures out/run", "evonav measures out/run --agents fu,ftu --out out/measures.md"),
     "breakdown": (
         "evonav breakdown out/run",
         "evonav breakdown out/run fu ftu --by path-length --measure spl --plot out/length.pdf",
@@ -36,52 +43,84 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav export out/run --csv out/stages.csv --parquet out/stages.parquet",
         "evonav export out/run --rounds --parquet out/rounds.parquet",
     ),
-    "video": ("evonav video out/run --out episode.mp4", "evonav video out/run --agent ftu --stage 2 --out stage.mp4"),
-    "rerun": ("evonav rerun out/run --agent ftu --out episode.rrd",),
+    "video": ("evonav video out/run", "evonav video out/run --agent ftu --stage 2 --out stage.mp4"),
+    "rerun": ("evonav rerun out/run --agent ftu",),
     "paper": ("evonav paper out/run", "evonav paper out/run --latex out/tables.tex"),
     "perception": (
         "evonav perception --perception gt --perception noisy:poor --limit 10 --out out/perception",
-        "evonav perception tasks --perception predicted:mini --views-per-room 24 --workers 4 --out out/mini",
+        "evonav perception --tasks tasks --perception predicted:mini --views-per-room 24 --workers 4 --out out/mini",
     ),
-    "strip": ("evonav strip out/run --agents fu,ftu --out episode.svg",),
+    "strip": ("evonav strip out/run --agent fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
-    "generate": (
-        "evonav generate --houses houses.jsonl.gz --out tasks",
-        "evonav generate --houses procthor-10k:test --subset test-90 --workers 8 --out tasks",
+    "tasks generate": (
+        "evonav tasks generate --houses bundled --limit 20 --out tasks",
+        "evonav tasks generate --houses procthor-10k:test --subset test-90 --workers 8 --out tasks",
     ),
-    "check-agent": ("evonav check-agent ./examples/own_agent.py:OwnAgent", "evonav check-agent ftu"),
+    "check-agent": ("evonav check-agent ./my_agent.py:MyAgent", "evonav check-agent ftu"),
     "pack": ("evonav pack out/run --title 'Our agent' --authors 'A. Author'",),
     "verify": ("evonav verify out/run.evonav.zip", "evonav verify out/run.evonav.zip --tasks tasks --subset test-90"),
     "mock-vlm": ("evonav mock-vlm --port 8000", "evonav mock-vlm --faults refusal=0.1,rate_limit=0.05 --latency 0.5"),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),
     "agents": ("evonav agents",),
     "version": ("evonav version",),
-    "houses list": ("evonav houses", "evonav houses list houses.jsonl.gz --limit 10"),
+    "houses list": ("evonav houses list", "evonav houses list houses.jsonl.gz --limit 10"),
     "houses fetch": ("evonav houses fetch procthor-10k --split test",),
-    "tasks list": ("evonav tasks list tasks",),
+    "tasks list": ("evonav tasks list", "evonav tasks list tasks --limit 10"),
     "tasks schema": ("evonav tasks schema task", "evonav tasks schema --out schemas"),
-    "tasks show": ("evonav tasks show tasks", "evonav tasks show tasks --task TASK --stage 2 --out stage.svg"),
-    "tasks stats": ("evonav tasks stats tasks --reweight procthor-10k",),
+    "tasks show": ("evonav tasks show", "evonav tasks show tasks --task TASK --stage 2 --out stage.svg"),
+    "tasks stats": ("evonav tasks stats", "evonav tasks stats tasks --reweight procthor-10k"),
     "tasks subset": ("evonav tasks subset tasks test-90",),
-    "tasks validate": ("evonav tasks validate tasks",),
-    "tasks write": ("evonav tasks write tasks --dry-run",),
-    "controlled generate": ("evonav controlled generate houses.jsonl.gz --out out/fixed --limit 60",),
-    "controlled evaluate": ("evonav controlled evaluate out/fixed --agents fu,stage-reset,ftu",),
+    "tasks validate": ("evonav tasks validate", "evonav tasks validate tasks --json problems.json"),
+    "tasks write": ("evonav tasks write tasks --model gpt-4o --dry-run",),
+    "controlled generate": ("evonav controlled generate --houses bundled --limit 60 --out out/fixed",),
+    "controlled evaluate": ("evonav controlled evaluate out/fixed --agent fu,stage-reset,ftu",),
     "controlled report": ("evonav controlled report out/fixed",),
     "controlled picture": ("evonav controlled picture out/fixed --agent fu --out pair.svg",),
 }
 """Examples by command."""
 
+PAGES = {
+    "evaluate": "quickstart.md",
+    "sweep": "sweeps.md",
+    "report": "report.md",
+    "compare": "statistics.md",
+    "breakdown": "statistics.md",
+    "export": "measures.md",
+    "failures": "reliability.md",
+    "video": "video.md",
+    "rerun": "video.md",
+    "paper": "reproduce.md",
+    "perception": "perception.md",
+    "view": "viewer.md",
+    "check-agent": "agents.md",
+    "pack": "submission.md",
+    "verify": "submission.md",
+    "mock-vlm": "decision.md",
+    "agents": "agents.md",
+    "houses list": "houses.md",
+    "houses fetch": "houses.md",
+    "tasks generate": "generation.md",
+    "tasks schema": "tasks.md",
+    "tasks stats": "dataset.md",
+    "tasks subset": "tasks.md",
+    "tasks validate": "tasks.md",
+    "tasks write": "goals.md",
+    "controlled generate": "controlled.md",
+    "controlled evaluate": "controlled.md",
+    "controlled report": "controlled.md",
+}
+"""Pages of the documentation by command."""
+
 
 def add_examples(app: "typer.Typer", before: str = "") -> None:
-    """Show examples below the help of every command of an app."""
+    """Show examples and the address of a page below the help of every command of an app."""
     for command in app.registered_commands:
         name = command.name or getattr(command.callback, "__name__", "").replace("_", "-")
-        examples = EXAMPLES.get(f"{before}{name}")
-        if examples:
-            lines = ("Examples:", *(f"  {example}" for example in examples))
-            # A blank line keeps lines apart; a bracket would be taken for a style.
-            command.epilog = "\n\n".join(line.replace("[", r"\[") for line in lines)
+        examples, page = EXAMPLES.get(f"{before}{name}", ()), PAGES.get(f"{before}{name}")
+        lines = ["Examples:", *(f"  {example}" for example in examples)] if examples else []
+        lines += [f"Documentation: {DOCS}/{page}"] if page else []
+        # A blank line keeps lines apart; a bracket would be taken for a style.
+        command.epilog = "\n\n".join(line.replace("[", r"\[") for line in lines) or None
     for group in app.registered_groups:
         if group.typer_instance is not None:
             add_examples(group.typer_instance, f"{before}{group.name} ")

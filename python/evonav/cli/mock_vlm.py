@@ -1,4 +1,4 @@
-"""`evonav mock-vlm`: serve a simulated model, to try the whole way to a model and back."""
+"""`evonav mock-vlm`: serve a simulated model, to test runs that ask one."""
 
 from typing import Annotated
 
@@ -6,18 +6,26 @@ import typer
 
 
 def mock_vlm(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 8000,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 takes any free one.")] = 8000,
     faults: Annotated[
-        str, typer.Option(help="Rates of failing requests, such as refusal=0.1,rate_limit=0.05; see below.")
+        str,
+        typer.Option(
+            metavar="NAME=RATE",
+            help="Share of requests that fail, such as refusal=0.1,rate_limit=0.05; names: see above.",
+        ),
     ] = "",
-    schemas: Annotated[bool, typer.Option(help="Accept JSON Schemas and follow them, as some servers do.")] = True,
-    seed: Annotated[int, typer.Option(min=0, help="Seed that decides which requests fail.")] = 0,
-    latency: Annotated[float, typer.Option(min=0.0, help="Seconds before each answer.")] = 0.0,
+    schemas: Annotated[
+        bool,
+        typer.Option(help="Accept JSON Schemas and follow them; with --no-schemas reject them, as some servers do."),
+    ] = True,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed that decides which requests fail.")] = 0,
+    latency: Annotated[float, typer.Option(min=0.0, metavar="X", help="Seconds before each answer.")] = 0.0,
 ) -> None:
-    """Serve an OpenAI-compatible API on this machine that answers by simple rules.
+    """Serve a simulated model on this machine, to test `--decision vlm` without a real one.
 
-    Faults: rate_limit (429 with Retry-After), server_error (500), hang, disconnect, malformed (broken JSON around the
-    answer), broken_json (in it), truncated, refusal, filtered, empty, off_topic.
+    It has an OpenAI-compatible API and answers by simple rules. Faults: rate_limit (429 with Retry-After), server_error
+    (500), hang, disconnect, malformed (broken JSON around the answer), broken_json (in it), truncated, refusal,
+    filtered, empty, off_topic.
     """
     import time
 

@@ -32,8 +32,8 @@ class TaskSource:
         """List the tasks.
 
         Args:
-            tasks: Folder of tasks as `evonav generate` makes them; by default the bundled ones, which are of the test
-                split.
+            tasks: Folder of tasks as `evonav tasks generate` makes them; by default the bundled ones, which are of the
+                test split.
             subset: Named subset of the folder, such as `train-90`; by default all tasks.
 
         Raises:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from evonav.house.procthor10k import HouseSet
 
 SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
+BUNDLED = "bundled"
+"""The word that stands for the bundled houses where a path of houses is asked for."""
 
 
 def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
@@ -24,12 +26,13 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name; or a fetched split, `procthor-10k:val`.
+            or a directory with such files, taken by name; or a fetched split, `procthor-10k:val`; or `bundled`, for the
+            houses that come with evonav.
         limit: Number of houses after which to stop.
 
     Yields:
         Each house, checked; its `name` is `file:line`, for lists `file:line[index]`,
-        of a split `procthor-10k:val:line`.
+        of a split `procthor-10k:val:line`, of the bundled ones `bundled:line`.
 
     Raises:
         HouseError: A file cannot be read or a house is malformed; it names file, line, object and field.
@@ -65,12 +68,15 @@ class HouseTexts:
         self.published: HouseSet | None = None
         """The published split that is read; `None` for a file or a directory."""
         self._path = Path(path)
+        is_bundled = str(path) == BUNDLED and not self._path.exists()
+        if is_bundled:
+            self._path = Path(str(resources.files("evonav") / "data" / "houses.jsonl.gz"))
         if str(path).startswith("procthor-10k") and not self._path.exists():
             from evonav.house.procthor10k import house_set, split_path
 
             self.published = house_set(path)
             self._path = split_path(self.published)
-        self.name = str(path if self.published else self._path)
+        self.name = str(path if self.published or is_bundled else self._path)
         self.files = files_of(self._path)
         """The files to read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
@@ -113,7 +119,7 @@ def files_of(path: Path) -> list[Path]:
             raise HouseError(f"{path}: no {', '.join(SUFFIXES)} file in this directory")
         return files
     if not path.name.endswith(SUFFIXES):
-        raise HouseError(f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}")
+        raise HouseError(f"{path}: expected a folder, a file with one of {', '.join(SUFFIXES)}, or the word {BUNDLED}")
     if not path.exists():
         raise HouseError(f"{path}: cannot be read: no such file")
     return [path]
@@ -128,10 +134,7 @@ def bundled_houses(limit: int | None = None) -> Iterator[House]:
     Yields:
         Each house, in a fixed order; its `name` is `bundled:line`.
     """
-    file = resources.files("evonav") / "data" / "houses.jsonl.gz"
-    with file.open("rb") as packed, gzip.open(packed, "rt", encoding="utf-8") as lines:
-        for number, line in islice(enumerate(lines, start=1), limit):
-            yield House(line, name=f"bundled:{number}")
+    yield from load_houses(BUNDLED, limit)
 
 
 def _text_of(path: Path, raw: IO[bytes]) -> IO[str]:

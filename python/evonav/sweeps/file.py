@@ -39,11 +39,11 @@ class TaskSet(Settings):
     limit: int | None = Field(default=None, ge=1)
     """Take the first N."""
     subset: str | None = None
-    """Named subset, SPLIT-N, such as test-90 (docs/tasks.md)."""
+    """Named subset, SPLIT-N, such as test-90."""
 
 
 class ProtocolSettings(Settings):
-    """The protocol of every run; values left out are the paper's (docs/parity.md)."""
+    """The protocol of every run; values left out are the paper's."""
 
     max_rounds: int | None = Field(default=None, ge=1)
     max_actions: int | None = Field(default=None, ge=1)

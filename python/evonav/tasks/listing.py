@@ -71,7 +71,7 @@ def _why_no_task(directory: Path) -> str:
     if (directory / "task.json").is_file():
         return f"is a task itself: name the folder that holds it, {directory.parent}"
     if not directory.exists():
-        return "holds no task, there is no such folder; `evonav generate` makes one, bundled tasks need none"
+        return "holds no task, there is no such folder; `evonav tasks generate` makes one, bundled tasks need none"
     if not directory.is_dir():
         return "holds no task, it is a file: name a folder of tasks"
-    return "holds no task (expected */task.json); `evonav generate` makes some"
+    return "holds no task (expected */task.json); `evonav tasks generate` makes some"

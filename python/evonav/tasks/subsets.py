@@ -77,8 +77,8 @@ def subset_roots(folder: Path | str, name: str) -> list[Path]:
     parse_subset(name)
     if not (Path(folder) / DATASET_NAME).is_file():
         raise SubsetError(
-            f"subset {name!r}: {folder} has no {DATASET_NAME}, which `evonav generate` writes and named subsets need; "
-            "a limit takes the first N of any folder"
+            f"subset {name!r}: {folder} has no {DATASET_NAME}, which `evonav tasks generate` writes and named subsets "
+            "need; a limit takes the first N of any folder"
         )
     roots = [Path(folder) / entry.task_id for entry in subset_of(read_dataset(folder), name)]
     for root in roots:

@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from evonav.cli.examples import DOCS
 from evonav.parallel.local import num_cores
 from evonav.perception.predicted import STACKS, StackConfig, StackName, weights_of
 from evonav.perception.weights import models_folder, places
@@ -250,7 +251,7 @@ def _models(stack: StackName) -> Result:
     if lacking:
         size_mb = sum(file.size_mb for file in lacking)
         finding = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
-        remedy = "fetched at first use" if folder is None else "docs/perception.md says where to download them"
+        remedy = "fetched at first use" if folder is None else f"{DOCS}/perception.md says where to download them"
         return "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy
     return "ok", f"{len(files)} files in {where}"
 
@@ -288,7 +289,7 @@ def _endpoint(where: Where) -> Result:
 
     key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)
     if not key and not url:
-        remedy = f"export {KEY_VARIABLE}=..., or {URL_VARIABLE} of your own server (docs/decision.md)"
+        remedy = f"export {KEY_VARIABLE}=..., or {URL_VARIABLE} of your own server ({DOCS}/decision.md)"
         return "missing", "none configured; rules decide without one", remedy
     url = (url or "https://api.openai.com/v1").rstrip("/")
     shown = re.sub(r"//[^/@]*@", "//", url)

@@ -10,14 +10,23 @@ _STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
 
 def doctor(
-    out: Annotated[Path, typer.Option(help="Folder for runs.")] = Path("out"),
-    network: Annotated[bool, typer.Option(help="Ask the model's endpoint, if one is configured.")] = True,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder in which runs will be written.")] = Path("out"),
+    network: Annotated[bool, typer.Option(help="Contact the model server, if one is configured.")] = True,
     base_url: Annotated[
-        str | None, typer.Option(help="Address of the endpoint. Default: OPENAI_BASE_URL, else OpenAI's.")
-    ] = (None),
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs and bug reports.")] = False,
+        str | None,
+        typer.Option(
+            metavar="URL",
+            help="VLM: address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's.",
+        ),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON instead of a table, for programs and bug reports.")
+    ] = False,
 ) -> None:
-    """Check what works on this machine and how to install the rest; exit code 1 if an essential part does not work."""
+    """Check what works on this machine, and say how to install the rest.
+
+    The exit code is 1 if an essential part does not work.
+    """
     import json
     from dataclasses import asdict
 

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.options.settings import MODEL_PANEL
+
 if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Sequence
 
@@ -18,10 +20,12 @@ DryRun = Annotated[
     bool,
     typer.Option(
         "--dry-run",
-        rich_help_panel="Decisions",
-        help="VLM: estimate requests, tokens and cost from a few tasks with the text matcher, and ask nothing.",
+        rich_help_panel=MODEL_PANEL,
+        help="VLM: ask nothing. Estimate requests, tokens and cost by running a few tasks with the text matcher.",
     ),
 ]
+
+HiddenDryRun = Annotated[bool, typer.Option("--dry-run", hidden=True)]
 
 
 def decision_component(

@@ -1,13 +1,13 @@
 """Derive command-line options from the settings models that sweep files use.
 
 `@with_settings("decisions")` gives a command one option for each field of `DecisionSettings`, and passes the settings
-as the argument `decisions`. Loading the models takes time, so `SettingsGroup` adds these options only to the command
-that is called.
+as the argument `decisions`. Loading the models takes time, so `evonav.cli.group.Group` adds these options only to the
+command that is called.
 """
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import wraps
 from types import UnionType
@@ -15,10 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 
 import typer
 from annotated_types import Ge
-from typer.core import TyperGroup
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.settings_model import Settings
+
+MODEL_PANEL = "Decision model"
+"""Heading of the options of decision models in the help."""
+WORKER_PANEL = "Workers and limits"
+"""Heading of the options of workers in the help."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Options:
     """The fields that are options; default: all that fit on a command line."""
     parse: Mapping[str, Callable[[str], Any]] = field(default_factory=dict)
     """Functions that read fields which are no plain values."""
+    hidden: bool = False
+    """The options work, but the help does not show them."""
     overrides: bool = False
     """The options override a file: none has a default, and an option that is given counts even if it is the model's."""
 
@@ -82,7 +88,10 @@ class Options:
             text = f"{what} Default: the file's{', else ' + default if default else '.'}"
         flags = f"{self.flag(name)}/--no-{self.flag(name)[2:]}" if found.default is True else self.flag(name)
         least: Any = next((limit.ge for limit in found.metadata if isinstance(limit, Ge)), None)
-        return typer.Option(flags, min=least, help=text, rich_help_panel=self.panel)
+        metavar = None if name in self.parse else _metavar(found.annotation)
+        return typer.Option(
+            flags, min=least, help=text, rich_help_panel=self.panel, hidden=self.hidden, metavar=metavar
+        )
 
     def read(self, given: dict[str, Any]) -> "Settings":
         """Take the options out of `given` and return the settings.
@@ -122,12 +131,17 @@ def settings_options(name: str) -> Options:
     return {
         "decisions": Options(
             settings.DecisionSettings,
-            "Decisions",
+            MODEL_PANEL,
             {"kind": "decision", "mode": "vlm_mode", "request_timeout_s": "request_timeout"},
             parse={"noise": _noise},
         ),
-        "endpoint": Options(settings.DecisionSettings, names={"base_url": "vlm_base_url"}, fields=("base_url",)),
-        "spending": Options(settings.SpendingSettings, "Decisions"),
+        "endpoint": Options(
+            settings.DecisionSettings,
+            MODEL_PANEL,
+            {"mode": "vlm_mode"},
+            fields=("model", "base_url", "mode", "exchanges"),
+        ),
+        "spending": Options(settings.SpendingSettings, MODEL_PANEL),
         "simulation": Options(
             settings.SimulatorSettings,
             "Simulator",
@@ -144,22 +158,24 @@ def settings_options(name: str) -> Options:
         "perception": Options(settings.PerceptionSettings, "Perception", {"make": "perception"}),
         "models": Options(settings.PerceptionSettings, "Perception", fields=("models", "device")),
         "workers": Options(RunSettings, fields=("workers",)),
-        "pool": Options(RunSettings, fields=pool),
-        "local_run": Options(RunSettings, names=run_names, fields=("workers", *agents)),
+        "pool": Options(RunSettings, WORKER_PANEL, fields=pool),
+        "local_run": Options(RunSettings, WORKER_PANEL, names=run_names, fields=("workers", *agents)),
         "run": Options(
             RunSettings,
+            WORKER_PANEL,
             names=run_names,
             fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb"),
         ),
-        "changes": Options(RunSettings, fields=(*pool, "worker_gpus"), overrides=True),
+        "changes": Options(RunSettings, WORKER_PANEL, fields=(*pool, "worker_gpus"), overrides=True),
     }[name]
 
 
-def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_settings(*names: str, hidden: tuple[str, ...] = ()) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Give a command the options of settings; its arguments `names` are the settings.
 
     Args:
         *names: Names that `settings_options` knows.
+        hidden: Those of them that the help does not show.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -168,7 +184,7 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
 
         def expand() -> Callable[..., None]:
             """Return the command with all its options."""
-            groups = {name: settings_options(name) for name in names}
+            groups = {name: replace(settings_options(name), hidden=name in hidden) for name in names}
 
             def run(**given: Any) -> None:  # noqa: ANN401 - values of options
                 from evonav.evaluation.run.settings_model import SettingError
@@ -186,27 +202,13 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
 
         @wraps(command)
         def wrapped(**_: Any) -> None:  # noqa: ANN401 - values of options
-            raise AssertionError("`SettingsGroup` calls the expanded command")
+            raise AssertionError("`Group` calls the expanded command")
 
         _signed(wrapped, command, plain)
         wrapped.expand = expand  # type: ignore[attr-defined]
         return wrapped
 
     return decorate
-
-
-class SettingsGroup(TyperGroup):
-    """A group of commands in which the called one gets the options of its settings."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - click's
-        """Return the called command's name, the command with all its options, and its arguments."""
-        name, command, rest = super().resolve_command(ctx, args)
-        expand = getattr(getattr(command, "callback", None), "expand", None)
-        if command is not None and expand is not None:
-            app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-            app.command(name, epilog=command.epilog)(expand())
-            command = typer.main.get_command(app)
-        return name, command, rest
 
 
 def _signed(
@@ -231,6 +233,12 @@ def _option_type(annotation: Any) -> Any:  # noqa: ANN401 - a type hint
     if get_origin(annotation) is Literal:
         return Enum("Choice", {value: value for value in get_args(annotation)}, type=str)
     return annotation
+
+
+def _metavar(annotation: Any) -> str | None:  # noqa: ANN401 - a type hint
+    """Return the word that stands for a value in the help; `None` leaves it to typer, which lists choices."""
+    kinds = {int: "N", float: "X", str: "TEXT"}
+    return next((kinds[part] for part in (annotation, *get_args(annotation)) if part in kinds), None)
 
 
 def _noise(text: str) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Declare options that several commands share."""
+"""Declare the options that several commands share, each once."""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,95 +9,159 @@ import typer
 from evonav.cli.options import completion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from evonav.tasks.listing import TaskFile
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
+BUNDLED = "bundled"
+_SEVERAL = "Repeat the option for more, or separate them by commas."
 
-AgentNames = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--agents",
-        help=f"Agents, separated by commas (see `evonav agents`). Default: {HEURISTICS}.",
-        autocompletion=completion.agents,
-    ),
-]
-OneAgent = Annotated[
+Agents = Annotated[
     list[str] | None,
     typer.Option(
         "--agent",
-        help="One agent: a name, `module:Class` or `./file.py:Class`. Repeat the option for more agents.",
+        metavar="NAME",
+        help=f"Agent to run: a name (`evonav agents` lists them), ./file.py:Class or module:Class. {_SEVERAL} "
+        f"Default: {HEURISTICS}.",
         autocompletion=completion.agents,
     ),
 ]
-RunFolder = Annotated[Path, typer.Argument(help="Folder of a run.", autocompletion=completion.runs)]
-RunTasks = Annotated[Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")]
-Exchanges = Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")]
+RunAgents = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--agent",
+        metavar="NAME",
+        help=f"Agent of the run. {_SEVERAL} Default: all.",
+        autocompletion=completion.agents,
+    ),
+]
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.", autocompletion=completion.runs)]
+RunTasks = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER", help="Folder of the run's tasks. Default: where the run found them, or the bundled tasks."
+    ),
+]
+RunTask = Annotated[
+    str | None, typer.Option("--task", metavar="ID", help="Task of the run. Default: the most telling one.")
+]
+OldTask = Annotated[str | None, typer.Argument(metavar="ID", hidden=True)]
+"""A task's id without `--task`, as before."""
+Stages = Annotated[
+    list[str] | None,
+    typer.Option("--stage", metavar="N", help=f"Stage of the task. {_SEVERAL} Default: all."),
+]
+Exchanges = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="SQLite file of a model's questions and answers. Default: the one in RUN."),
+]
 ComparedRuns = Annotated[
     list[str],
-    typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
+    typer.Argument(
+        metavar="RUN",
+        help="Runs or sweeps with all their agents, one agent as RUN:AGENT, or one run followed by some of its agents.",
+        autocompletion=completion.runs,
+    ),
 ]
-MarkdownFile = Annotated[Path | None, typer.Option(help="Write a Markdown file.")]
-LatexFile = Annotated[Path | None, typer.Option(help="Write a LaTeX file (booktabs, graphicx).")]
-CsvFile = Annotated[Path | None, typer.Option(help="Write a CSV file with unrounded numbers.")]
-HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
-Houses = Annotated[Path | None, typer.Option(help=f"Houses to generate tasks from: {HOUSES}.")]
+MarkdownFile = Annotated[Path | None, typer.Option("--md", metavar="FILE", help="Write a Markdown file.")]
+LatexFile = Annotated[
+    Path | None, typer.Option("--latex", metavar="FILE", help="Write a LaTeX file (it needs booktabs and graphicx).")
+]
+CsvFile = Annotated[
+    Path | None, typer.Option("--csv", metavar="FILE", help="Write a CSV file, with numbers that are not rounded.")
+]
+PlotFile = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE", help="Write a plot: .svg, .png or .pdf. It needs the extra `viz`."),
+]
+HOUSES = "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, or bundled"
+Houses = Annotated[
+    Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}. Default: use --tasks.")
+]
+SomeHouses = Annotated[Path, typer.Option("--houses", metavar="HOUSES", help=f"Houses: {HOUSES}.")]
 Tasks = Annotated[
     Path | None,
-    typer.Option(help="Folder of tasks. Default: the bundled tasks.", autocompletion=completion.task_folders),
+    typer.Option(
+        metavar="FOLDER",
+        help="Folder of tasks, or bundled. Default: the bundled tasks.",
+        autocompletion=completion.task_folders,
+    ),
+]
+TaskFolder = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="FOLDER",
+        help="Folder of tasks, or bundled. Default: the bundled tasks.",
+        autocompletion=completion.task_folders,
+    ),
 ]
 Limit = Annotated[
-    int | None, typer.Option(min=1, help="Take only the first N multi-room houses or tasks. Default: all.")
+    int | None, typer.Option(min=1, metavar="N", help="Take only the first N tasks or houses. Default: all.")
 ]
 Subset = Annotated[
     str | None,
     typer.Option(
-        help="Take a named subset, SPLIT-N, such as test-90 (docs/tasks.md). Default: all.",
+        metavar="SPLIT-N",
+        help="Take only a named subset of the tasks, such as test-90, which is the same for everyone. Default: all.",
         autocompletion=completion.subsets,
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of every random choice.")]
+Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of every random choice.")]
+GeneratorFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="TOML file with parameters of the task generator. Default: the paper's."),
+]
 AnyAsset = Annotated[
     bool,
     typer.Option(
         "--allow-unknown-assets",
-        help="Give assets missing from the catalogue the usual size of their category; Objaverse houses need it.",
+        help="Give assets that are missing from the catalogue the usual size of their category.",
     ),
 ]
 RetryErrored = Annotated[
-    bool, typer.Option("--retry-errored", help="Run errored stages again, and those not run because of them.")
+    bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]
-Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished run is resumed.")]
+Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run; an unfinished run is resumed.")]
 
 
-def names_of(agents: list[str] | None, agent: list[str] | None = None) -> list[str]:
-    """Return the agents of `--agents`, then those of `--agent`; the paper's heuristics if neither is given."""
-    lists = agents if agents is not None else [] if agent else [HEURISTICS]
-    return [*(name for text in lists for name in listed(text)), *(agent or ())]
+def names_of(agents: "Sequence[str] | None") -> list[str]:
+    """Return the agents that the option `--agent` names; the paper's heuristics if it is not given."""
+    return listed(agents) or listed([HEURISTICS])
 
 
-def listed(text: str | None) -> list[str]:
-    """Return the names in a text that separates them by commas."""
-    return [name for part in (text or "").split(",") if (name := part.strip())]
+def listed(texts: "Sequence[str] | None") -> list[str]:
+    """Return the names in the texts of an option, which may separate them by commas."""
+    return [name for text in texts or () for part in text.split(",") if (name := part.strip())]
 
 
-def numbers_of(option: str, text: str) -> list[int]:
-    """Return the numbers in an option that separates them by commas."""
+def numbers_of(option: str, texts: "Sequence[str] | None") -> list[int]:
+    """Return the numbers in the texts of an option, which may separate them by commas."""
     try:
-        return [int(number) for number in text.split(",")] if text else []
+        return [int(number) for number in listed(texts)]
     except ValueError:
-        raise typer.BadParameter(f"{option} {text}: numbers, comma-separated") from None
+        raise typer.BadParameter(f"{option} {','.join(texts or ())}: expected numbers separated by commas") from None
+
+
+@contextmanager
+def task_folder(folder: Path | None) -> "Iterator[Path]":
+    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`."""
+    from evonav.tasks.bundled import bundled_tasks
+
+    if folder is not None and (str(folder) != BUNDLED or folder.exists()):
+        yield folder
+        return
+    with bundled_tasks() as bundled:
+        yield bundled
 
 
 @contextmanager
 def chosen_tasks(tasks: Path | None, limit: int | None, subset: str | None) -> "Iterator[list[TaskFile]]":
-    """Lend the tasks that `--tasks`, `--limit` and `--subset` choose; by default the bundled tasks."""
-    from evonav.tasks.bundled import bundled_tasks
+    """Lend the tasks that `--tasks`, `--limit` and `--subset` choose."""
     from evonav.tasks.listing import task_files
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
-    with bundled_tasks() as bundled:
-        yield task_files(tasks or bundled, limit, subset)
+    with task_folder(tasks) as folder:
+        yield task_files(folder, limit, subset)

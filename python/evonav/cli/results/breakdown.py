@@ -1,12 +1,11 @@
 """`evonav breakdown`: show rates by kind of stage."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from evonav.cli.display import write_texts
-from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
+from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile, PlotFile, listed
 
 
 def breakdown(
@@ -14,17 +13,24 @@ def breakdown(
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="stratum, mode, path-length, earlier-stages, room-count, category, radius, or any field of a stage's "
-            "row; repeat it for more. Default: all of these."
+            metavar="FIELD",
+            help="Kind of stage: stratum, mode, path-length, earlier-stages, room-count, category, radius or any "
+            "column of `evonav export`. Repeat the option for more, or separate them by commas. Default: all of "
+            "these.",
         ),
     ] = None,
-    measure: Annotated[str, typer.Option(help="Numeric field of a stage's row (docs/measures.md).")] = "success",
+    measure: Annotated[
+        str, typer.Option(metavar="FIELD", help="What to average: a numeric column that `evonav export` writes.")
+    ] = "success",
     md: MarkdownFile = None,
     latex: LatexFile = None,
     csv: CsvFile = None,
-    plot: Annotated[Path | None, typer.Option(help="Write plots to a .svg, .png or .pdf file (extra `viz`).")] = None,
+    plot: PlotFile = None,
 ) -> None:
-    """Show rates by kind of stage, each with n and a 95% interval over houses."""
+    """Show rates by kind of stage, such as by room count or path length.
+
+    Each rate has its number of stages and a 95% interval over houses.
+    """
     from rich.console import Console
 
     from evonav.report.compare import breakdown as made
@@ -35,7 +41,7 @@ def breakdown(
     if plot is not None:
         check_plot(plot)
     compared = read_compared_agents(runs)
-    found = [made.breakdown(compared, name, measure) for name in by or made.STANDARD]
+    found = [made.breakdown(compared, name, measure) for name in listed(by) or made.STANDARD]
     found = [one for one in found if one.groups]
     tables = [made.breakdown_table(one) for one in found]
     console = Console()

@@ -6,30 +6,41 @@ from typing import Annotated
 import typer
 
 from evonav.cli.display import write_texts
-from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile
+from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile, PlotFile, listed
 
 
 def compare(
     runs: ComparedRuns,
     measure: Annotated[
         list[str] | None,
-        typer.Option(help="Compare another numeric field of a stage's row. Repeat the option for more."),
+        typer.Option(
+            metavar="FIELD",
+            help="Compare another numeric column that `evonav export` writes. Repeat the option for more, or separate "
+            "them by commas.",
+        ),
     ] = None,
-    baseline: Annotated[str | None, typer.Option(help="Compare all agents with this one. Default: every pair.")] = None,
+    baseline: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Compare every other agent with this one. Default: every pair.")
+    ] = None,
     allow_differences: Annotated[
         bool,
         typer.Option(
-            "--allow-differences", help="Compare runs of different tasks or protocols on the stages that they share."
+            "--allow-differences", help="Compare runs with different tasks or settings on the stages that they share."
         ),
     ] = False,
     md: MarkdownFile = None,
     latex: LatexFile = None,
     csv: CsvFile = None,
-    json: Annotated[Path | None, typer.Option(help="Write a JSON file, with the stages whose outcome differs.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write an HTML page with links to replays.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write a plot to a .svg, .png or .pdf file (extra `viz`).")] = None,
+    json: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a JSON file, with the stages whose outcome differs.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
+    plot: PlotFile = None,
 ) -> None:
-    """Compare agents on the same stages: differences with 95% intervals and p-values, and the stages that differ."""
+    """Compare agents on the same stages: `compare A B` shows A minus B.
+
+    Differences have 95% intervals and p-values, and the stages with different outcomes are listed.
+    """
     import json as json_text
 
     from rich.console import Console
@@ -42,7 +53,7 @@ def compare(
     from evonav.report.plots.render import write_plots
 
     found = compare_agents(
-        read_compared_agents(runs), measures=measure or [], baseline=baseline, allow_differences=allow_differences
+        read_compared_agents(runs), measures=listed(measure), baseline=baseline, allow_differences=allow_differences
     )
     console = Console()
     for table in wording.terminal_tables(found):

@@ -5,24 +5,25 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import CsvFile, RunAgents, RunFolder, listed
 
 
 def export(
     run: RunFolder,
-    csv: Annotated[Path | None, typer.Option(help="Write a CSV file.")] = None,
-    jsonl: Annotated[Path | None, typer.Option(help="Write a file of JSON lines.")] = None,
-    parquet: Annotated[Path | None, typer.Option(help="Write a Parquet file (extra `data`).")] = None,
+    agent: RunAgents = None,
+    csv: CsvFile = None,
+    jsonl: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a file of JSON lines.")] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a Parquet file. It needs the extra `data`.")
+    ] = None,
     rounds: Annotated[
         bool, typer.Option("--rounds", help="Write one row per decision round instead of one per stage.")
     ] = False,
-    agent: Annotated[
-        list[str] | None, typer.Option(help="Write only this agent. Repeat the option for more agents.")
-    ] = None,
 ) -> None:
-    """Write one row per stage or decision round, with every metric (docs/measures.md)."""
+    """Write every metric to a file: one row per stage, or per decision round."""
     from evonav.report import export as made
 
+    names = listed(agent) or None
     files = {".csv": csv, ".jsonl": jsonl, ".parquet": parquet}
     if not any(files.values()):
         raise typer.BadParameter("name a file: --csv, --jsonl or --parquet")
@@ -32,5 +33,5 @@ def export(
         if path.suffix != suffix:
             raise typer.BadParameter(f"--{suffix[1:]} {path}: expected a file {suffix}")
         columns = made.ROUND_COLUMNS if rounds else made.stage_columns()
-        rows = made.round_table(run, agent) if rounds else made.stage_table(run, agent)
+        rows = made.round_table(run, names) if rounds else made.stage_table(run, names)
         typer.echo(f"written: {made.write_table(rows, columns, path)}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import write_texts
-from evonav.cli.options.shared import RunFolder
+from evonav.cli.options.shared import MarkdownFile, RunFolder
 
 if TYPE_CHECKING:
     from evonav.report.paper.tables import Perception
@@ -23,16 +23,25 @@ class Half(str, Enum):
 
 def paper(
     run: RunFolder,
-    perception: Annotated[Half, typer.Option(help="Half of the paper's tables to compare with.")] = Half.GT,
-    out: Annotated[Path | None, typer.Option(help="Write the tables to a Markdown file too.")] = None,
+    perception: Annotated[
+        Half, typer.Option(help="Half of the paper's tables to compare with: ground-truth or predicted perception.")
+    ] = Half.GT,
+    md: MarkdownFile = None,
     latex: Annotated[
-        Path | None, typer.Option(help="Write Tables 1 and 2 in the paper's layout to a LaTeX file.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a LaTeX file with Tables 1 and 2 in the paper's layout."),
     ] = None,
     prediction: Annotated[
-        Path | None, typer.Option(help="Run with predicted perception, which fills the lower half of the LaTeX tables.")
+        Path | None,
+        typer.Option(
+            metavar="RUN", help="Run with predicted perception, which fills the lower half of the LaTeX tables."
+        ),
     ] = None,
 ) -> None:
-    """Show the paper's Tables 1 and 2 beside a run's, the order of agents, and which differences it could detect."""
+    """Show a run beside the paper's Tables 1 and 2.
+
+    Also shows the order of the agents in both, and how large a difference the run could detect.
+    """
     from rich.console import Console
 
     from evonav.errors import StoreError
@@ -43,7 +52,7 @@ def paper(
 
     loaded = load_run(run)
     if not any(summary.n for summary in loaded.summaries):
-        raise StoreError(f"{run}: no stage of it is scored yet: `evonav evaluate` goes on with it")
+        raise StoreError(f"{run}: no stage is scored yet; `evonav evaluate` with the same options resumes the run")
     console = Console()
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
     for table in tables:
@@ -51,5 +60,5 @@ def paper(
     runs: dict[Perception, Run] = {perception.value: loaded}
     if latex is not None and prediction is not None:
         runs["prediction"] = load_run(prediction)
-    write_texts((out, lambda: markdown_tables(table for table in tables if table.rows)), label="tables")
+    write_texts((md, lambda: markdown_tables(table for table in tables if table.rows)), label="tables")
     write_texts((latex, lambda: paper_latex(runs)), label="LaTeX")

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import interruptible, progress_bar, show
-from evonav.cli.options import completion
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
@@ -14,6 +13,7 @@ from evonav.cli.options.shared import (
     Limit,
     Seed,
     Subset,
+    Tasks,
     chosen_tasks,
 )
 
@@ -26,38 +26,44 @@ if TYPE_CHECKING:  # the command must start fast
 def perception(
     workers: "RunSettings",
     models: "PerceptionSettings",
-    tasks: Annotated[
-        Path | None,
-        typer.Argument(help="Folder of tasks. Default: the bundled tasks.", autocompletion=completion.task_folders),
-    ] = None,
+    old_tasks: Annotated[Path | None, typer.Argument(metavar="FOLDER", hidden=True)] = None,
+    tasks: Tasks = None,
     perceptions: Annotated[
         list[str] | None,
         typer.Option(
             "--perception",
-            metavar="WORD",
-            help="Perception, as for evaluate (docs/perception.md). Repeat the option for more. Default: gt.",
+            metavar="NAME",
+            help="Perception to measure: gt, noisy:PRESET, predicted:STACK or module:function (see `evonav evaluate`). "
+            "Repeat the option for more. Default: gt.",
         ),
     ] = None,
     out: Annotated[
-        Path, typer.Option(help="Folder of records and report; finished tasks are not measured again.")
+        Path,
+        typer.Option(metavar="FOLDER", help="Folder of the records and the report; finished tasks are not run again."),
     ] = Path("out/perception"),
     limit: Limit = None,
     subset: Subset = None,
     views_per_room: Annotated[
-        int, typer.Option(min=1, help="Largest number of views of a room, in places of 6 views that are far apart.")
-    ] = 12,
-    houses: Annotated[
         int,
         typer.Option(
-            min=1, help="Number of a task's houses to tour, in the order of its stages; with 1 no memory becomes stale."
+            min=1, metavar="N", help="Largest number of views of a room: 6 from each of several places far apart."
+        ),
+    ] = 12,
+    houses_per_task: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Number of states of a task's house to visit, in the order of its stages. With 1 nothing moves, so no "
+            "memory becomes stale.",
         ),
     ] = 2,
     seed: Seed = 0,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Measure perceptions against the truth: their detections, and the memory built from them.
+    """Measure what perceptions detect, and the memory built from it, against the truth.
 
-    Every perception sees the same views. Run again to resume. Writes OUT/report.html, summary.json, .csv and .md.
+    Every perception sees the same views. Run again to resume. Writes report.html, summary.json, .csv and .md.
     """
     from evonav.evaluation.run.settings import PerceptionSettings
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
@@ -72,13 +78,13 @@ def perception(
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
-    with interruptible(out), chosen_tasks(tasks, limit, subset) as task_files:
+    with interruptible(out), chosen_tasks(tasks or old_tasks, limit, subset) as task_files:
         with progress_bar("tours") as on_progress:
             measured = measure(
                 specs,
                 task_files,
                 out,
-                config=TourConfig(views_per_room, houses, seed),
+                config=TourConfig(views_per_room, houses_per_task, seed),
                 simulator=f"evonav.evaluation.run.components:{name}",
                 num_workers=workers.num_workers,
                 on_progress=on_progress,

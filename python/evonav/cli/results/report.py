@@ -5,8 +5,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_table
-from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, numbers_of
+from evonav.cli.display import print_table, write_texts
+from evonav.cli.options.shared import (
+    Exchanges,
+    MarkdownFile,
+    OldTask,
+    RunAgents,
+    RunFolder,
+    RunTask,
+    RunTasks,
+    Stages,
+    listed,
+    numbers_of,
+)
 from evonav.cli.results.view import replay_pages
 from evonav.cli.run.sweep import write_sweep_summary
 
@@ -18,21 +29,35 @@ NUM_REPLAYS = 2
 
 def report(
     run: RunFolder,
-    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: RUN.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: RUN.")] = None,
+    text: Annotated[
+        bool, typer.Option("--text", help="Print the report's tables of metrics to the terminal; write no page.")
+    ] = False,
+    agent: RunAgents = None,
+    md: MarkdownFile = None,
     replays: Annotated[
         str | None,
         typer.Option(
             metavar="all|N|none",
-            help=f"Number of episodes to replay, all or none. Default: {NUM_REPLAYS} highlights, none for sweeps.",
+            help="Episodes to replay in the report: a number, all or none. Default: the "
+            f"{NUM_REPLAYS} most telling ones, none for sweeps.",
         ),
     ] = None,
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
     maps: Annotated[bool, typer.Option("--maps", help="Also write the map of every stage to maps/*.svg.")] = False,
 ) -> None:
-    """Write an HTML report of a run or sweep, with tables, maps and replays (docs/report.md)."""
+    """Write one HTML page about a run or sweep: tables, plots, maps and replays.
+
+    `--text` prints metrics that explain the rates instead: other definitions of success, stale entries, memory, costs.
+    """
     from evonav.sweeps.run import SWEEP_NAME
 
+    if not text and (agent is not None or md is not None):
+        raise typer.BadParameter("--agent and --md are for --text; the page shows all agents")
+    if text:
+        _print_metrics(run, listed(agent) or None, md)
+        return
     if (run / SWEEP_NAME).is_file():
         typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
         return
@@ -71,20 +96,40 @@ def _report_sweep(
     return write_sweep_page(out or sweep, sweep.resolve().name, tables, reports)
 
 
+def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> None:
+    """Print the tables of metrics of a run, and write them to a Markdown file if one is named."""
+    from rich.console import Console
+
+    from evonav.report.tables.metric_tables import measures_tables
+    from evonav.report.tables.table import markdown_tables
+
+    tables = [table for table in measures_tables(run, agents) if table.rows]
+    console = Console()
+    for table in tables:
+        console.print(table.rich())
+    write_texts((md, lambda: markdown_tables(tables)))
+
+
 def strip(
     run: RunFolder,
+    old_task: OldTask = None,
+    task: RunTask = None,
+    agent: RunAgents = None,
+    stage: Stages = None,
     out: Annotated[
-        Path, typer.Option(help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`).")
-    ],
-    task: Annotated[str | None, typer.Argument(help="Id of a task of the run. Default: the best highlight.")] = None,
-    agents: Annotated[str, typer.Option(help="Agents of the run, separated by commas; each has a row.")] = "ftu",
-    stages: Annotated[str, typer.Option(help="Stages, separated by commas. Default: all.")] = "",
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`). Default: RUN/strip.svg.",
+        ),
+    ] = None,
 ) -> None:
     """Draw one task of a run as a picture, with a column per stage and a row per agent."""
-    from evonav.report import write_strip
+    from evonav.report import load_run, write_strip
 
-    numbers = numbers_of("--stages", stages) or None
-    typer.echo(f"picture: {write_strip(run, task, agents.split(','), out, stages=numbers)}")
+    numbers = numbers_of("--stage", stage) or None
+    agents = listed(agent) or load_run(run).agents
+    typer.echo(f"picture: {write_strip(run, task or old_task, agents, out or run / 'strip.svg', stages=numbers)}")
 
 
 def _count(replays: str) -> int | None:

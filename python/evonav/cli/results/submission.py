@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.display import print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import Limit, Subset, Tasks, chosen_tasks, listed
+from evonav.cli.options.shared import Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -17,24 +17,26 @@ EXIT_REJECTED = 1
 
 
 def pack(
-    run: Annotated[Path, typer.Argument(help="Folder of a complete run.")],
-    out: Annotated[Path | None, typer.Option(help="File to write. Default: RUN.evonav.zip beside the folder.")] = None,
-    agents: Annotated[str | None, typer.Option(help="Agents of the run, separated by commas. Default: all.")] = None,
-    title: Annotated[str, typer.Option(help="Title of the entry.")] = "",
-    authors: Annotated[str, typer.Option(help="Authors of the entry.")] = "",
-    contact: Annotated[str, typer.Option(help="Address for questions.")] = "",
-    url: Annotated[str, typer.Option(help="Address of the paper or code.")] = "",
+    run: RunFolder,
+    agent: RunAgents = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN.evonav.zip beside the folder.")
+    ] = None,
+    title: Annotated[str, typer.Option(metavar="TEXT", help="Title of the entry.")] = "",
+    authors: Annotated[str, typer.Option(metavar="TEXT", help="Authors of the entry.")] = "",
+    contact: Annotated[str, typer.Option(metavar="TEXT", help="Email address for questions.")] = "",
+    url: Annotated[str, typer.Option(metavar="URL", help="Web address of the paper or code.")] = "",
     description: Annotated[
-        str, typer.Option(help="Model, prompts, training data and what else readers should know.")
+        str, typer.Option(metavar="TEXT", help="Model, prompts, training data and what else readers should know.")
     ] = "",
 ) -> None:
-    """Pack a run's records, configuration and task checksums into one file for a leaderboard."""
+    """Pack a complete run into one file to hand in: records, configuration and checksums of the tasks."""
     from evonav.submission.pack import SUFFIX, About, pack
 
     run = run.absolute()
     target = out or run.with_name(run.name + SUFFIX)
     about = About(title=title, authors=authors, contact=contact, url=url, description=description)
-    names = None if agents is None else listed(agents)
+    names = listed(agent) or None
     header = pack(run, target, agents=names, about=about)
     typer.echo(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
@@ -45,7 +47,7 @@ def pack(
 @with_settings("workers")
 def verify(
     workers: "RunSettings",
-    file: Annotated[Path, typer.Argument(help="A packed run.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A packed run, from `evonav pack`.")],
     tasks: Tasks = None,
     limit: Limit = None,
     subset: Subset = None,
@@ -53,17 +55,20 @@ def verify(
         bool,
         typer.Option(
             "--scores-only",
-            help="Recompute the scores without carrying out the actions: takes seconds, but proves less.",
+            help="Recompute the scores from the recorded paths, without replaying the actions: faster, proves less.",
         ),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON instead of a table.")] = False,
 ) -> None:
-    """Score a packed run again by carrying out its actions; exit code 1 if anything was altered or is missing."""
+    """Check a packed run by replaying its actions and scoring them again.
+
+    The exit code is 1 if anything was altered or is missing.
+    """
     import json
 
     from evonav.submission.verify import verdict_json, verify
 
-    with chosen_tasks(tasks, limit, subset) as task_files, progress_bar("carrying actions out again") as on_progress:
+    with chosen_tasks(tasks, limit, subset) as task_files, progress_bar("replaying actions") as on_progress:
         verdict = verify(
             file,
             task_files,
@@ -88,11 +93,11 @@ def _print(file: Path, verdict: "Verdict") -> None:
         ((check.name, *marks[check.is_passed], check.detail) for check in verdict.checks),
     )
     if verdict.is_accepted and verdict.submission is not None:
-        scores = Table(title="SR and SPL in %, of the records")
+        scores = Table(title="SR and SPL in %, as scored again")
         for column in ("agent", "n", "SR", "SPL"):
             scores.add_column(column, justify="left" if column == "agent" else "right")
         for agent, row in verdict.submission.summary["agents"].items():
             scores.add_row(agent, str(row["n"]), f"{100 * row['sr']:.1f}", f"{100 * row['spl']:.1f}")
         show(scores)
         if not verdict.is_rescored:
-            typer.echo("The actions were not carried out again: the recorded paths were taken as they are.")
+            typer.echo("The actions were not replayed: the recorded paths were trusted.")

@@ -6,17 +6,28 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, numbers_of
+from evonav.cli.options.shared import (
+    Exchanges,
+    OldTask,
+    RunFolder,
+    RunTask,
+    RunTasks,
+    Stages,
+    listed,
+    numbers_of,
+)
 from evonav.cli.results.view import task_path
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from evonav.replay.replay import RunReplay
     from evonav.replay.types import ReplayedStage
 
-Task = Annotated[str | None, typer.Argument(help="Id of a task of the run. Default: the best highlight.")]
-Agent = Annotated[str | None, typer.Option(help="Agent of the run. Default: that of the best highlight.")]
-Stages = Annotated[str, typer.Option("--stage", help="Stages, separated by commas. Default: all.")]
-Out = Annotated[Path, typer.Option(help="File to write.")]
+Agent = Annotated[
+    str | None,
+    typer.Option("--agent", metavar="NAME", help="Agent of the run. Default: that of the most telling episode."),
+]
 
 ACTIONS_FPS, ROUNDS_FPS = 12.0, 2.0
 VIEW_PX = 396
@@ -27,23 +38,28 @@ MANY_ROUNDS = 100
 
 def video(
     run: RunFolder,
-    out: Out,
-    task: Task = None,
+    old_task: OldTask = None,
+    task: RunTask = None,
     agent: Agent = None,
-    stage: Stages = "",
+    stage: Stages = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN/episode.mp4.")] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Rounds per second. Default: 2, or 12 where each round is a single action.")
+        float | None,
+        typer.Option(
+            min=0.1, metavar="X", help="Rounds per second. Default: 2, or 12 where each round is a single action."
+        ),
     ] = None,
-    width: Annotated[int, typer.Option(help="Width of the video, in pixels.")] = 1280,
+    width: Annotated[int, typer.Option(min=1, metavar="N", help="Width of the video, in pixels.")] = 1280,
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Write a video of an episode: views, the agent's map and memory, and the truth (docs/video.md)."""
+    """Write an episode as an MP4 video: views, the agent's map and memory, and the truth."""
     from evonav.replay.video import check_video, write_video
     from evonav.replay.video_frames import episode_frame, stage_frames
 
+    out = out or run / "episode.mp4"
     check_video(out, fps or ROUNDS_FPS, width)
-    replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
+    replay, agent, stages, success_radius_m = _replayed(run, task or old_task, agent, stage, tasks, exchanges, VIEW_PX)
     maps = {one.record.stage: one.stage_map for one in stages[0] if one.stage_map is not None}
     frame, budget = episode_frame(stages[0], maps), replay.budget(agent)
     with status("Drawing") as tell:
@@ -62,19 +78,21 @@ def video(
 
 def rerun(
     run: RunFolder,
-    out: Out,
-    task: Task = None,
+    old_task: OldTask = None,
+    task: RunTask = None,
     agent: Agent = None,
-    stage: Stages = "",
+    stage: Stages = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN/episode.rrd.")] = None,
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Write an episode as a recording for the rerun viewer, with views, map, memory and truth (.rrd)."""
+    """Write an episode as a recording for the rerun viewer: views, map, memory and the truth."""
     from evonav.replay.rerun_export import check_recording, write_recording
 
+    out = out or run / "episode.rrd"
     check_recording(out)
     _, agent, (stages, shown), radius_m = _replayed(
-        run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
+        run, task or old_task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
     )
     maps = {one.record.stage: one.stage_map for one in stages if one.stage_map is not None}
     write_recording(shown, maps, out, success_radius_m=radius_m)
@@ -85,7 +103,7 @@ def _replayed(
     run: Path,
     task: str | None,
     agent: str | None,
-    stage: str,
+    stage: "Sequence[str] | None",
     tasks: Path | None,
     exchanges: Path | None,
     heading_px: int,
@@ -113,7 +131,7 @@ def _replayed(
         stages = list(replay.episode(name, task_id, on_round, last_stage=last))
     shown = [one for one in stages if wanted is None or one.record.stage in wanted]
     if not shown:
-        raise InvalidArgumentError(f"{run}: no stage {stage} of task {task_id!r} by agent {name!r}")
+        raise InvalidArgumentError(f"{run}: no stage {', '.join(listed(stage))} of task {task_id!r} by agent {name!r}")
     for one in shown:
         reason = one.why_not or "; ".join(one.differences)
         if reason:

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import Exchanges, RunFolder, RunTasks, listed
+from evonav.cli.options.shared import (
+    Exchanges,
+    RunAgents,
+    RunFolder,
+    RunTask,
+    RunTasks,
+    Stages,
+    listed,
+    numbers_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -17,16 +26,17 @@ if TYPE_CHECKING:
 
 def view(
     run: RunFolder,
-    task: Annotated[str | None, typer.Option(help="Id of a task of the run. Default: the best highlight.")] = None,
-    agent: Annotated[str, typer.Option(help="Agents of the run, separated by commas. Default: all.")] = "",
-    stage: Annotated[int | None, typer.Option(min=1, help="Show only this stage.")] = None,
+    task: RunTask = None,
+    agent: RunAgents = None,
+    stage: Stages = None,
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
-    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: RUN/view.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: RUN/view.")] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Show episodes round by round as HTML pages: views, map, memory, questions and answers (docs/viewer.md)."""
-    pages, index = make_pages(run, task, listed(agent), stage=stage, tasks=tasks, exchanges=exchanges, out=out)
+    """Show episodes round by round as HTML pages: views, map, memory, questions and answers."""
+    stages = numbers_of("--stage", stage)
+    pages, index = make_pages(run, task, listed(agent), stages=stages, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:
         typer.echo(
             f"page: {index.parent / page.href}{' (the replay differs from the records)' if page.differs else ''}"
@@ -43,7 +53,7 @@ def make_pages(
     task: str | None = None,
     agents: "Sequence[str]" = (),
     *,
-    stage: int | None = None,
+    stages: "Sequence[int]" = (),
     tasks: Path | None = None,
     exchanges: Path | None = None,
     out: Path | None = None,
@@ -54,7 +64,7 @@ def make_pages(
         run: A run.
         task: Id of a task; default: the best highlight.
         agents: Names; default: all of the run's.
-        stage: The only stage to show.
+        stages: The stages to show, each on a page of its own; default: all, on one page.
         tasks: Folder of the run's tasks.
         exchanges: File of a model's answers.
         out: Folder to write.
@@ -68,14 +78,14 @@ def make_pages(
     ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
     task_id = task if task is not None else best_highlight(found, ranked)[0]
     episodes = [(name, task_id) for name in agents]
-    return replay_pages(found, episodes, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
+    return replay_pages(found, episodes, stages=stages, tasks=tasks, exchanges=exchanges, out=out)
 
 
 def replay_pages(
     found: "Run",
     episodes: "Sequence[tuple[str, str]]",
     *,
-    stage: int | None = None,
+    stages: "Sequence[int]" = (),
     tasks: Path | None = None,
     exchanges: Path | None = None,
     out: Path | None = None,
@@ -90,15 +100,17 @@ def replay_pages(
     pages = []
     with status("Replaying") as tell:
         for name, task_id in episodes:
-            stages = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=stage))
-            pages += write_episode(
-                stages,
-                out_dir,
-                budget=replay.budget(name),
-                success_radius_m=found.success_radius_m,
-                only=stage,
-                records_sha256=found.episodes_sha256[name, task_id],
-            )
+            last = max(stages, default=None)
+            replayed = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=last))
+            for only in stages or (None,):
+                pages += write_episode(
+                    replayed,
+                    out_dir,
+                    budget=replay.budget(name),
+                    success_radius_m=found.success_radius_m,
+                    only=only,
+                    records_sha256=found.episodes_sha256[name, task_id],
+                )
     return pages, write_index(pages, out_dir, found.run_dir.resolve().name)
 
 

@@ -20,14 +20,21 @@ _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
 
 @with_settings("perception", "decisions", "spending")
 def check_agent(
-    agent: Annotated[str, typer.Argument(help="Agent: a name, `module:Class` or `./file.py:Class`.")],
+    agent: Annotated[
+        str, typer.Argument(metavar="AGENT", help="Agent: ./file.py:Class, module:Class or a name (`evonav agents`).")
+    ],
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
     seed: Seed = 0,
-    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for an answer of the agent.")] = 60.0,
+    agent_timeout: Annotated[
+        float, typer.Option(min=0.1, metavar="X", help="Seconds to wait for an agent's answer.")
+    ] = 60.0,
 ) -> None:
-    """Check that an agent keeps the contract, and force situations in which agents crash; exit code 1 if one fails."""
+    """Check in seconds that an agent works, also where agents crash: a target that moved, or was never found.
+
+    It runs in bundled houses. The exit code is 1 if a check fails.
+    """
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
@@ -37,7 +44,7 @@ def check_agent(
             perception=perceived,
             decision=decision_component(decisions, spending, Path(folder), seed, 1),
         )
-        report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
+        report = check_agent(agent, backend=backend, seed=seed, timeout_s=agent_timeout)
     print_checks(
         report.conclusion,
         ((check.name, check.verdict, _STYLES[check.verdict], check.finding) for check in report.checks),

@@ -7,15 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import interruptible, print_table, status
+from evonav.cli.group import Command, new_app
 from evonav.cli.options.decisions import decision_component
-from evonav.cli.options.settings import SettingsGroup, with_settings
+from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     HOUSES,
-    AgentNames,
+    Agents,
     AnyAsset,
+    GeneratorFile,
     Limit,
-    OneAgent,
+    OldTask,
     RetryErrored,
     Seed,
     names_of,
@@ -26,42 +28,52 @@ if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run_settings import RunSettings
     from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
 
-controlled_app = typer.Typer(
-    name="controlled",
-    cls=SettingsGroup,
-    help="Measure the effect of a change with all else equal: Fixed / Not Fixed pairs, or several evolution rates.",
-    no_args_is_help=True,
+controlled_app = new_app(
+    "controlled",
+    help="Measure what a change in the house costs, all else equal: Fixed / Not Fixed pairs, or several change rates.",
 )
 
-Directory = Annotated[Path, typer.Argument(help="Folder of the analysis, which `controlled generate` writes.")]
+Directory = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="Folder of the analysis, from `evonav controlled generate`.")
+]
 
 
-@controlled_app.command()
+@controlled_app.command(cls=Command)
 @with_settings("workers")
 def generate(
     workers: "RunSettings",
-    source: Annotated[Path, typer.Argument(help=f"Houses ({HOUSES}), or a folder of tasks whose houses are used.")],
-    out: Annotated[Path, typer.Option(help="Folder of the analysis; an unfinished analysis is resumed.")],
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder of the analysis; an unfinished analysis is resumed.")
+    ],
+    old_houses: Annotated[Path | None, typer.Argument(metavar="HOUSES", hidden=True)] = None,
+    houses: Annotated[
+        Path | None,
+        typer.Option(metavar="HOUSES", help=f"Houses: {HOUSES}; or a folder of tasks, whose houses are used."),
+    ] = None,
     rates: Annotated[
         str | None,
         typer.Option(
-            help="Probabilities of evolution to compare, such as 0,0.5,1. Default: generate Fixed / Not Fixed pairs."
+            metavar="X,Y",
+            help="Probabilities that the house changes between two stages, such as 0,0.5,1, each an arm. "
+            "Default: generate Fixed / Not Fixed pairs.",
         ),
     ] = None,
     limit: Limit = None,
-    per_house: Annotated[int, typer.Option(min=1, help="Number of tasks per house, with seeds from SEED on.")] = 1,
+    per_house: Annotated[
+        int, typer.Option(min=1, metavar="N", help="Number of tasks per house, with the seeds SEED, SEED+1, ...")
+    ] = 1,
     seed: Seed = 0,
-    config: Annotated[
-        Path | None,
-        typer.Option(help="TOML file with parameters of the generator (docs/extensions.md). Default: the paper's."),
-    ] = None,
+    config: GeneratorFile = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Generate the same tasks in several arms that differ in one thing only; run again to resume."""
+    """Generate the same tasks in several arms that differ in one thing; run again to resume."""
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
 
+    source = houses or old_houses
+    if source is None:
+        raise typer.BadParameter("name houses: --houses FILE, or --houses bundled")
     options = ControlledOptions(
         seed=seed,
         per_house=per_house,
@@ -90,7 +102,7 @@ def generate(
         typer.echo(f"  without: {rejection.house}: {rejection.reason}")
 
 
-@controlled_app.command()
+@controlled_app.command(cls=Command)
 @with_settings("local_run", "perception", "decisions", "spending")
 def evaluate(
     directory: Directory,
@@ -98,12 +110,11 @@ def evaluate(
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
-    agents: AgentNames = None,
-    agent: OneAgent = None,
+    agent: Agents = None,
     seed: Seed = 0,
     retry_errored: RetryErrored = False,
 ) -> None:
-    """Evaluate agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
+    """Evaluate agents in every arm, into FOLDER/runs/ARM; run again to resume, or to add agents."""
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
     from evonav.evaluation.run.components import Backend
@@ -116,7 +127,7 @@ def evaluate(
         perception=perception.component(),
         decision=decision_component(decisions, spending, directory, seed, num_workers),
     )
-    names = names_of(agents, agent)
+    names = names_of(agent)
 
     def tell(arm: str, progress: "Progress") -> None:
         latest = "" if progress.latest is None else f" {progress.latest.label}"
@@ -138,12 +149,12 @@ def evaluate(
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
-@controlled_app.command()
+@controlled_app.command(cls=Command)
 def report(
     directory: Directory,
-    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: DIRECTORY/report.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: FOLDER/report.")] = None,
 ) -> None:
-    """Print the tables, and write them with plots and a page of all pairs."""
+    """Print the tables, and write a page with them, plots and all pairs."""
     from rich.console import Console
 
     from evonav.controlled.analysis import load_analysis
@@ -155,20 +166,28 @@ def report(
     typer.echo(f"page: {write_controlled_report(directory, out)}")
 
 
-@controlled_app.command()
+@controlled_app.command(cls=Command)
 def picture(
     directory: Directory,
+    old_task: OldTask = None,
+    task: Annotated[
+        str | None, typer.Option(metavar="ID", help="Task of the analysis. Default: the most telling one.")
+    ] = None,
+    agent: Annotated[str, typer.Option(metavar="NAME", help="Agent to draw.")] = "fu",
     out: Annotated[
-        Path, typer.Option(help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`).")
-    ],
-    task: Annotated[str | None, typer.Argument(help="Id of a task. Default: the best highlight.")] = None,
-    agent: Annotated[str, typer.Option(help="Agent to draw.")] = "fu",
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`). Default: FOLDER/pair.svg.",
+        ),
+    ] = None,
 ) -> None:
-    """Draw one agent in one pair, Fixed on the left and Not Fixed on the right."""
+    """Draw how one agent moved in one pair: Fixed on the left, Not Fixed on the right."""
     from evonav.controlled.analysis import load_analysis
     from evonav.controlled.paired_maps import highlighted_pairs, write_pair
     from evonav.errors import InvalidArgumentError
 
+    task = task or old_task
     analysis = load_analysis(directory)
     if agent not in analysis.agents:
         raise InvalidArgumentError(f"{directory}: no agent {agent!r}; there are {', '.join(analysis.agents)}")
@@ -177,4 +196,4 @@ def picture(
         found = [key for _, key in highlighted_pairs(analysis, agent)] or found
     if not found:
         raise InvalidArgumentError(f"{directory}: no pair {task or ''} that {agent!r} has finished")
-    typer.echo(f"picture: {write_pair(analysis, agent, found[0], out)}")
+    typer.echo(f"picture: {write_pair(analysis, agent, found[0], out or directory / 'pair.svg')}")

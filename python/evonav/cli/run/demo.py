@@ -1,13 +1,13 @@
 """`evonav demo`: evaluate the heuristics on the bundled tasks and show the results."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.decisions import DryRun, decision_component, print_estimate
+from evonav.cli.options.decisions import HiddenDryRun, decision_component, print_estimate
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AgentNames, Limit, Seed, names_of
+from evonav.cli.options.shared import Agents, Limit, Seed, names_of
 from evonav.cli.results.view import make_pages
 from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_tasks, running
 
@@ -16,23 +16,23 @@ if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
 
 
-@with_settings("workers", "decisions", "spending")
+@with_settings("workers", "decisions", "spending", hidden=("decisions", "spending"))
 def demo(
     workers: "RunSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
-    out: Path = Path("out/demo"),
-    agents: AgentNames = None,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder to write.")] = Path("out/demo"),
+    agent: Agents = None,
     limit: Limit = None,
     seed: Seed = 0,
-    dry_run: DryRun = False,
+    dry_run: HiddenDryRun = False,
 ) -> None:
-    """Evaluate the paper's three heuristics on the bundled tasks, and write a report with replays of one task."""
+    """Run three agents on the bundled tasks, and write a report with replays; it takes a minute or two."""
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import evaluate
     from evonav.report import write_report
 
-    num_workers, names = workers.num_workers, names_of(agents)
+    num_workers, names = workers.num_workers, names_of(agent)
     decision = decision_component(decisions, spending, out, seed, num_workers, dry_run=dry_run)
     config = workers.config(seed, Backend(decision=decision), decisions)
     with run_tasks(out, limit=limit) as task_files:

@@ -11,10 +11,9 @@ from evonav.cli.options.decisions import DryRun, decision_component, print_estim
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
-    AgentNames,
+    Agents,
     Houses,
     Limit,
-    OneAgent,
     Out,
     RetryErrored,
     Seed,
@@ -42,8 +41,7 @@ def evaluate(
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
-    agents: AgentNames = None,
-    agent: OneAgent = None,
+    agent: Agents = None,
     houses: Houses = None,
     tasks: Tasks = None,
     limit: Limit = None,
@@ -52,9 +50,9 @@ def evaluate(
     retry_errored: RetryErrored = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Evaluate agents on tasks; run again to resume.
+    """Evaluate agents on tasks, by default on the bundled ones; run again to resume.
 
-    Writes records.sqlite and summary.json into OUT.
+    Results go to the folder OUT. Look at them with `evonav report OUT` and `evonav view OUT`.
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunRequest, evaluate_all
@@ -68,7 +66,7 @@ def evaluate(
         decision=decision_component(decisions, spending, out, seed, run.num_workers, dry_run=dry_run),
     )
     config = run.config(seed, backend, decisions)
-    names = names_of(agents, agent)
+    names = names_of(agent)
     allows_any = simulation.allow_unknown_assets
     with run_tasks(out, houses, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
         if dry_run:

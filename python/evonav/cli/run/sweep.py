@@ -23,11 +23,10 @@ if TYPE_CHECKING:
 @with_settings("changes")
 def sweep(
     changes: "RunSettings",
-    file: Annotated[
-        Path | None, typer.Argument(help="Sweep file in TOML (docs/sweeps.md).", show_default=False)
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="Sweep file in TOML.", show_default=False)] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the sweep. Default: the file's `out`, else out/NAME.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder of the sweep. Default: the file's `out`, else out/NAME."),
     ] = None,
     set_: Annotated[
         list[str] | None,
@@ -39,19 +38,19 @@ def sweep(
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="GLOB", help="Run only cells whose name matches. Repeat the option for more."),
+        typer.Option(metavar="GLOB", help="Run only cells whose name matches, such as '*__s0'. Repeat for more."),
     ] = None,
     retry_errored: RetryErrored = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="List cells, stages and the estimated cost of models; run nothing.")
+        bool, typer.Option("--dry-run", help="Run nothing: list cells, stages and the estimated cost of models.")
     ] = False,
     schema: Annotated[
-        bool, typer.Option("--schema", help="Print the JSON Schema of sweep files, for editors.")
+        bool, typer.Option("--schema", help="Print the JSON Schema of sweep files, which editors use.")
     ] = False,
 ) -> None:
-    """Evaluate every combination of agents, perceptions, decisions, tasks and seeds in a file; run again to resume.
+    """Evaluate every combination of agents, perceptions, tasks and seeds that a file lists; run again to resume.
 
-    Writes a run for every cell into OUT/runs, and OUT/summary.json, .csv and .md.
+    Each combination is a cell with a run of its own in OUT/runs. Also writes summary.json, .csv and .md.
     """
     if schema:
         _print_schema()
@@ -143,7 +142,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
     missing = [row for row in rows if row.is_incomplete and row.cell in selected]
     if any(row.counts["errored"] for row in missing):
         typer.echo(
-            f"some stages errored (`evonav failures` of their run says why); to run them again: {again} --retry-errored"
+            f"some stages errored (`evonav failures RUN` says why); run them again with: {again} --retry-errored"
         )
     return bool(missing)
 
@@ -187,7 +186,7 @@ def _print_plan(
     show(table)
     typer.echo(f"{total} stages" + (f", about ${total_usd:.2f}" if total_usd else ""))
     if has_models and settings.prices is None:
-        typer.echo("dollars: name a table of prices, `prices = ...` (docs/decision.md)")
+        typer.echo("no prices: name a file of prices in the sweep file, such as prices = 'prices.json'")
     if settings.max_cost is not None and total_usd > settings.max_cost:
         typer.echo(f"more than max_cost = {settings.max_cost:g}: stages beyond it would end as errored")
 

@@ -1,48 +1,58 @@
-"""`evonav tasks`: list, draw, describe and check task files."""
+"""`evonav tasks`: generate, check, draw and describe tasks."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.group import Command, add_commands, new_app
 from evonav.cli.options import completion
-from evonav.cli.options.settings import SettingsGroup
-from evonav.cli.options.shared import Limit
+from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of, task_folder
+from evonav.cli.tasks.generate import generate
 from evonav.cli.tasks.stats import stats
 from evonav.cli.tasks.validate import validate
 from evonav.cli.tasks.write import write
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from evonav.tasks import Task
 
-tasks_app = typer.Typer(
-    cls=SettingsGroup, help="List, draw, describe, check and rewrite task files.", no_args_is_help=True
-)
+PICTURES = Path("out/tasks")
+"""Folder of pictures of tasks by default."""
 
-Folder = Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")]
+tasks_app = new_app(help="Generate, check, draw and describe tasks.")
 
 
-@tasks_app.command(name="list")
-def list_tasks(folder: Folder, limit: Limit = None) -> None:
-    """List tasks with their rooms, stages, and the stages before which the house changes."""
+@tasks_app.command(name="list", cls=Command)
+def list_tasks(folder: TaskFolder = None, limit: Limit = None) -> None:
+    """List tasks with their rooms and stages, and the stages before which the house changes."""
     from evonav.tasks import load_tasks
 
-    for task in load_tasks(folder, limit):
+    with task_folder(folder) as found:
+        tasks = list(load_tasks(found, limit))
+    width = max(len(task.task_id) for task in tasks)
+    typer.echo(f"{'task':{width}}  rooms  stages  the house changes before stages")
+    for task in tasks:
         changed = [str(stage.stage) for stage in task.oracle_stages if stage.evolution.outcome == "evolved"]
-        rooms = f"{task.header.house.num_rooms:2} rooms"
-        typer.echo(f"{task.task_id}  {rooms}  {task.num_stages} stages  changed before: {', '.join(changed) or '-'}")
+        counts = f"{task.header.house.num_rooms:5}  {task.num_stages:6}"
+        typer.echo(f"{task.task_id:{width}}  {counts}  {', '.join(changed) or '-'}")
 
 
-@tasks_app.command()
+@tasks_app.command(cls=Command)
 def schema(
     name: Annotated[
-        str | None, typer.Argument(help="File to describe: dataset, oracle_stage, public_stage or task. Default: all.")
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="File to describe: dataset, oracle_stage, public_stage or task. Default: all."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write NAME.schema.json files to. Default: print them.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder to write NAME.schema.json files to. Default: print them."),
     ] = None,
 ) -> None:
-    """Print or write the JSON Schemas (draft 2020-12) of task files."""
+    """Print or write the JSON Schemas of task files, which editors and validators use."""
     from evonav.tasks.schema import MODELS, schema_text, write_schemas
 
     if out is not None:
@@ -53,42 +63,49 @@ def schema(
         typer.echo(schema_text(each), nl=False)
 
 
-@tasks_app.command()
+@tasks_app.command(cls=Command)
 def show(
-    folder: Annotated[Path, typer.Argument(help="Folder of a task, or of a dataset.")],
-    task: Annotated[str | None, typer.Option(help="Draw only this task of a dataset.")] = None,
-    stage: Annotated[int | None, typer.Option(help="Draw only this stage.")] = None,
+    folder: TaskFolder = None,
+    task: Annotated[
+        str | None, typer.Option("--task", metavar="ID", help="Task to draw. Default: a gallery of all.")
+    ] = None,
+    stage: Stages = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            help="File or folder to write: a page (.html), a picture of one --stage (.svg, .png or .pdf), or a folder."
+            metavar="PATH",
+            help="What to write: a folder, a page of a --task (.html), or a picture of a --task and --stage (.svg, "
+            ".png or .pdf). Default: out/tasks/NAME for a gallery, out/tasks/ID.html for a task.",
         ),
     ] = None,
     limit: Limit = None,
 ) -> None:
-    """Draw tasks with their hidden changes and answers: a page for a task, or a gallery for a dataset."""
+    """Draw tasks as pages: the house before each stage, what changes unseen, goals and answers."""
     from evonav.drawing.files import SUFFIXES
     from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
 
-    one = _one_task(folder, task, stage)
+    stages = numbers_of("--stage", stage)
+    with task_folder(folder) as found:
+        name = found.resolve().name
+        one = _one_task(found, task, stages)
+        tasks = list(load_tasks(found, limit)) if one is None else []
     if one is None:
-        if stage is not None or (out is not None and out.suffix in (*SUFFIXES, ".html")):
-            raise typer.BadParameter("--stage and single files are for one task: give its folder, or --task")
-        target = out or Path(f"{folder.resolve().name}-pictures")
-        path = write_gallery(load_tasks(folder, limit), target, folder.resolve().name, on_task=typer.echo)
+        if stages or (out is not None and out.suffix in (*SUFFIXES, ".html")):
+            raise typer.BadParameter("--stage and single files are for one task: name it with --task")
+        path = write_gallery(tasks, out or PICTURES / name, name, on_task=typer.echo)
     elif out is not None and out.suffix in SUFFIXES:
-        if stage is None:
-            raise typer.BadParameter("a picture shows one stage: give --stage, too")
-        path = write_stage_picture(one, stage, out)
+        if len(stages) != 1:
+            raise typer.BadParameter("a picture shows one stage: name it with --stage")
+        path = write_stage_picture(one, stages[0], out)
     else:
-        name = f"{one.task_id}.html"
-        target = Path(name) if out is None else out if out.suffix == ".html" else out / name
-        path = write_task_page(one, target, stages=None if stage is None else [stage])
+        folder = out or PICTURES
+        target = folder if folder.suffix == ".html" else folder / f"{one.task_id}.html"
+        path = write_task_page(one, target, stages=stages or None)
     typer.echo(f"pictures: {path}")
 
 
-def _one_task(folder: Path, task_id: str | None, stage: int | None) -> "Task | None":
+def _one_task(folder: Path, task_id: str | None, stages: "Sequence[int]") -> "Task | None":
     """Return the chosen task; `None` for all of a dataset.
 
     Raises:
@@ -103,26 +120,39 @@ def _one_task(folder: Path, task_id: str | None, stage: int | None) -> "Task | N
         return None
     root = folder if task_id is None else folder / task_id
     if task_id is not None and (is_task or Path(task_id).name != task_id or not (root / "task.json").is_file()):
-        raise InvalidArgumentError(f"{folder}: holds no task {task_id!r}")
+        raise InvalidArgumentError(f"{folder}: holds no task {task_id!r}; `evonav tasks list` shows which there are")
     task = load_task(root)
-    if stage is not None and not 1 <= stage <= task.num_stages:
-        raise InvalidArgumentError(f"task {task.task_id}: argument `stage` is {stage}, expected 1 to {task.num_stages}")
+    for stage in stages:
+        if not 1 <= stage <= task.num_stages:
+            raise InvalidArgumentError(f"task {task.task_id}: no stage {stage}; it has stages 1 to {task.num_stages}")
     return task
 
 
-@tasks_app.command()
+@tasks_app.command(cls=Command)
 def subset(
-    folder: Annotated[Path, typer.Argument(help="Folder of tasks with a dataset.json.")],
-    name: Annotated[str, typer.Argument(help="Subset: SPLIT-N, such as test-90.", autocompletion=completion.subsets)],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folder of tasks with a dataset.json, or bundled.",
+            autocompletion=completion.task_folders,
+        ),
+    ],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="SPLIT-N", help="Subset, such as test-90.", autocompletion=completion.subsets),
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="File to write the task ids to, one per line. Default: print them.")
+        Path | None,
+        typer.Option(metavar="FILE", help="File to write the task ids to, one per line. Default: print them."),
     ] = None,
 ) -> None:
-    """List the tasks of a named subset, which is the same for everyone with the same houses (docs/tasks.md)."""
+    """List the tasks of a named subset, which is the same for everyone with the same houses."""
     from evonav.errors import TaskError
     from evonav.tasks.subsets import subset_roots
 
-    ids = [root.name for root in subset_roots(folder, name)]
+    with task_folder(folder) as found:
+        ids = [root.name for root in subset_roots(found, name)]
     if out is None:
         typer.echo("\n".join(ids))
         return
@@ -133,5 +163,4 @@ def subset(
     typer.echo(f"{len(ids)} task ids in {out}")
 
 
-for command in (stats, write, validate):
-    tasks_app.command()(command)
+add_commands(tasks_app, generate, validate, stats, write)

@@ -1,19 +1,13 @@
-"""`evonav generate`: generate tasks from houses."""
+"""`evonav tasks generate`: generate tasks from houses."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import generation_progress, interruptible
+from evonav.cli.display import counted_as, generation_progress, interruptible
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import (
-    HOUSES,
-    AnyAsset,
-    Limit,
-    Seed,
-    Subset,
-)
+from evonav.cli.options.shared import AnyAsset, GeneratorFile, Limit, Seed, SomeHouses, Subset
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -23,31 +17,39 @@ if TYPE_CHECKING:
 @with_settings("pool")
 def generate(
     pool: "RunSettings",
-    houses: Annotated[Path, typer.Option(help=f"Houses: {HOUSES}.")],
-    out: Annotated[Path, typer.Option(help="Folder of the tasks; an unfinished one is resumed.")],
+    houses: SomeHouses,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the tasks; an unfinished one is resumed.")],
     limit: Limit = None,
     subset: Subset = None,
     seed: Seed = 0,
-    config: Annotated[
-        Path | None,
-        typer.Option(help="TOML file with parameters of the generator (docs/extensions.md). Default: the paper's."),
-    ] = None,
+    config: GeneratorFile = None,
     evolve_probability: Annotated[
-        float | None, typer.Option(help="Probability that a transition changes the house. Default: the paper's 0.5.")
+        float | None,
+        typer.Option(
+            metavar="X", help="Probability that the house changes between two stages. Default: the paper's 0.5."
+        ),
     ] = None,
     num_stages: Annotated[
         str | None,
-        typer.Option(help="Numbers of stages to draw from, separated by commas. Default: the paper's 3,4,5."),
+        typer.Option(
+            metavar="N,N", help="Numbers of stages to draw from, separated by commas. Default: the paper's 3,4,5."
+        ),
     ] = None,
-    house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds before a house is abandoned.")] = 120.0,
+    house_timeout: Annotated[
+        float, typer.Option(min=1.0, metavar="X", help="Seconds before a house is given up.")
+    ] = 120.0,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Try houses again on which the generator failed.")
+        bool, typer.Option("--retry-failed", help="Try houses again for which the generator failed.")
     ] = False,
-    split: Annotated[str | None, typer.Option(help="Split to record. Default: that of the houses.")] = None,
-    dataset_name: Annotated[str | None, typer.Option(help="Dataset to record. Default: that of the houses.")] = None,
+    split: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Name of the split to record. Default: that of the houses.")
+    ] = None,
+    dataset_name: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Name of the dataset to record. Default: that of the houses.")
+    ] = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Generate tasks from multi-room houses; run again to resume."""
+    """Generate a task from every house with several rooms; run again to resume."""
     from evonav.generation.config import read_parameters
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
@@ -80,6 +82,7 @@ def generate(
 
 def _tell(made: "GenerationSummary", out: Path) -> None:
     rate = f" in {made.seconds:.0f} s ({made.num_new / made.seconds:.1f} tasks/s)" if made.num_new else ""
-    typer.echo(f"{len(made.roots)} tasks in {out}, from {made.num_houses} houses; {made.num_new} new{rate}")
+    counts = f"{counted_as(len(made.roots), 'task')} in {out}, from {counted_as(made.num_houses, 'house')}"
+    typer.echo(f"{counts}; {made.num_new} new{rate}")
     for reason, count in made.reasons.most_common():
-        typer.echo(f"  {count} houses without a task: {reason}")
+        typer.echo(f"  {counted_as(count, 'house')} without a task: {reason}")

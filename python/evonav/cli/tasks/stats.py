@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import BUNDLED, PlotFile, task_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -20,19 +21,26 @@ NUM_NAMES = 6
 @with_settings("workers")
 def stats(
     workers: "RunSettings",
-    folders: Annotated[list[Path], typer.Argument(help="Folders that hold one folder per task.")],
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FOLDER", help="Folders of tasks, or bundled. Default: the bundled tasks."),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write statistics.json, statistics.html and statistics.svg to.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder to write statistics.json, statistics.html and statistics.svg to."),
     ] = None,
     reweight: Annotated[
         str | None,
-        typer.Option(help="Also weight tasks so that their houses have the room counts of a dataset: procthor-10k."),
+        typer.Option(
+            metavar="DATASET",
+            help="Also weight tasks so that their houses have the room counts of a dataset: procthor-10k.",
+        ),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Write the paper's figure to a .svg, .png or .pdf file (extra `viz`).")
-    ] = None,
+    plot: PlotFile = None,
 ) -> None:
     """Print and plot statistics of tasks beside the paper's."""
+    from contextlib import ExitStack
+
     from evonav.cli.display import status
     from evonav.generation.statistics.compute import statistics_of_folders
     from evonav.report.plots.render import check_plot
@@ -40,9 +48,9 @@ def stats(
 
     if plot is not None:
         check_plot(plot)
-    with status("Reading tasks") as tell:
+    with ExitStack() as stack, status("Reading tasks") as tell:
         found = statistics_of_folders(
-            folders,
+            [stack.enter_context(task_folder(folder)) for folder in folders or [Path(BUNDLED)]],
             mix=reweight,
             num_workers=workers.num_workers,
             on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,
@@ -83,8 +91,8 @@ def print_statistics(found: "TaskStatistics") -> None:
         console.print(f"{one.label} ({total}): {', '.join(shown)}{more}")
     console.print(_quantities(found))
     console.print(
-        "95% intervals: w Wilson; others percentile bootstrap over houses. (In brackets): not published, "
-        "worked out or tried without pictures and refusals."
+        "95% intervals: Wilson where marked w, else percentile bootstrap over houses. Numbers in parentheses are not "
+        "in the paper: they are derived from its text, or simulated without images and without rejected goals."
     )
 
 

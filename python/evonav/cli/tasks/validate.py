@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import progress_bar
+from evonav.cli.display import counted_as, progress_bar
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AnyAsset, Limit
+from evonav.cli.options.shared import AnyAsset, Limit, TaskFolder, task_folder
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -21,17 +21,25 @@ NUM_EXAMPLES = 3
 @with_settings("workers")
 def validate(
     workers: "RunSettings",
-    folder: Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")],
+    folder: TaskFolder = None,
     limit: Limit = None,
-    json_file: Annotated[Path | None, typer.Option("--json", help="Write all problems to a JSON file.")] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write a JSON file with all problems.")
+    ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Also count oddities that the source houses have themselves.")
+    ] = False,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Check tasks: files, records, physics, reference views, trajectories, and that no oracle data is public."""
+    """Check tasks: files, records, physics, reference views and paths, and that agents cannot read the answers.
+
+    The exit code is 1 if a task is invalid.
+    """
     from evonav.generation.validation import validate_folder
 
-    with progress_bar("tasks") as on_progress:
+    with task_folder(folder) as found, progress_bar("tasks") as on_progress:
         report = validate_folder(
-            folder,
+            found,
             limit=limit,
             num_workers=workers.num_workers,
             allow_unknown_assets=allow_unknown_assets,
@@ -39,13 +47,13 @@ def validate(
         )
     if json_file is not None:
         write_json(report, json_file)
-    print_report(report)
+    print_report(report, is_verbose=verbose)
     if report.problems:
         raise typer.Exit(1)
 
 
-def print_report(report: "FolderReport") -> None:
-    """Print problems by kind, and how many of them the source houses already have."""
+def print_report(report: "FolderReport", *, is_verbose: bool = False) -> None:
+    """Print whether tasks are valid, problems by kind, and if asked what the source houses already have."""
     from rich.console import Console
     from rich.table import Table
 
@@ -63,11 +71,13 @@ def print_report(report: "FolderReport") -> None:
             which = "\n".join([KINDS[kind], *examples])
             table.add_row(kind, str(num), str(len({problem.task_id for problem in found})), which)
         console.print(table, markup=False)
-    if report.source_counts:
+    num_tasks = len(report.reports)
+    verdict = "valid" if not report.num_invalid else "INVALID"
+    counted = f"{num_tasks - report.num_invalid} of {counted_as(num_tasks, 'task')} valid"
+    console.print(f"{verdict}: {counted}, {counted_as(num_stages, 'stage')}")
+    if report.source_counts and is_verbose:
         counts = ", ".join(f"{num} {kind}" for kind, num in report.source_counts.most_common())
-        console.print(f"as in the source houses, and no problem: {counts}", markup=False)
-    num_valid = len(report.reports) - report.num_invalid
-    console.print(f"{num_valid} of {len(report.reports)} tasks valid, {num_stages} stages")
+        console.print(f"oddities of the source houses, which make no task invalid: {counts}", markup=False)
 
 
 def write_json(report: "FolderReport", path: Path) -> None:

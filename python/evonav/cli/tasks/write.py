@@ -1,12 +1,12 @@
 """`evonav tasks write`: let a model rewrite the instructions of tasks."""
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from evonav.cli.display import progress_bar
+from evonav.cli.options.decisions import DryRun
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
 
@@ -15,27 +15,8 @@ if TYPE_CHECKING:
     from evonav.generation.instructions.writer import Writing
 
 
-class VlmMode(str, Enum):
-    """The source of answers."""
-
-    LIVE = "live"
-    RECORD = "record"
-    REPLAY = "replay"
-    AUTO = "auto"
-
-
-Folder = Annotated[Path, typer.Argument(help="Folder of tasks, which are rewritten in place.")]
-VlmModel = Annotated[str, typer.Option(help="Name of the model on the server.")]
-VlmExchanges = Annotated[
-    Path | None, typer.Option(help="SQLite file that stores questions and answers. Default: none.")
-]
-VlmModeOption = Annotated[
-    VlmMode | None,
-    typer.Option(
-        help="auto asks what is not stored yet, replay never asks, record asks and stores, live stores nothing."
-    ),
-]
-VlmWorkers = Annotated[int, typer.Option(min=1, help="Number of questions asked at the same time.")]
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of tasks, which are rewritten in place.")]
+Concurrency = Annotated[int, typer.Option(min=1, metavar="N", help="Number of questions asked at the same time.")]
 
 
 @with_settings("endpoint", "spending")
@@ -43,26 +24,24 @@ def write(
     folder: Folder,
     endpoint: "DecisionSettings",
     spending: "SpendingSettings",
-    vlm_model: VlmModel = "gpt-4o",
-    vlm_exchanges: VlmExchanges = None,
-    vlm_mode: VlmModeOption = None,
-    vlm_workers: VlmWorkers = 4,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Estimate the cost, and ask nothing.")] = False,
+    concurrency: Concurrency = 4,
+    dry_run: DryRun = False,
     limit: Limit = None,
 ) -> None:
-    """Let a model write appearance and unified instructions, with the paper's prompts; run again to resume.
+    """Let a model rewrite the instructions of tasks with the paper's prompts; run again to resume.
 
-    The key is read from OPENAI_API_KEY.
+    It describes how goals look and merges the parts of each instruction. The key is read from OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.client import VlmClient, VlmConfig
     from evonav.decision.vlm.response_cache import ResponseCache
     from evonav.generation.instructions.writer import estimate_texts, write_texts
 
-    account = Account(spending.price(vlm_model), spending.max_cost)
-    config = VlmConfig(vlm_model, base_url=endpoint.base_url, max_concurrency=vlm_workers)
-    store = None if vlm_exchanges is None else ResponseCache(vlm_exchanges)
-    client = VlmClient(config, store=store, mode=None if vlm_mode is None else vlm_mode.value, account=account)
+    model = endpoint.named_model()
+    account = Account(spending.price(model), spending.max_cost)
+    config = VlmConfig(model, base_url=endpoint.base_url, max_concurrency=concurrency)
+    store = None if endpoint.exchanges is None else ResponseCache(Path(endpoint.exchanges))
+    client = VlmClient(config, store=store, mode=endpoint.mode, account=account)
     if dry_run:
         estimate = estimate_texts(folder, client, limit=limit)
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"

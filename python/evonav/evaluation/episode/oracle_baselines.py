@@ -155,7 +155,7 @@ class OracleFlags(FrontierUpdate, OracleBaseline):
 ORACLE_BASELINES: dict[str, type[OracleBaseline]] = dict(
     zip(ORACLE_BASELINE_NAMES, (ShortestPath, PerfectRecognition, OracleMemory, OracleFlags), strict=True)
 )
-"""The oracle baselines by name, for `evonav evaluate --agents`."""
+"""The oracle baselines by name, for `evonav evaluate --agent`."""
 
 
 def as_oracle_baseline(agent: object) -> OracleBaseline | None:

@@ -42,9 +42,9 @@ class SimulatorSettings(Settings):
     """The simulator that runs the episodes."""
 
     kind: Literal["embedded", "ai2thor"] = "embedded"
-    """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client, see docs/ai2thor.md)."""
+    """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     allow_unknown_assets: bool = False
-    """Give assets that are missing from the catalogue the usual size of their category; Objaverse houses need it."""
+    """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None
     """AI2-THOR: path of a build's executable, or `evonav` for our engine. Default: download a build."""
     commit_id: str | None = None
@@ -79,7 +79,7 @@ class PerceptionSettings(Settings):
     """The perception that turns camera images into what agents see (docs/perception.md)."""
 
     make: str = "gt"
-    """Perception of the agents (docs/perception.md).
+    """Perception of the agents.
 
     gt (the simulator's masks and labels), noisy:PRESET (with simulated errors), predicted:STACK (models) or
     module:function (your own), with keys as in noisy:poor,miss_rate=0.3."""
@@ -119,7 +119,7 @@ class DecisionSettings(Settings):
     """VLM: auto asks what is not stored yet, replay never asks, record needs a new file, live stores nothing.
     Default: auto."""
     exchanges: str | None = None
-    """SQLite file that stores questions and answers. Default: exchanges.sqlite in the run's folder."""
+    """SQLite file that stores questions and answers. Default: exchanges.sqlite in the run's folder, if any."""
     exchange_images: bool = True
     """Store the images of questions too."""
     temperature: float | None = None
@@ -154,6 +154,19 @@ class DecisionSettings(Settings):
     def answer_timeout_s(self) -> float:
         """Time limit of an agent's answer in a round; longer where a model is asked."""
         return ANSWER_TIMEOUT_S if self.kind == "text" else VLM_ANSWER_TIMEOUT_S
+
+    def named_model(self) -> str:
+        """Return the name of the model on the server.
+
+        Raises:
+            SettingError: No model is named.
+        """
+        model = self.model or os.environ.get(MODEL_VARIABLE)
+        if not model:
+            raise SettingError(
+                type(self), "model", f"is needed to ask a model (or {MODEL_VARIABLE} in the environment)"
+            )
+        return model
 
     def check(self) -> None:
         """Check the settings without asking or opening anything.
@@ -191,11 +204,7 @@ class DecisionSettings(Settings):
             return {"path": self.kind, **noise}
         from evonav.decision.backends import SAMPLING
 
-        model = self.model or os.environ.get(MODEL_VARIABLE)
-        if not model:
-            raise SettingError(
-                type(self), "model", f"is needed to ask a model (or {MODEL_VARIABLE} in the environment)"
-            )
+        model = self.named_model()
         sampling: dict[str, Any] = {**SAMPLING, "seed": seed}
         if self.reasoning:
             sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
@@ -302,7 +311,11 @@ class SpendingSettings(Settings):
         """Return the keyword arguments of a decision model that asks `model`."""
         price = self.price(model)
         if self.max_cost is not None and price is None:
-            raise SettingError(type(self), "max_cost", "needs the model's prices: name a table with prices")
+            raise SettingError(
+                type(self),
+                "max_cost",
+                "needs the model's prices: name a file with --prices (in a sweep file: prices = ...)",
+            )
         spending: dict[str, Any] = {} if price is None else {"price": [price.input_usd, price.output_usd]}
         return spending if self.max_cost is None else {**spending, "max_cost_usd": self.max_cost}
 

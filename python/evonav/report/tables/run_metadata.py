@@ -52,7 +52,7 @@ def reproduction(run: Run) -> list[str]:
     if any(str(parts.get(name, "")).rpartition(":")[2] != part for name, part in _DEFAULT_PARTS.items()):
         return []
     perception = perception_of(run)
-    command = ["evonav", "evaluate", "--agents", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
+    command = ["evonav", "evaluate", "--agent", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
     if isinstance(run.notes.get("tasks_dir"), str):
         command += ["--tasks", run.notes["tasks_dir"]]
     command += ["--perception", perception] if perception not in ("gt", "") else []

@@ -1,0 +1,95 @@
+"""Parse and show commands as evonav does: `-h`, plain flags, panels in order, and old names that still work."""
+
+from collections.abc import Callable
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from evonav.cli.old_names import in_new_names
+
+HELP_NAMES = {"help_option_names": ["-h", "--help"]}
+
+
+class _Shown:
+    """Show flags without a type, arguments in capitals, and no hidden argument."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - click's
+        """Return the parameters, with the names under which the help shows their values."""
+        params: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for param in params:
+            if getattr(param, "is_flag", False):
+                param.metavar = ""
+            elif param.param_type_name == "argument" and param.metavar is None:
+                param.metavar = str(param.name).upper()
+        return params
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ANN401 - click's
+        """Return the parts of the line `Usage:`."""
+        hidden = {
+            piece for param in self.get_params(ctx) if getattr(param, "hidden", False) for piece in _pieces(param, ctx)
+        }
+        pieces: list[str] = super().collect_usage_pieces(ctx)  # type: ignore[misc]
+        return [piece for piece in pieces if piece not in hidden]
+
+
+def _pieces(param: Any, ctx: Any) -> list[str]:  # noqa: ANN401 - click's
+    return list(param.get_usage_pieces(ctx)) if param.param_type_name == "argument" else []
+
+
+class Command(_Shown, TyperCommand):
+    """A command."""
+
+
+class Group(_Shown, TyperGroup):
+    """A group of commands in which the called one gets the options of its settings (`evonav.cli.options.settings`)."""
+
+    order: tuple[str, ...] = ()
+    """Names of commands in the order of the help; default: as they were added."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401 - click's
+        """Return the names of the commands in the order of the help."""
+        places = {name: place for place, name in enumerate(self.order)}
+        return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(places)))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - click's
+        """Return the called command's name, the command with all its options, and its arguments."""
+        args = in_new_names(str(self.name), args, is_quiet=ctx.resilient_parsing)
+        name, command, rest = super().resolve_command(ctx, args)
+        expand = getattr(getattr(command, "callback", None), "expand", None)
+        if command is not None and expand is not None:
+            app = new_app()
+            app.command(name, epilog=command.epilog, cls=Command)(expand())
+            command = typer.main.get_command(app)
+        return name, command, rest
+
+
+def new_app(name: str | None = None, *, help: str | None = None, cls: type[Group] = Group) -> typer.Typer:
+    """Return an empty group of commands.
+
+    Args:
+        name: Its name; default: the one it gets when it is added.
+        help: Its purpose.
+        cls: Its class.
+    """
+    return typer.Typer(
+        name=name,
+        cls=cls,
+        help=help,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings=HELP_NAMES,
+    )
+
+
+def add_commands(app: typer.Typer, *commands: Callable[..., None], panel: str | None = None) -> None:
+    """Add commands to a group.
+
+    Args:
+        app: The group.
+        *commands: Functions; a command is named as its function is.
+        panel: Heading in the group's help.
+    """
+    for command in commands:
+        app.command(cls=Command, rich_help_panel=panel)(command)

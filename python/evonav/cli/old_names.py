@@ -1,0 +1,61 @@
+"""Keep old names of commands and options working for one version; the help does not show them."""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import typer
+
+OLD_COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "evonav generate": ("tasks", "generate"),
+        "evonav measures": ("report", "--text"),
+    }
+)
+"""The words that stand for a command that was renamed or moved."""
+_AGENTS = {"--agents": "--agent"}
+OLD_OPTIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "evonav check-agent": {"--timeout": "--agent-timeout"},
+        "controlled evaluate": _AGENTS,
+        "evonav demo": _AGENTS,
+        "evonav evaluate": _AGENTS,
+        "evonav measures": {**_AGENTS, "--out": "--md"},
+        "evonav pack": _AGENTS,
+        "evonav paper": {"--out": "--md"},
+        "evonav perception": {"--houses": "--houses-per-task"},
+        "evonav strip": {**_AGENTS, "--stages": "--stage"},
+        "tasks write": {
+            "--vlm-model": "--model",
+            "--vlm-base-url": "--base-url",
+            "--vlm-exchanges": "--exchanges",
+            "--vlm-workers": "--concurrency",
+        },
+    }
+)
+"""Options by command: the old spelling, and the one that took its place."""
+
+
+def in_new_names(group: str, words: Sequence[str], *, is_quiet: bool = False) -> list[str]:
+    """Return a command line in which old names are replaced.
+
+    Args:
+        group: Name of the group that the first word is a command of, such as `evonav` or `tasks`.
+        words: The command's name and its arguments.
+        is_quiet: Do not print which names are new.
+    """
+    if not words:
+        return []
+    name, *rest = words
+    renamed = OLD_OPTIONS.get(f"{group} {name}", {})
+    for place, word in enumerate(rest):
+        if word == "--":
+            break
+        option, equals, value = word.partition("=")
+        if option in renamed:
+            rest[place] = f"{renamed[option]}{equals}{value}"
+            if not is_quiet:
+                typer.echo(f"note: {option} is now {renamed[option]}", err=True)
+    new = OLD_COMMANDS.get(f"{group} {name}")
+    if new is not None and not is_quiet:
+        typer.echo(f"note: `evonav {name}` is now `evonav {' '.join(new)}`", err=True)
+    return [*(new or (name,)), *rest]
