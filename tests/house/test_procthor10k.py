@@ -121,7 +121,7 @@ def test_a_split_is_read_wherever_houses_are(remote, tmp_path) -> None:
     assert [house.to_json() for house in loaded] == remote.texts["val"]
     assert loaded[1].name == f"{name}:2"
     listed = CliRunner().invoke(app, ["houses", name, "--limit", "1"])
-    assert listed.stdout.startswith(f"{name}:1\t"), listed.output
+    assert listed.stdout.splitlines()[1].endswith(f" {name}:1"), listed.output
     made = CliRunner().invoke(
         app, ["tasks", "generate", "--houses", name, "--out", str(tmp_path / "tasks"), "--limit", "1"]
     )

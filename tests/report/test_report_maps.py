@@ -119,7 +119,7 @@ def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
     assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4
     assert CliRunner().invoke(app, [*arguments, "--stage", "x"]).exit_code == 2
     assert CliRunner().invoke(app, ["strip", str(run_dir), "--out", str(out)]).exit_code == 0
-    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 2
+    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4  # both agents
 
 
 def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:
