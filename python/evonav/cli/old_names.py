@@ -35,17 +35,17 @@ OLD_OPTIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
 """Options by command: the old spelling, and the one that took its place."""
 
 
-def in_new_names(group: str, words: Sequence[str], *, is_quiet: bool = False) -> list[str]:
+def in_new_names(group: str, command_line: Sequence[str], *, is_quiet: bool = False) -> list[str]:
     """Return a command line in which old names are replaced.
 
     Args:
         group: Name of the group that the first word is a command of, such as `evonav` or `tasks`.
-        words: The command's name and its arguments.
+        command_line: The command's name and its arguments.
         is_quiet: Do not print which names are new.
     """
-    if not words:
+    if not command_line:
         return []
-    name, *rest = words
+    name, *rest = command_line
     renamed = OLD_OPTIONS.get(f"{group} {name}", {})
     for place, word in enumerate(rest):
         if word == "--":
