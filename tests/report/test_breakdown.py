@@ -80,7 +80,7 @@ def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
     found = breakdown(read_compared_agents([str(run)]), "stratum")
     table = breakdown_table(found)
     assert table.columns == ("stratum", "n", "fu", "ftu")
-    assert table.rows[0] == ("first", "8-9", "100.0", "100.0")
+    assert table.rows[0] == ("first", "8-9", "100.0 [–]", "100.0 [–]")
     assert table.rows[1][2].startswith("11.1 [0.0, ")
     assert breakdown_table(found, is_brief=True).rows[1][2].startswith("11.1 ±")
     rows = list(csv.DictReader(io.StringIO(breakdown_csv([found]))))
@@ -107,7 +107,9 @@ def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
     plots = run_plots(loaded)
     assert [plot.title for plot, _ in plots] == [
         "SR differences, points",
+        "SPL differences, points",
         "SR by stratum",
+        "SPL by stratum",
         "SR by evolution",
         "SR by path length",
         "SR by earlier stages",

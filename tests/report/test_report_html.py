@@ -219,16 +219,18 @@ def test_tasks_without_a_record_are_listed(tmp_path: Path) -> None:
 
 
 def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> None:
-    first, second = findings.statements(load_run(write_run()))
+    first, second, third = findings.statements(load_run(write_run()))
     assert first.startswith("ftu has the highest success rate, 91.7 [")
-    assert second.endswith("points on the 12 stages that both scored: a tie at this n.")
+    assert second.startswith("ftu has the highest SPL, ")
+    assert third.startswith("ftu less fu, on the 12 stages that both scored: SR +41.7 [")
+    assert re.search(r"points, a tie at this n; SPL .* points, a tie at this n\.$", third)
     few = findings.statements(load_run(write_run("few", num_tasks=2)))
-    assert few[1] == "2 houses are too few to tell agents apart."
+    assert few[2] == "2 houses: too few to tell agents apart."
     (partial,) = findings.statements(load_run(write_run("partial", is_complete=False)))
     assert partial.startswith("Not every agent has been scored on every stage")
     records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in ("fu", "ftu")]
     tied = findings.statements(load_run(record_run(tmp_path / "tied", records, {"t": 1}, ["fu", "ftu"])))
-    assert tied[0] == "fu and ftu have the same success rate, 100.0 %."
+    assert tied[0] == "fu and ftu have the same success rate, 100.0%, the highest."
 
 
 def test_effort_counts_the_way_to_stale_entries(write_run: WriteRun) -> None:
@@ -236,9 +238,9 @@ def test_effort_counts_the_way_to_stale_entries(write_run: WriteRun) -> None:
     table = findings.effort_table(run)
     fu, ftu = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
     # fu chose a stale entry in the three moves (1 m each) of each of its second stages.
-    assert (fu["of it to stale entries m"], fu["stale entries"], fu["rounds"]) == ("1.5", "0.5", "4.0")
-    assert (ftu["of it to stale entries m"], ftu["stale entries"]) == ("0.0", "0.0")
-    assert (fu["walked m"], fu["SoftSPL %"], fu["ended itself"]) == ("3.0", "50.0", "12 of 12")
+    assert (fu["path to stale entries m"], fu["stale entries"], fu["rounds"]) == ("1.5", "0.5", "4.0")
+    assert (ftu["path to stale entries m"], ftu["stale entries"]) == ("0.0", "0.0")
+    assert (fu["path m"], fu["SoftSPL %"], fu["stopped itself"]) == ("3.0", "50.0", "12 of 12")
     assert run.wall_s == {"fu": [1.0] * 12, "ftu": [1.0] * 12}
 
 

@@ -100,7 +100,7 @@ def test_strip_shows_the_stages_side_by_side(write_run: WriteRun, tmp_path: Path
     assert words == ["Stage 1", "Stage 2"]
     assert len(root.findall(f".//{SVG}svg")) == 2
     assert [ring.get("r") for ring in with_class(root, "ring")] == ["150", "150", "9"]  # two maps, and the legend
-    assert "RETAIN_GROUP in the kitchen: 2 objects moved" in "".join(root.itertext())
+    assert "retained group in the kitchen: 2 objects moved" in "".join(root.itertext())
 
 
 def test_strip_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from rich.console import Console
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise
 from evonav.report.run import load_run
 from evonav.report.tables import table as tables
-from evonav.report.tables.numbers import percent
+from evonav.report.tables.numbers import percent, rate
 from evonav.statistics import paired_effect
 
 F64 = NDArray[np.float64]
@@ -118,19 +118,20 @@ def test_latex_compiles_and_shrinks_to_the_line(tmp_path: Path) -> None:
 
 
 def test_rates_without_spread_claim_no_interval() -> None:
-    assert percent(1.0, None) == "100.0"
-    assert percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
-    assert percent(None, None) == "–"
+    assert rate(1.0, None) == "100.0 [–]"
+    assert rate(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
+    assert rate(None, None) == "–"
+    assert percent(0.5) == "50.0"
 
 
 def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> None:
     table = tables.paired_table(load_run(write_run()).pairs)
     (row,) = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
     # ftu alone succeeds in six second stages, fu alone in one first stage.
-    assert (row["Agents"], row["only first"], row["only second"]) == ("ftu less fu", "6", "1")
+    assert (row["Agents"], row["only first / second"]) == ("ftu less fu", "6 / 1")
     assert row["SR difference [95% CI]"].startswith("+41.7 [")
     # The interval leaves 0 out, p does not suffice: six houses against half a house.
-    assert (row["p"], row["SR says"]) == ("0.062", "a tie at this n")
+    assert (row["p"], row["SR verdict"], row["SPL verdict"]) == ("0.062", "a tie at this n", "a tie at this n")
 
 
 def test_no_name_of_an_agent_is_a_formula_in_a_spreadsheet() -> None:

@@ -151,7 +151,7 @@ def test_words_count_the_moved_and_name_the_farthest(task: Task, drawing: TaskDr
     evolution = task.oracle(stage).evolution
     words = change_sentence(drawing.maps[stage], evolution)
     far_m = max(change.displacement_m for change in evolution.changes)
-    assert re.fullmatch(rf"FULL_SHUFFLE in the .+: {len(evolution.changes)} objects? moved, .+ {far_m:.1f} m\.", words)
+    assert re.fullmatch(rf"Full shuffle in the .+: {len(evolution.changes)} objects? moved, .+ {far_m:.1f} m\.", words)
     rows = move_rows(drawing.maps[stage], evolution)
     assert rows[0][2] == f"{far_m:.2f} m"
     assert {row[1] for row in rows} == {change.id for change in evolution.changes}

@@ -7,7 +7,7 @@ from typing import Any
 
 from evonav.parallel.folders import write_atomically
 from evonav.report.export import csv_text
-from evonav.report.tables.numbers import percent
+from evonav.report.tables.numbers import rate
 from evonav.report.tables.table import INTERVALS, Table, markdown_tables
 from evonav.sweeps.summary import AXES, STATES, SweepRow
 
@@ -59,8 +59,8 @@ def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
         (
             row.agent,
             *(str(getattr(row, axis)) for axis in axes),
-            percent(row.sr, row.sr_ci95),
-            percent(row.spl, row.spl_ci95),
+            rate(row.sr, row.sr_ci95),
+            rate(row.spl, row.spl_ci95),
             str(row.n),
             f"all {row.num_stages}" if not row.is_incomplete else f"{_missing(row)}, incomplete",
         )

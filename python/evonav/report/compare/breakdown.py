@@ -16,7 +16,7 @@ from evonav.report.compare.wording import RATES, measure_name, scale_of
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.report.tables.numbers import NONE, estimate_text, number
-from evonav.report.tables.table import MODES, Table
+from evonav.report.tables.table import MODES, STRICT_NOTE, Table
 from evonav.statistics import ClusterBootstrap, Estimate
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
@@ -114,8 +114,8 @@ def _by_radius(compared_agents: Sequence[ComparedAgent]) -> Breakdown:
             if judged:
                 cells[name, compared.name] = _cell(judged, [float(getattr(row, field)) for row in judged])
     note = (
-        "The agents were run under their own radius; these are the same stages judged by others. Strict: it called "
-        "stop within 1 m of the target's box with the target in view. Geodesic: the way to it is under the radius."
+        "The agents ran with their own success radius; these are the same stages judged by others. Geodesic success: "
+        f"the path to the target is shorter than the radius. {STRICT_NOTE}"
     )
     groups = [group for group in (*labels, "strict", "geodesic") if any(group == key for key, _ in cells)]
     agents = tuple(compared.name for compared in compared_agents)
@@ -126,7 +126,7 @@ def _grouping(compared_agents: Sequence[ComparedAgent], by: str) -> Grouping:
     if by == "stratum":
         return Grouping("stratum", lambda row: STRATA.get(row.stratum), list(STRATA.values()))
     if by == "mode":
-        note = "The transition before the stage; stages 2 and on."
+        note = "What changed before the stage; stages 2 and later."
         return Grouping("evolution", lambda row: MODES.get(row.mode), list(MODES.values()), note)
     if by == "path-length":
         names = [f"{a:g}-{b:g} m" for a, b in pairwise(LENGTH_EDGES_M)] + [f"{LENGTH_EDGES_M[-1]:g} m and more"]

@@ -1,17 +1,20 @@
 """Write a comparison as tables and sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, points
 from evonav.report.tables.table import (
     INTERVALS,
+    SPL_NOTE,
+    STRICT_NOTE,
     VERDICTS,
     Table,
     effect_cells,
     latex_tables,
     markdown_tables,
+    mode_words,
     p_heading,
     p_words,
     verdict_words,
@@ -109,7 +112,7 @@ def comparison_table(one: Comparison) -> Table:
     )
     columns = ("%", one.b, one.a, "difference [95% CI]", "p", "verdict")
     only = f"Only {one.b} succeeded in {one.all.num_only_b} stages, only {one.a} in {one.all.num_only_a}."
-    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD))
+    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_explained(effects)))
 
 
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
@@ -160,7 +163,13 @@ def part_table(one: Comparison) -> Table:
         for field in fields:
             cells += effect_cells(part.effects.get(field), scale_of(field))
         rows.append(tuple(cells))
-    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING))
+    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_explained(fields)))
+
+
+def _explained(fields: Iterable[str]) -> tuple[str, ...]:
+    """Return notes on metrics whose name does not say enough."""
+    notes = {"spl": SPL_NOTE, "is_strict_success": STRICT_NOTE}
+    return tuple(note for field, note in notes.items() if field in fields)
 
 
 def flip_table(one: Comparison) -> Table:
@@ -308,7 +317,7 @@ def amount(value: float, field: str) -> str:
 def where(flip: Flip) -> str:
     """Return the stratum and the mode in words."""
     stratum = _stratum(flip)
-    return stratum if flip.mode == "first" else f"{stratum}, {flip.mode.upper() if '_' in flip.mode else flip.mode}"
+    return stratum if flip.mode == "first" else f"{stratum}, {mode_words(flip.mode)}"
 
 
 def _stratum(flip: Flip) -> str:

@@ -67,7 +67,9 @@ def write_report(
     path = out_dir / REPORT_NAME
     with replacing(path) as beside, beside.open("w", encoding="utf-8") as file:
         tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
-        for text in page.generate(**_template_values(run, found), tasks=tasks, replays=replays):
+        for text in page.generate(
+            **_template_values(run, found, has_replays=bool(replays)), tasks=tasks, replays=replays
+        ):
             file.write(text)
     return path
 
@@ -124,7 +126,7 @@ def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
         write_atomically(map_dir / map_name(record), drawn)
 
 
-def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
+def _template_values(run: Run, found: Sequence[tables.Table], *, has_replays: bool) -> dict[str, Any]:
     overview = [
         {
             "anchor": slug(task_id),
@@ -138,7 +140,17 @@ def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         for task_id, num_stages in run.num_stages.items()
     ]
     headline, *others = found
-    plots = run_plots(run)
+    shown = [table for table in others if table.rows]
+    plots, failures = run_plots(run), failure_groups(run)
+    sections = [
+        ("rates", headline.title),
+        *([("replays", "Round by round")] if has_replays else []),
+        *([("plots", "Plots")] if plots else []),
+        *((f"table-{number}", table.title) for number, table in enumerate(shown, 1)),
+        ("episodes", "Episodes"),
+        *([("failures", "Errors")] if failures else []),
+        ("settings", "Settings"),
+    ]
     used = {outcome.cause for outcome in run.outcomes.values()}
     columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
     css = text_of("report.css") + map_css() + plot_css() + columns
@@ -148,13 +160,20 @@ def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         "name": run.run_dir.resolve().name,
         "headline": headline,
         "bars": [_bars(summary) for summary in run.summaries],
-        "others": [table for table in others if table.rows],
-        "plots": list(zip(plot_elements([plot for plot, _ in plots]), (caption for _, caption in plots), strict=False)),
+        "others": shown,
+        "sections": sections,
+        "plots": list(
+            zip(
+                plot_elements([plot for plot, _ in plots], are_even=True),
+                (caption for _, caption in plots),
+                strict=False,
+            )
+        ),
         "statements": statements(run),
         "overview": overview,
         "causes": [(cause.name, CAUSE_NAMES[cause]) for cause in FailureCause if cause in used],
         "facts": run_facts(run),
-        "failures": failure_groups(run),
+        "failures": failures,
         "commands": reproduction(run),
         "digests": task_digests(run),
         "css": css,

@@ -12,6 +12,7 @@ from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.trajectory import change, course, rounds
 from evonav.report.run import Run, Task
 from evonav.report.tables.causes import sentence
+from evonav.report.tables.numbers import count
 
 
 def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
@@ -94,11 +95,11 @@ def _uses(prefix: str, stage: int) -> str:
 
 def _facts(record: StageRecord) -> str:
     """Return the numbers of a stage in a line."""
-    parts = [f"{record.num_rounds} rounds"]
+    parts = [count(record.num_rounds, "round")]
     if record.path_length_m is not None:
         shortest = "" if record.reference_length_m is None else f" (shortest {record.reference_length_m:.1f} m)"
-        parts.append(f"{record.path_length_m:.1f} m{shortest}")
-    parts.append(f"target seen in {record.num_target_visible_rounds}")
+        parts.append(f"walked {record.path_length_m:.1f} m{shortest}")
+    parts.append(f"target in view in {count(record.num_target_visible_rounds, 'round')}")
     num_stale = sum(entry.is_stale for entry in record.entries)
     if record.entries:
         parts.append(f"{len(record.entries)} entries, {num_stale} stale")

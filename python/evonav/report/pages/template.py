@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evonav.drawing.svg import clean
+from evonav.report.tables.numbers import count
 
 
 def text_of(name: str) -> Markup:
@@ -19,7 +20,7 @@ def text_of(name: str) -> Markup:
 
 def page_environment() -> Environment:
     """Return the package's templates; text is escaped, and characters that no page may contain are replaced."""
-    return Environment(
+    environment = Environment(
         loader=PackageLoader("evonav.report"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -27,6 +28,8 @@ def page_environment() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
     )
+    environment.globals["count"] = count
+    return environment
 
 
 def page_text(

@@ -7,7 +7,7 @@ from functools import partial
 from evonav.evaluation.metrics.navigation import Rates
 from evonav.report.paper.tables import NUM_STAGES, PAPER, PaperResult, Perception
 from evonav.report.run import Run
-from evonav.report.tables.numbers import percent
+from evonav.report.tables.numbers import rate
 from evonav.report.tables.table import latex_text
 
 NAMES = {
@@ -153,7 +153,7 @@ def _comments(setting: Perception, row: _Row, order: Sequence[str]) -> list[str]
             name = row.name.split(" $", maxsplit=1)[0]
             lines.append(
                 f"% {SETTINGS[setting]}, {name}, {' '.join(agent.split())}: "
-                f"{percent(_value(found, row.measure), interval)}, n = {found.n}"
+                f"{rate(_value(found, row.measure), interval)}, n = {found.n}"
                 + (f"; paper n = {row.num_paper}" if agent in NAMES else "")
             )
     return lines

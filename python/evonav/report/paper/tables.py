@@ -11,7 +11,7 @@ from typing import Literal
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary
 from evonav.report.run import PAPER_ORDER, Run
-from evonav.report.tables.numbers import NONE, number, percent, points
+from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
 
@@ -118,9 +118,9 @@ def _main_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]
         (
             s.agent,
             _theirs(paper.get(s.agent)),
-            percent(s.sr, s.sr_ci95),
+            rate(s.sr, s.sr_ci95),
             percent(paper[s.agent].spl) if s.agent in paper else NONE,
-            percent(s.spl, s.spl_ci95),
+            rate(s.spl, s.spl_ci95),
             f"{s.n} of {s.num_stages}" if s.is_incomplete else str(s.n),
         )
         for s in summaries
@@ -226,9 +226,9 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
 def _theirs(known: PaperResult | None, split: str = "all") -> str:
     if known is None:
         return NONE
-    return percent(known.sr(split), wilson(known.num_successes(split), NUM_STAGES[split]))
+    return rate(known.sr(split), wilson(known.num_successes(split), NUM_STAGES[split]))
 
 
 def _ours(summary: AgentSummary, split: str) -> str:
     part = summary.rates(split)
-    return NONE if part.sr is None else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"
+    return NONE if part.sr is None else f"{rate(part.sr, part.sr_ci95)}, n = {part.n}"

@@ -18,7 +18,7 @@ from evonav.drawing.svg import escape, title
 from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
 from evonav.report.plots.draw import TOOLTIP, draw, size_in
-from evonav.report.plots.specs import Plot
+from evonav.report.plots.specs import GapPlot, Plot
 from evonav.report.plots.style import RC, plot_css
 
 if TYPE_CHECKING:
@@ -36,15 +36,30 @@ def has_renderer() -> bool:
     return find_spec("matplotlib") is not None
 
 
-def plot_elements(plots: Sequence[Plot]) -> list[Markup]:
+def plot_elements(plots: Sequence[Plot], *, are_even: bool = False) -> list[Markup]:
     """Return plots as `svg` elements for a page that has `plot_css()`.
+
+    Args:
+        plots: The plots.
+        are_even: Whether all plots have the width of the widest, and all of a kind the height of the highest, so that
+            they fill the rows of a page.
 
     Returns:
         One element a plot, without styles of its own; where matplotlib is missing, a single line that says so.
     """
     if plots and not has_renderer():
         return [Markup('<p class="note">{}</p>').format(HINT)]
-    return [Markup(_svg([plot], columns=1, style="")) for plot in plots]  # noqa: S704 - our own SVG
+    sizes = _even_sizes(plots) if are_even else [size_in(plot) for plot in plots]
+    return [Markup(_svg([plot], [size], columns=1, style="")) for plot, size in zip(plots, sizes, strict=True)]  # noqa: S704 - our own SVG
+
+
+def _even_sizes(plots: Sequence[Plot]) -> list[tuple[float, float]]:
+    sizes = [size_in(plot) for plot in plots]
+    width_in = max((width for width, _ in sizes), default=0.0)
+    heights_in: dict[bool, float] = {}
+    for plot, (_, height) in zip(plots, sizes, strict=True):
+        heights_in[isinstance(plot, GapPlot)] = max(height, heights_in.get(isinstance(plot, GapPlot), 0.0))
+    return [(width_in, heights_in[isinstance(plot, GapPlot)]) for plot in plots]
 
 
 def check_plot(path: Path) -> None:
@@ -74,22 +89,21 @@ def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
     check_plot(path)
     suffix = path.suffix.lower()
     if suffix == ".svg":
-        data = (_svg(plots, columns, f"<style>{plot_css()}</style>") + "\n").encode()
+        data = (_svg(plots, list(map(size_in, plots)), columns, f"<style>{plot_css()}</style>") + "\n").encode()
     else:
         # Without dates, the same plots are the same file.
         metadata = {"CreationDate": None} if suffix == ".pdf" else {}
-        with _figure(plots, columns) as figure:
+        with _figure(plots, list(map(size_in, plots)), columns) as figure:
             data = _saved(figure, format=suffix[1:], dpi=200, metadata=metadata)
     return write_atomically(path, data)
 
 
 @contextmanager
-def _figure(plots: Sequence[Plot], columns: int) -> "Iterator[Figure]":
-    """Draw plots row by row, in the style of the pages."""
+def _figure(plots: Sequence[Plot], sizes: Sequence[tuple[float, float]], columns: int) -> "Iterator[Figure]":
+    """Draw plots row by row, in the style of the pages; `sizes` are their widths and heights in inches."""
     from matplotlib import style
     from matplotlib.figure import Figure
 
-    sizes = [size_in(plot) for plot in plots]
     rows = [sizes[i : i + columns] for i in range(0, len(sizes), columns)]
     widths = [max(row[j][0] for row in rows if j < len(row)) for j in range(min(columns, len(plots)))]
     heights = [max(height for _, height in row) for row in rows]
@@ -111,8 +125,8 @@ def _saved(figure: "Figure", **options: Any) -> bytes:  # noqa: ANN401 - options
     return buffer.getvalue()
 
 
-def _svg(plots: Sequence[Plot], columns: int, style: str) -> str:
-    with _figure(plots, columns) as figure:
+def _svg(plots: Sequence[Plot], sizes: Sequence[tuple[float, float]], columns: int, style: str) -> str:
+    with _figure(plots, sizes, columns) as figure:
         root = ElementTree.fromstring(_saved(figure, format="svg", metadata={"Date": None}))  # noqa: S314 - our own
     tooltips: list[str] = []
     content = "".join(_element(child, tooltips) for child in root)

@@ -9,11 +9,11 @@ from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.numbers import estimate_text
-from evonav.report.tables.table import Table
+from evonav.report.tables.table import STRICT_NOTE, Table
 
 TITLES = {
     "success": "Success, by several definitions",
-    "staleness": "Believing what is no longer so",
+    "staleness": "Stale beliefs",
     "memory": "Memory against the objects seen so far",
     "costs": "What a stage costs",
 }
@@ -53,4 +53,5 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
     houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
     sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
     note = f"{sizes}. 95% bootstrap over houses. In parentheses: how many stages have a value, if not all."
-    return Table(TITLES[kind], ("Measure", *found), tuple(lines), (note,))
+    notes = (note, STRICT_NOTE) if kind == "success" else (note,)
+    return Table(TITLES[kind], ("Measure", *found), tuple(lines), notes)

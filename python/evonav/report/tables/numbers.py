@@ -6,9 +6,22 @@ NONE = "–"
 """Text of a cell without a value."""
 
 
-def number(
+def number(value: float | None, *, scale: float = 1, digits: int = 1, is_signed: bool = False, unit: str = "") -> str:
+    """Return a number as text.
+
+    Args:
+        value: `None` where there is nothing to show.
+        scale: Factor of the value.
+        digits: Digits after the point.
+        is_signed: Show the sign of a positive number, too.
+        unit: Text behind the value.
+    """
+    return NONE if value is None else f"{scale * value:{_form(digits, is_signed)}}{unit}"
+
+
+def with_interval(
     value: float | None,
-    interval: Interval | None = None,
+    interval: Interval | None,
     *,
     scale: float = 1,
     digits: int = 1,
@@ -19,7 +32,7 @@ def number(
 
     Args:
         value: `None` where there is nothing to show.
-        interval: `None` where resampling gives none: a single house, or houses that all agree.
+        interval: `None` where resampling gives none, for a single house or houses that all agree: `61.1 [–]`.
         scale: Factor of value and interval.
         digits: Digits after the point.
         is_signed: Show the sign of a positive number, too.
@@ -27,19 +40,28 @@ def number(
     """
     if value is None:
         return NONE
-    form = f"{'+' if is_signed else ''}.{digits}f"
-    ends = "" if interval is None else f" [{scale * interval[0]:{form}}, {scale * interval[1]:{form}}]"
-    return f"{scale * value:{form}}{unit}{ends}"
+    form = _form(digits, is_signed)
+    ends = NONE if interval is None else ", ".join(f"{scale * end:{form}}" for end in interval)
+    return f"{number(value, scale=scale, digits=digits, is_signed=is_signed, unit=unit)} [{ends}]"
 
 
-def percent(value: float | None, interval: Interval | None = None) -> str:
+def _form(digits: int, is_signed: bool) -> str:
+    return f"{'+' if is_signed else ''}.{digits}f"
+
+
+def percent(value: float | None) -> str:
+    """Return a rate of 0 to 1 in percent."""
+    return number(value, scale=100)
+
+
+def rate(value: float | None, interval: Interval | None) -> str:
     """Return a rate of 0 to 1 in percent, with its interval."""
-    return number(value, interval, scale=100)
+    return with_interval(value, interval, scale=100)
 
 
 def points(effect: PairedEffect, scale: float = 100) -> str:
     """Return a difference in percentage points, with its interval: `+6.3 [-1.2, +13.9]`."""
-    return number(effect.difference, effect.ci95, scale=scale, is_signed=True)
+    return with_interval(effect.difference, effect.ci95, scale=scale, is_signed=True)
 
 
 def estimate_text(
@@ -48,8 +70,13 @@ def estimate_text(
     """Return an estimate with its interval, by default in percent, and with its n in parentheses if `has_n`."""
     if estimate is None or estimate.value is None:
         return NONE
-    text = number(estimate.value, estimate.ci95, scale=scale, digits=digits, is_signed=is_signed)
+    text = with_interval(estimate.value, estimate.ci95, scale=scale, digits=digits, is_signed=is_signed)
     return f"{text} ({estimate.n})" if has_n else text
+
+
+def count(number: int, noun: str) -> str:
+    """Return a number of things in words: `1 house`, `2 houses`."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def scaled(interval: Interval | None, scale: float = 100) -> Interval | None:

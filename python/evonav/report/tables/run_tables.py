@@ -1,13 +1,16 @@
 """Build all tables of a run, and sentences that claim no more than the numbers allow."""
 
 from collections import Counter
+from collections.abc import Sequence
+from typing import Literal
 
+from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import Run
 from evonav.report.tables import table as tables
-from evonav.report.tables.numbers import NONE, percent, points
+from evonav.report.tables.numbers import NONE, count, percent, points, rate
 from evonav.statistics import MIN_CLUSTERS
 
 
@@ -29,7 +32,7 @@ def run_tables(run: Run) -> list[tables.Table]:
 
 def effort_table(run: Run) -> tables.Table:
     """Build the table of what success cost, and what believing stale entries cost: means per scored stage."""
-    columns = ("Agent", "SoftSPL %", "rounds", "walked m", "of it to stale entries m", "stale entries", "ended itself")
+    columns = ("Agent", "SoftSPL %", "rounds", "path m", "path to stale entries m", "stale entries", "stopped itself")
     rows = []
     for summary in run.summaries:
         scored = run.scored(summary.agent)
@@ -42,10 +45,10 @@ def effort_table(run: Run) -> tables.Table:
             sum(outcome.row.num_stale_entries or 0 for outcome in scored) / len(scored),
         )
         ended = f"{summary.num_stopped} of {summary.n}"
-        rows.append((summary.agent, percent(summary.soft_spl, None), *(f"{x:.1f}" for x in averages), ended))
+        rows.append((summary.agent, percent(summary.soft_spl), *(f"{x:.1f}" for x in averages), ended))
     note = (
-        "Means a scored stage. Walked to stale entries: in rounds that chose an object entry with no object of its "
-        "label there. Stale entries: in memory at the end of a stage."
+        "Means over scored stages. Path to stale entries: walked in rounds that chose an object entry with no object "
+        "of its label there. Stale entries: in memory at the end of a stage."
     )
     return tables.Table("Effort and staleness", columns, tuple(rows), (note,))
 
@@ -72,34 +75,38 @@ def failure_table(run: Run) -> tables.Table:
             errored = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or NONE
             rows.append((agent, errored, *map(str, counts)))
     note = (
-        "Failed decisions: no valid answer of the model in all tries; the agent then did what it does without one. "
-        "Scored after a failure: an earlier stage of the task is errored; without memory: the agent's process was lost "
-        "in it."
+        "Failed decisions: the model gave no valid answer in any try, and the agent went on without one. Scored after "
+        "a failure: an earlier stage of the task is errored. Without memory: the agent's process ended in that stage."
     )
     return tables.Table("What failed", columns, tuple(rows), (note,))
 
 
 def statements(run: Run) -> list[str]:
     """Describe what the run shows, in sentences that claim no more than the intervals allow."""
-    scored = sorted((s for s in run.summaries if s.sr is not None), key=lambda s: -(s.sr or 0.0))
+    scored = [summary for summary in run.summaries if summary.sr is not None]
     if not scored:
         return ["No stage has been scored yet."]
-    best = scored[0]
     if any(summary.is_incomplete for summary in run.summaries):
         return ["Not every agent has been scored on every stage: compare agents by their paired differences alone."]
-    equal = [summary.agent for summary in scored if summary.sr == best.sr]
-    if len(equal) > 1:
-        lines = [f"{' and '.join(equal)} have the same success rate, {percent(best.sr, None)} %."]
-    else:
-        measured = percent(best.sr, best.sr_ci95)
-        lines = [f"{best.agent} has the highest success rate, {measured} % of {best.n} stages."]
+    best, *_ = sorted(scored, key=lambda s: (-(s.sr or 0.0), -(s.spl or 0.0)))
+    lines = [_highest("success rate", scored, "sr"), _highest("SPL", scored, "spl")] if len(scored) > 1 else []
     pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
     if pairs and all(pair.sr.num_clusters < MIN_CLUSTERS for pair in pairs):
-        lines.append(f"{pairs[0].sr.num_clusters} houses are too few to tell agents apart.")
-        return lines
+        return [*lines, f"{count(pairs[0].sr.num_clusters, 'house')}: too few to tell agents apart."]
     for pair in pairs:
-        lines.append(
-            f"{pair.b} less {pair.a}: {points(pair.sr)} points on the {pair.n} stages that both scored: "
-            f"{tables.verdict_words(pair.a, pair.b, pair.sr)}."
-        )
+        effects = (("SR", pair.sr), ("SPL", pair.spl))
+        found = (f"{name} {points(one)} points, {tables.verdict_words(pair.a, pair.b, one)}" for name, one in effects)
+        lines.append(f"{pair.b} less {pair.a}, on the {pair.n} stages that both scored: {'; '.join(found)}.")
     return lines
+
+
+def _highest(title: str, summaries: Sequence[AgentSummary], name: Literal["sr", "spl"]) -> str:
+    """Name the agents with the highest rate; `name` is a field of their summaries."""
+    values = [(getattr(summary, name) or 0.0, summary) for summary in summaries]
+    highest = max(value for value, _ in values)
+    first, *others = (summary for value, summary in values if value == highest)
+    if others:
+        names = [first.agent, *(summary.agent for summary in others)]
+        return f"{', '.join(names[:-1])} and {names[-1]} have the same {title}, {percent(highest)}%, the highest."
+    measured = rate(highest, getattr(first, f"{name}_ci95"))
+    return f"{first.agent} has the highest {title}, {measured} % of {first.n} stages."

@@ -21,13 +21,21 @@ from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates,
 from evonav.evaluation.records.schema import StageRecord
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
-from evonav.report.tables.numbers import NONE, percent, points
+from evonav.report.tables.numbers import NONE, points, rate
 from evonav.statistics import LEVEL, NUM_RESAMPLES, PairedEffect
 
-INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times)."
+INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times); – where one house or equal houses give none."
+SPL_NOTE = (
+    "SPL is the length of the shortest path to the target divided by that of the walked path, at most 1. A success may "
+    "stop short of the target by up to the success radius, so a walked path can be shorter than the shortest path."
+)
+STRICT_NOTE = (
+    "Strict success: the agent called stop within 1 m of the target's box, with the target in view. Most agents look "
+    "at an object from 1.5 m by design, so their strict rates are low."
+)
 VERDICTS = (
     "p: two-sided, the agents' names exchanged in whole houses. Holm: p adjusted for the number of pairs. Ahead: p is "
-    f"at most {LEVEL:g} and the interval leaves 0 out."
+    f"at most {LEVEL:g} and the interval does not include 0."
 )
 
 
@@ -130,8 +138,8 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
     rows = tuple(
         (
             summary.agent,
-            percent(summary.sr, summary.sr_ci95),
-            percent(summary.spl, summary.spl_ci95),
+            rate(summary.sr, summary.sr_ci95),
+            rate(summary.spl, summary.spl_ci95),
             str(summary.n),
             *(str(summary.counts.get(state, 0)) for state in ("success", "failure", "errored", "not_run")),
             f"{summary.n} of {summary.num_stages}, incomplete"
@@ -144,6 +152,7 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
     incomplete = [summary.agent for summary in summaries if summary.is_incomplete]
     if incomplete:
         notes.append(f"Incomplete: {', '.join(incomplete)}. Some stages errored or were not run; rates are not final.")
+    notes.append(SPL_NOTE)
     # Rates over different stages have no best.
     best = [] if incomplete else _best([s.sr for s in summaries], 1) + _best([s.spl for s in summaries], 2)
     return Table("Success rate and SPL", columns, rows, tuple(notes), frozenset(best))
@@ -151,13 +160,20 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
 
 MODES = {
     "static": "static",
-    "salient_object": "SALIENT_OBJECT",
-    "retain_group": "RETAIN_GROUP",
-    "full_shuffle": "FULL_SHUFFLE",
+    "salient_object": "salient object",
+    "retain_group": "retained group",
+    "full_shuffle": "full shuffle",
     "activities": "daily activities",
     "extensions": "other extensions",
 }
 """Kinds of the transition before a stage, in reading order, and their titles."""
+
+
+def mode_words(mode: str) -> str:
+    """Return an evolution mode, such as `RETAIN_GROUP`, in words."""
+    return MODES.get(mode.lower(), mode)
+
+
 SPLIT_TITLES = {
     "stage_1": "stage 1",
     "relocated": "target relocated",
@@ -170,13 +186,13 @@ SPLIT_TITLES = {
 def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
     """Build the table of SR on stage 1 and on the paper's two strata of the later stages."""
     names = ("stage_1", "relocated", "not_relocated")
-    note = "Relocated: the target had ever moved since stage 1. Stages 2 and on; stage 1 is in neither."
+    note = "Relocated: the target had moved since stage 1, at any time. Both columns are of stages 2 and later."
     return _split_table("By relocation of the target", summaries, names, (note,))
 
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:
     """Build the table of SR by the kind of the transition before the stage."""
-    return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and on.",))
+    return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and later.",))
 
 
 def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
@@ -193,7 +209,7 @@ def cause_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Tabl
     """Build a table of the stages without success by cause, from counts by agent."""
     causes = [cause for cause in FailureCause if any(part.get(cause) for part in counts.values())]
     rows = tuple((CAUSE_NAMES[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
-    note = "One cause a stage, the first that fits."
+    note = "Each stage has one cause, the first that fits."
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
 
 
@@ -204,28 +220,28 @@ def paired_table(pairs: Sequence[AgentPair]) -> Table:
         "Agents",
         "SR difference [95% CI]",
         p_name,
+        "SR verdict",
         "SPL difference [95% CI]",
         p_name,
+        "SPL verdict",
         "n",
-        "only first",
-        "only second",
-        "SR says",
+        "only first / second",
     )
     rows = tuple(
         (
             f"{pair.b} less {pair.a}",
             *effect_cells(pair.sr),
-            *effect_cells(pair.spl),
-            str(pair.n),
-            str(pair.num_only_b),
-            str(pair.num_only_a),
             verdict_words(pair.a, pair.b, pair.sr),
+            *effect_cells(pair.spl),
+            verdict_words(pair.a, pair.b, pair.spl),
+            str(pair.n),
+            f"{pair.num_only_b} / {pair.num_only_a}",
         )
         for pair in pairs
     )
     notes = (
         f"Percentage points, on the same stages. {INTERVALS} {VERDICTS}",
-        "Only first: stages where only the first-named agent succeeded.",
+        "Only first / second: stages where only the first-named, or the second-named, agent succeeded.",
     )
     return Table("Paired differences", columns, rows, notes)
 
@@ -307,7 +323,7 @@ def _rates_table(
 
 
 def _rate_cell(part: Rates) -> str:
-    return NONE if part.n == 0 else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"
+    return NONE if part.n == 0 else f"{rate(part.sr, part.sr_ci95)}, n = {part.n}"
 
 
 def _best(values: Sequence[float | None], column: int) -> list[tuple[int, int]]:

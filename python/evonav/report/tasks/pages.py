@@ -13,6 +13,8 @@ from evonav.drawing.svg import escape, join, slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.maps.legend import TASK_ENTRIES, legend
 from evonav.report.pages.template import page_text, text_of
+from evonav.report.tables.numbers import count
+from evonav.report.tables.table import mode_words
 from evonav.report.tasks.floor_plans import (
     TaskDrawing,
     after_svg,
@@ -83,8 +85,9 @@ def write_gallery(
         text_of("tasks.js"),
         has_drawings=True,
         name=name,
-        summary=f"{len(cards)} tasks, {num_stages} stages",
+        summary=f"{count(len(cards), 'task')}, {count(num_stages, 'stage')}",
         cards=cards,
+        mode_words={mode: mode_words(mode) for card in cards for mode in card["modes"]},
         modes=sorted({mode for card in cards for mode in card["modes"]}),
         rooms=sorted({card["num_rooms"] for card in cards}),
     )
@@ -155,7 +158,7 @@ def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
         frame = change_frame(drawing, stage)
         plans.append((f"before (stage {stage - 1})", frame, before_svg(drawing, stage, frame)))
         plans.append((f"after (stage {stage})", frame, after_svg(drawing, stage, frame)))
-    return [*plans, ("the house, and the reference course", drawing.frame, course_svg(drawing, stage))]
+    return [*plans, ("the house, and the reference path", drawing.frame, course_svg(drawing, stage))]
 
 
 def _card(drawing: TaskDrawing, href: str) -> dict[str, Any]:

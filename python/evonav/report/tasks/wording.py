@@ -4,11 +4,13 @@ from collections import Counter
 from collections.abc import Callable
 
 from evonav.evaluation.records.schema import FloorPlan
+from evonav.report.tables.numbers import count
+from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage
 
 OUTCOMES = {
-    "first_stage": "The first stage: the house as its file has it.",
+    "first_stage": "The first stage: the house as in its file.",
     "not_triggered": "Nothing changed before this stage.",
     "no_room": "A change was drawn, but no room could take one.",
     "no_placement": "A change was drawn, but nothing could be moved",
@@ -55,7 +57,8 @@ def change_sentence(stage_map: FloorPlan, evolution: Evolution) -> str:
     if evolution.outcome == "no_placement":
         text += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
     if evolution.outcome == "evolved" and evolution.mode is not None:
-        text = f"{evolution.mode} in the {room_namer(stage_map)(evolution.room_id or '')}: {_moved_text(evolution)}."
+        room = room_namer(stage_map)(evolution.room_id or "")
+        text = f"{mode_words(evolution.mode).capitalize()} in the {room}: {_moved_text(evolution)}."
     extra = [
         (len(evolution.additions), "came"),
         (len(evolution.removals), "went"),
@@ -99,8 +102,7 @@ def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
 
 def _moved_text(evolution: Evolution) -> str:
     """Describe how many objects moved, and how far."""
-    num = len(evolution.changes)
-    text = f"{num} object{'' if num == 1 else 's'} moved"
+    text = f"{count(len(evolution.changes), 'object')} moved"
     if evolution.changes:
         farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
         text += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
