@@ -112,7 +112,7 @@ def comparison_table(one: Comparison) -> Table:
     )
     columns = ("%", one.b, one.a, "difference [95% CI]", "p", "verdict")
     only = f"Only {one.b} succeeded in {one.all.num_only_b} stages, only {one.a} in {one.all.num_only_a}."
-    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_explained(effects)))
+    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_notes_on(effects)))
 
 
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
@@ -163,10 +163,10 @@ def part_table(one: Comparison) -> Table:
         for field in fields:
             cells += effect_cells(part.effects.get(field), scale_of(field))
         rows.append(tuple(cells))
-    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_explained(fields)))
+    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_notes_on(fields)))
 
 
-def _explained(fields: Iterable[str]) -> tuple[str, ...]:
+def _notes_on(fields: Iterable[str]) -> tuple[str, ...]:
     """Return notes on metrics whose name does not say enough."""
     notes = {"spl": SPL_NOTE, "is_strict_success": STRICT_NOTE}
     return tuple(note for field, note in notes.items() if field in fields)

@@ -100,7 +100,7 @@ def _draw_gap(axes: "Axes", row: int, gap: Gap) -> None:
     colour = COLOURS[0] if gap.is_emphasised else SOFT
     if gap.interval is not None:
         axes.plot(gap.interval, (row, row), color=colour)
-    _mark(axes, gap.value, row, colour, f"{gap.name}: {_told(gap.value, gap.interval, is_signed=True)}")
+    _mark(axes, gap.value, row, colour, f"{gap.name}: {_value_text(gap.value, gap.interval, is_signed=True)}")
     place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "color": SOFT, "fontsize": SMALL}
     axes.annotate(clean(gap.detail), (1.02, row), **place)
 
@@ -111,7 +111,7 @@ def _draw_groups(axes: "Axes", plot: GroupPlot) -> None:
         for i, (value, interval) in enumerate(zip(series.values, series.intervals, strict=True)):
             if value is not None:
                 _whisker(axes, i + shift, interval, colour)
-                text = f"{series.name}, {plot.groups[i]}: {_told(value, interval)}".replace("\n", ", ")
+                text = f"{series.name}, {plot.groups[i]}: {_value_text(value, interval)}".replace("\n", ", ")
                 _mark(axes, i + shift, value, colour, text)
         axes.plot([], [], "o", color=colour, label=_name(series.name))
     _name_groups(axes, plot.groups, is_slanted=False)
@@ -140,7 +140,7 @@ def _draw_bar(axes: "Axes", plot: BarPlot, series: Series, index: int, shift: fl
     if value is None:
         return
     x, width = index + shift, 0.8 / len(plot.series)
-    text = f"{plot.groups[index]}, {series.name}: {_told(value, interval, unit='%')}".replace("\n", " ")
+    text = f"{plot.groups[index]}, {series.name}: {_value_text(value, interval, unit='%')}".replace("\n", " ")
     axes.bar(x, value, width, color=colour, gid=TOOLTIP + clean(text), label=_name(series.name, index))
     _whisker(axes, x, interval, INK, alpha=1.0, has_caps=True)
     if plot.has_values:
@@ -249,7 +249,7 @@ def _shift(index: int, num: int, room: float) -> float:
     return room * (index - (num - 1) / 2) / max(1, num)
 
 
-def _told(value: float, interval: Interval | None, **form: Any) -> str:  # noqa: ANN401 - options of `number`
+def _value_text(value: float, interval: Interval | None, **form: Any) -> str:  # noqa: ANN401 - options of `number`
     """Return a tooltip's number, with its interval if there is one."""
     return number(value, **form) if interval is None else with_interval(value, interval, **form)
 
