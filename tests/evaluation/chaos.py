@@ -1,4 +1,6 @@
-"""Kills processes of a run at random instants, until it is done: `python tests/evaluation/chaos.py --help`.
+"""Kills processes of a run at random instants until it is done.
+
+See `PYTHONPATH=tests/helpers python tests/evaluation/chaos.py --help`.
 
 The same run is made twice, undisturbed and disturbed; their records must be the same. A killed driver is started again,
 as its user would; killed workers and agents are the driver's business.
@@ -17,24 +19,12 @@ from collections import Counter
 from contextlib import closing, suppress
 from pathlib import Path
 
+from processes import children
+
 from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.parallel.local import PROCESS_NAME
 
-VICTIMS = {"driver": None, "worker": "multiprocessing.spawn", "agent": "evonav.agents.hosting.serving"}
-
-
-def children(pid):
-    """Processes that descend from one, by their command lines."""
-    parents, lines = {}, {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with suppress(OSError, IndexError):
-                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-                lines[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
-    found, fresh = {}, {pid}
-    while fresh:
-        fresh = {child for child, parent in parents.items() if parent in fresh}
-        found |= {child: lines.get(child, "") for child in fresh}
-    return found
+VICTIMS = {"driver": None, "worker": PROCESS_NAME, "agent": "evonav.agents.hosting.serving"}
 
 
 def num_recorded(run_dir):

@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from chaos import children, disturb, num_recorded, texts
+from chaos import disturb, num_recorded, texts
 from power_loss import Disk, read_log
+from processes import children
 from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 
@@ -22,6 +23,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel import folders
 from evonav.parallel.folders import replacing, write_atomically, writing
+from evonav.parallel.local import PROCESS_NAME
 from evonav.tasks.listing import task_files
 
 HERE = Path(__file__).parent
@@ -163,7 +165,7 @@ def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
 
     def look(news):
         if news.num_done in (60, 209):
-            workers = [pid for pid, line in children(os.getpid()).items() if "multiprocessing.spawn" in line]
+            workers = [pid for pid, line in children(os.getpid()).items() if PROCESS_NAME in line]
             num_open = [len(list(Path(f"/proc/{pid}/fd").iterdir())) for pid in (os.getpid(), *workers)]
             seen.append((num_open, sum(map(resident_mb, workers))))
 

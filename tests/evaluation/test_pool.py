@@ -7,7 +7,7 @@ import threading
 import time
 
 import pytest
-from chaos import children
+from processes import children
 from test_engine import CONFIG, texts
 from toy_house import write_tasks
 

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import pytest
 from generated_folder import OPTIONS, assert_same
+from processes import children
 
 from evonav.generation.dataset import generate_dataset
+from evonav.parallel.local import PROCESS_NAME
 from evonav.tasks import load_task
 
 
@@ -37,16 +39,8 @@ def wait_for_lines(process, out, count):
         time.sleep(0.002)
 
 
-def children_of(pid):
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-            if int(fields[1]) == pid and b"spawn_main" in (path.parent / "cmdline").read_bytes():
-                found.append(int(path.parent.name))
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-    return found
+def workers_of(pid):
+    return [child for child, line in children(pid).items() if PROCESS_NAME in line]
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +83,7 @@ def test_workers_killed_a_dozen_times_cost_nothing(large_house_file, large_clean
         process = subprocess.Popen(command(large_house_file, out, "--workers", 3), stdout=subprocess.DEVNULL)
         while process.poll() is None:
             wait_for_lines(process, out, num_lines(out) + 3)
-            workers = children_of(process.pid)
+            workers = workers_of(process.pid)
             if workers and num_kills < 10:
                 os.kill(draws.choice(workers), signal.SIGKILL)
                 num_kills += 1
