@@ -41,8 +41,9 @@ class ProcessHost:
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
         """Wait until a worker has a message, and return all that have one."""
-        connections = {worker.connection: worker for worker in workers if isinstance(worker, WorkerProcess)}
-        return [connections[ready] for ready in wait(list(connections), timeout_s) if isinstance(ready, Connection)]
+        connections = [worker.connection for worker in workers if isinstance(worker, WorkerProcess)]
+        ready = wait(connections, timeout_s)
+        return [worker for worker in workers if isinstance(worker, WorkerProcess) and worker.connection in ready]
 
     def close(self) -> None:
         """Do nothing: all processes have ended."""

@@ -180,6 +180,8 @@ def _folder(out: Path) -> Result:
         remedy = "name a folder that you may write to with --out"
         return "failed", f"{place}: {error.strerror or error}", remedy
     finding = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
+    if has_locks is None:
+        return "ok", f"{finding}: evonav has none on Windows, so let only one command write to a folder"
     if not has_locks:
         return "failed", finding, "put runs on a local disk: two commands could write to one run"
     if free_gb < MIN_FREE_GB:
@@ -187,12 +189,12 @@ def _folder(out: Path) -> Result:
     return "ok", finding
 
 
-def _has_locks(path: Path) -> bool:
-    """Return true if a locked file cannot be locked a second time."""
+def _has_locks(path: Path) -> bool | None:
+    """Return true if a locked file cannot be locked a second time, `None` on Windows."""
     try:
         import fcntl
-    except ImportError:  # Windows
-        return False
+    except ImportError:
+        return None
     with path.open("w") as first, path.open("w") as second:
         try:
             fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
