@@ -40,12 +40,12 @@ IMAGES = PAGE.parent / "images"
 
 Keep = Callable[[StageRecord], bool]
 CLAIMS: tuple[tuple[str, str, str, Keep], ...] = (
-    ("MSGNav less FTU", "ftu", "msgnav", lambda record: True),
-    ("3D-Mem less FU", "fu", "3d-mem", lambda record: True),
-    ("Stage-Reset less FU", "fu", "stage-reset", lambda record: True),
-    ("FTU less FU", "fu", "ftu", lambda record: True),
-    ("FTU less FU, relocated", "fu", "ftu", lambda record: record.stage > 1 and record.target.is_relocated),
-    ("FTU less FU, not relocated", "fu", "ftu", lambda record: record.stage > 1 and not record.target.is_relocated),
+    ("MSGNav minus FTU", "ftu", "msgnav", lambda record: True),
+    ("3D-Mem minus FU", "fu", "3d-mem", lambda record: True),
+    ("Stage-Reset minus FU", "fu", "stage-reset", lambda record: True),
+    ("FTU minus FU", "fu", "ftu", lambda record: True),
+    ("FTU minus FU, moved", "fu", "ftu", lambda record: record.stage > 1 and record.target.is_relocated),
+    ("FTU minus FU, not moved", "fu", "ftu", lambda record: record.stage > 1 and not record.target.is_relocated),
 )
 """Differences that the paper draws its conclusions about perception from (its Sec. 5, Tables 1 and 2)."""
 
@@ -127,11 +127,9 @@ def cost_table(runs: Mapping[str, Run]) -> Table:
     columns = (
         "Agent",
         f"relocation, {name_of(first)}",
-        *(f"{name_of(word)} less {name_of(first)}" for word, _ in others),
+        *(f"{name_of(word)} minus {name_of(first)}" for word, _ in others),
     )
-    note = (
-        "Points of SR. Relocation: relocated targets less those that stayed, other stages. The rest: the same stages."
-    )
+    note = "Points of SR. Relocation: moved targets minus those that stayed, other stages. The rest: the same stages."
     return Table("What evolution costs, and what perception costs", columns, tuple(rows), (note,))
 
 
@@ -158,9 +156,9 @@ def _points(effect: PairedEffect | None) -> str:
 
 
 def _paper_difference(a: PaperResult, b: PaperResult, title: str) -> str:
-    if title.endswith("not relocated"):
+    if title.endswith("not moved"):
         return f"{100 * (b.num_not_relocated - a.num_not_relocated) / 166:+.1f}"
-    if title.endswith("relocated"):
+    if title.endswith(", moved"):
         return f"{100 * (b.num_relocated - a.num_relocated) / 109:+.1f}"
     return f"{100 * (b.num_all - a.num_all) / 365:+.1f}"
 

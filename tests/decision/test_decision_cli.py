@@ -99,6 +99,21 @@ def test_options_that_make_no_sense_are_told(
     assert not (tmp_path / "out" / "records.sqlite").exists()
 
 
+def test_a_spent_budget_is_told_with_what_to_do(tmp_path: Path) -> None:
+    prices = tmp_path / "prices.json"
+    prices.write_text('{"m": {"input_usd": 1.0, "output_usd": 10.0}}')
+    options = ("--decision", "vlm", "--model", "m", "--prices", prices, "--max-cost", 0.0001)
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
+        code, printed = run("evaluate", *COMMON, *options, "--base-url", stub.url, "--out", tmp_path / "out")
+    assert code == 3
+    assert "stages errored: budget reached" in printed
+    assert "higher --max-cost and --retry-errored" in printed
+    code, printed = run("evaluate", *COMMON, *options[:4], "--dry-run", "--out", tmp_path / "out")
+    assert code == 0
+    assert "0%" not in printed  # all tasks were run, which says nothing about a model
+    assert "name a file of prices with --prices" in printed
+
+
 def test_recording_wants_a_new_file(tmp_path: Path) -> None:
     common = ("evaluate", *COMMON, "--decision", "vlm", "--model", "m", "--vlm-mode", "record")
     with serving(lambda request: {"text": mock_answer(request)}) as stub:

@@ -1,6 +1,7 @@
 """The command: what it prints, what it refuses, and with which exit code."""
 
 import json
+import re
 import subprocess
 import sys
 import time
@@ -66,6 +67,17 @@ def test_an_incomplete_run_says_so(tmp_path):
     result = run("evaluate", "--agent", "toy_agents:Raising", "--limit", 1, "--workers", 0, "--out", tmp_path)
     assert result.exit_code == 3
     assert "incomplete" in result.stdout
+    assert "1 stage errored: the agent failed" in result.stdout
+
+
+def test_equal_failures_are_listed_once(tmp_path):
+    agent = "toy_agents:AlwaysRaising"
+    result = run("evaluate", "--agent", agent, "--limit", 1, "--workers", 0, "--in-process", "--out", tmp_path)
+    assert "4 stages errored: the agent failed" in result.stdout
+    listed = run("failures", tmp_path, "--agent", agent).stdout
+    assert listed.count("RuntimeError: no idea") == 2  # in the heading, and below the only traceback
+    assert re.match(rf"{agent} 4 stages, first: bundled-0084-\S+ stage 1: errored, since the agent", listed)
+    assert run("failures", tmp_path, "--brief").stdout.count("\n") == 1
 
 
 def test_importing_is_quick():

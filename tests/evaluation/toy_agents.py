@@ -43,6 +43,11 @@ class Raising(Explorer):
         return super().act(observation)
 
 
+class AlwaysRaising(Explorer):
+    def act(self, observation):
+        raise RuntimeError("no idea")
+
+
 class Hanging(Explorer):
     def act(self, observation):
         if self.stage == 2:

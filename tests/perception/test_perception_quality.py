@@ -262,7 +262,7 @@ def test_files_tell_the_same_as_the_scores(folder, found, tmp_path):
     lesser = [row for row in rows if row["by"] == "less" and row["measure"] == "recall"]
     assert [float(row["value"]) for row in lesser] == [gap["recall"]["value"] for gap in gaps]
     text = page.read_text()
-    assert "confusing less missing_a_third" in text
+    assert "confusing minus missing_a_third" in text
     assert text.count("data:image/jpeg;base64,") == 4 * 3
     brief, full = (perception_tables(shown, is_brief=brief) for brief in (True, False))
     assert [table.title for table in brief] == [table.title for table in full]

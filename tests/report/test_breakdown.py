@@ -32,9 +32,9 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
             expected = num_scored // 2 if by == "mode" else num_scored  # the first stage comes after nothing
             assert sum(cell.n for (_, name), cell in found.cells.items() if name == agent) == expected, by
     found = breakdown(sides, "stratum")
-    assert found.groups == ("first", "relocated")
+    assert found.groups == ("first", "moved")
     told = rates([record for record in records["ftu"] if record.stage == 2])
-    cell = found.cells["relocated", "ftu"]
+    cell = found.cells["moved", "ftu"]
     assert (cell.n, cell.num_clusters, cell.value) == (told.n, 8, told.sr)
     assert cell.ci95 == told.sr_ci95 is not None
     assert found.cells["first", "ftu"].ci95 is None  # all houses agree
@@ -87,8 +87,8 @@ def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
     assert [(row["group"], row["agent"], row["n"]) for row in rows] == [
         ("first", "fu", "9"),
         ("first", "ftu", "8"),
-        ("relocated", "fu", "9"),
-        ("relocated", "ftu", "8"),
+        ("moved", "fu", "9"),
+        ("moved", "ftu", "8"),
     ]
 
 

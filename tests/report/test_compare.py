@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -28,7 +29,7 @@ def one(*words_: object, **options) -> Comparison:
 
 def test_stages_are_paired_and_taken_apart(tmp_path: Path) -> None:
     run = lettered_run(tmp_path / "run", {"fu": "sf" * 8 + "ss", "ftu": "ss" * 6 + "sf" * 3})
-    found = one(run, "fu", "ftu")
+    found = one(run, "ftu", "fu")
     parts = {part.key: part for part in found.parts}
     assert list(parts) == ["all", "stage_1", "relocated", "retain_group"]
     assert [parts[key].n for key in parts] == [18, 9, 9, 9]
@@ -57,13 +58,13 @@ def test_what_is_not_compared_is_told(tmp_path: Path) -> None:
 def test_runs_that_were_not_run_alike_are_refused(tmp_path: Path) -> None:
     a = lettered_run(tmp_path / "a", {"fu": "ss" * 6})
     b = lettered_run(tmp_path / "b", {"fu": "sf" * 6}, protocol=1.0, seed=4)
-    with pytest.raises(InvalidArgumentError, match=r"protocol.success_radius_m 1.5 and 1.0.*--allow-differences"):
+    with pytest.raises(InvalidArgumentError, match=r"a:fu and b:fu .*_radius_m 1.5 and 1.0.*--allow-differences"):
         one(a, b)
     found = one(a, b, allow_differences=True)
-    assert (found.a, found.b) == ("a:fu", "b:fu")
-    assert found.settings == {"protocol.success_radius_m": ("1.5", "1.0"), "seed": ("3", "4")}
+    assert (found.b, found.a) == ("a:fu", "b:fu")
+    assert found.settings == {"protocol.success_radius_m": ("1.0", "1.5"), "seed": ("4", "3")}
     same = lettered_run(tmp_path / "c", {"fu": "sf" * 6}, seed=4)
-    assert one(a, same).settings == {"seed": ("3", "4")}  # another seed, or model, may be compared
+    assert one(a, same).settings == {"seed": ("4", "3")}  # another seed, or model, may be compared
 
 
 def test_another_stage_of_the_same_name_is_no_pair(tmp_path: Path) -> None:
@@ -81,14 +82,14 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     a, b = lettered_run(tmp_path / "a", outcomes), lettered_run(tmp_path / "b", outcomes)
 
     def pairs(*asked: object, **options) -> list[tuple[str, str]]:
-        return [(found.a, found.b) for found in compare(read_compared_agents([str(word) for word in asked]), **options)]
+        return [(found.b, found.a) for found in compare(read_compared_agents([str(word) for word in asked]), **options)]
 
     assert pairs(a) == [("fu", "ftu"), ("fu", "my_module:Agent"), ("ftu", "my_module:Agent")]
     assert pairs(a, "my_module:Agent", "fu") == pairs(f"{a}:my_module:Agent", f"{a}:fu")
     assert pairs(a, "my_module:Agent", "fu") == [("my_module:Agent", "fu")]
     assert pairs(a, b) == [(f"a:{name}", f"b:{name}") for name in outcomes]
     assert pairs(f"{a}:fu", f"{b}:ftu") == [("a:fu", "b:ftu")]
-    assert pairs(a, baseline="ftu") == [("ftu", "fu"), ("ftu", "my_module:Agent")]
+    assert pairs(a, baseline="ftu") == [("fu", "ftu"), ("my_module:Agent", "ftu")]
     for cell in ("one", "two"):
         lettered_run(tmp_path / "sweep" / "runs" / cell, outcomes)
     assert pairs(tmp_path / "sweep", "ftu", "fu") == [("one:ftu", "two:ftu"), ("one:fu", "two:fu")]
@@ -128,11 +129,14 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     (run / VIEW_DIR / page_name("task-00", "fu")).write_text("page")
     files = {name: tmp_path / "out" / f"c.{name}" for name in ("md", "tex", "csv", "json", "html", "svg")}
     options = [f"--{ {'tex': 'latex', 'svg': 'plot'}.get(name, name) }={path}" for name, path in files.items()]
-    result = CliRunner().invoke(app, ["compare", str(run), "fu", "ftu", *options])
+    result = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", *options])
     assert result.exit_code == 0, result.output
-    assert "ftu is ahead" in result.output
+    assert "ftu is ahead of fu: ftu minus fu is +37.5" in " ".join(result.output.split())
+    assert re.search(r"^% +ftu +fu +difference|^ +ftu +fu +difference", result.output, re.MULTILINE), (
+        "in the order named"
+    )
     assert max(len(line) for line in result.output.splitlines() if not line.startswith("written")) <= 80
-    found = one(run, "fu", "ftu")
+    found = one(run, "ftu", "fu")
     rows = {(row["part"], row["measure"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}
     effect = found.all.effects["success"]
     assert effect.ci95 is not None

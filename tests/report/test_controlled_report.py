@@ -154,9 +154,9 @@ def test_claims_say_what_holds_and_what_is_not_told_apart(tmp_path):
         outcomes = {"fu": ([S] * (many - 1) + [F], [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
         folder = write_analysis(tmp_path / "many", "pairs", ARMS, outcomes, num_tasks=many)
     found = {claim.what: claim for claim in claims(load_analysis(folder))}
-    assert found["fu less stage-reset, Fixed"].verdict == "holds"
-    assert found["stage-reset less fu, Not Fixed"].verdict == "same direction, not significant"
-    assert found["fu, Fixed less Not Fixed"].effect.difference == 11 / 12
+    assert found["fu minus stage-reset, Fixed"].verdict == "holds"
+    assert found["stage-reset minus fu, Not Fixed"].verdict == "same direction, not significant"
+    assert found["fu, Fixed minus Not Fixed"].effect.difference == 11 / 12
     assert {claim.effect.n for claim in found.values()} == {12, 6}
 
 

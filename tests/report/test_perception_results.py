@@ -13,17 +13,17 @@ def test_differences_are_of_the_same_stages_and_stand_beside_the_papers(write_ru
     assert table.columns == ("SR, points", "paper, GT", "paper, Prediction", "perfect", "poor")
     rows = {row[0]: row[1:] for row in table.rows}
     # ftu succeeds in 11 of 12 stages, fu in 6; the paper's counts are 246 and 223, 179 and 154 of 365.
-    assert rows["FTU less FU"][:2] == ("+6.3", "+6.8")
-    assert rows["FTU less FU"][2] == "+41.7 [+16.7, +50.0]"
-    assert rows["3D-Mem less FU"] == ("-13.4", "+1.9", "–", "–")
+    assert rows["FTU minus FU"][:2] == ("+6.3", "+6.8")
+    assert rows["FTU minus FU"][2] == "+41.7 [+16.7, +50.0]"
+    assert rows["3D-Mem minus FU"] == ("-13.4", "+1.9", "–", "–")
     # 75 less 59 and 57 less 32 of 109.
-    assert rows["FTU less FU, relocated"][:2] == ("+14.7", "+22.9")
+    assert rows["FTU minus FU, moved"][:2] == ("+14.7", "+22.9")
 
 
 def test_what_perception_costs_is_paired_between_runs(write_run: WriteRun) -> None:
     good, worse = load_run(write_run("good")), load_run(write_run("worse", num_tasks=3))
     table = script.cost_table({"noisy:perfect": good, "noisy:poor": worse})
-    assert table.columns[2] == "poor less perfect"
+    assert table.columns[2] == "poor minus perfect"
     assert {row[0]: row[2] for row in table.rows} == {"fu": "+0.0", "ftu": "+0.0"}
 
 

@@ -27,7 +27,7 @@ from evonav.report.plots.style import plot_css
 SVG = "{http://www.w3.org/2000/svg}"
 GROUPS = GroupPlot(
     "SR by stratum",
-    ("first\nn = 9", "relocated\nn = 8"),
+    ("first\nn = 9", "moved\nn = 8"),
     (
         Series("fu", (90.0, 20.0), ((80.0, 95.0), None)),
         Series("_a<b>&$x$", (None, 60.0), (None, (50.0, 70.0))),
@@ -86,8 +86,8 @@ def test_a_group_plot_has_a_mark_for_every_value_where_it_belongs() -> None:
     found = marks(root)
     assert list(found) == [
         "fu, first, n = 9: 90.0 [80.0, 95.0]",
-        "fu, relocated, n = 8: 20.0",
-        "_a<b>&$x$, relocated, n = 8: 60.0 [50.0, 70.0]",
+        "fu, moved, n = 8: 20.0",
+        "_a<b>&$x$, moved, n = 8: 60.0 [50.0, 70.0]",
     ]
     (x0, y0), (x1, y1), (x2, y2) = found.values()
     assert x0 < x1 < x2

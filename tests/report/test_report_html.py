@@ -222,7 +222,7 @@ def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> N
     first, second, third = findings.statements(load_run(write_run()))
     assert first.startswith("ftu has the highest success rate, 91.7 [")
     assert second.startswith("ftu has the highest SPL, ")
-    assert third.startswith("ftu less fu, on the 12 stages that both scored: SR +41.7 [")
+    assert third.startswith("ftu minus fu, on the 12 stages that both scored: SR +41.7 [")
     assert re.search(r"points, a tie at this n; SPL .* points, a tie at this n\.$", third)
     few = findings.statements(load_run(write_run("few", num_tasks=2)))
     assert few[2] == "2 houses: too few to tell agents apart."

@@ -80,16 +80,16 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     assert cells(main)["ftu"]["SR % paper"].startswith("67.4 [62.4, 72.")
     assert (cells(main)["fu"]["SPL % paper"], cells(main)["fu"]["n ours"]) == ("48.8", "12")
     # fu fails in every second stage, where the target has moved; ftu in none.
-    assert cells(relocation)["fu"]["relocated, ours"] == "0.0, n = 6"
-    assert cells(relocation)["fu"]["relocated, paper"].startswith("54.1 [")
+    assert cells(relocation)["fu"]["moved, ours"] == "0.0, n = 6"
+    assert cells(relocation)["fu"]["moved, paper"].startswith("54.1 [")
     assert cells(relocation)["ftu"]["gap, paper"] == "+2.5"
-    assert cells(relocation)["ftu"]["not relocated, ours"] == "–"
+    assert cells(relocation)["ftu"]["not moved, ours"] == "–"
     assert cells(first)["fu"]["ours"] == "100.0, n = 6"
     assert cells(first)["ftu"]["paper, decoded"].startswith("67.8 [")
     assert cells(order)["SR"] == {"Measure": "SR", "paper": "ftu > fu", "ours": "ftu > fu"}
     assert cells(order)["SR, stage 1"]["ours"] == "fu > ftu"
     (pair,) = differences.rows
-    assert pair[:2] == ("ftu less fu", "+6.3")
+    assert pair[:2] == ("ftu minus fu", "+6.3")
     assert pair[2].startswith("+41.7 [")
     assert pair[6:] == ("a tie at this n", "no")
 
@@ -113,11 +113,11 @@ def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path:
     run_dir, out = write_run(), tmp_path / "paper.md"
     result = CliRunner().invoke(app, ["paper", str(run_dir), "--out", str(out)], env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
-    assert "Table 2: relocated and not relocated targets" in result.output
+    assert "Table 2: moved and not moved targets" in result.output
     text = out.read_text(encoding="utf-8")
     assert text.startswith(markdown_tables(paper.paper_tables(load_run(run_dir))))
     assert text.count("\n| ftu |") == 3
-    assert text.count("\n| ftu less fu |") == 2
+    assert text.count("\n| ftu minus fu |") == 2
 
 
 def test_power_is_of_the_papers_houses(write_run: WriteRun) -> None:
@@ -125,7 +125,7 @@ def test_power_is_of_the_papers_houses(write_run: WriteRun) -> None:
     pair = AgentPair("fu", "ftu", num_tasks=440, num_only_a=1, num_only_b=1, sr=effect, spl=effect)
     (row,) = paper.power_table([pair]).rows
     error = 0.03 / 1.96 * (110 / 90) ** 0.5
-    assert row[:2] == ("ftu less fu", "+6.3")
+    assert row[:2] == ("ftu minus fu", "+6.3")
     assert float(row[3]) == pytest.approx(280.16 * error, abs=0.06)
     # 6.3 points are 3.7 standard errors.
     assert float(row[4].rstrip("%")) == pytest.approx(100 * stats.norm.cdf(23 / 365 / error - 1.96), abs=0.6)

@@ -128,7 +128,7 @@ def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> Non
     table = tables.paired_table(load_run(write_run()).pairs)
     (row,) = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
     # ftu alone succeeds in six second stages, fu alone in one first stage.
-    assert (row["Agents"], row["only first / second"]) == ("ftu less fu", "6 / 1")
+    assert (row["Agents"], row["only first / second"]) == ("ftu minus fu", "6 / 1")
     assert row["SR difference [95% CI]"].startswith("+41.7 [")
     # The interval leaves 0 out, p does not suffice: six houses against half a house.
     assert (row["p"], row["SR verdict"], row["SPL verdict"]) == ("0.062", "a tie at this n", "a tie at this n")

@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 HOUSES = Path(evonav.__file__).parent / "data" / "houses.jsonl.gz"
 NUM_HOUSES, NUM_HOUSES_WITH_TWO_TASKS = 8, 4
 AGENTS = ("fu", "stage-reset", "random-walk")
-GROUPS = {"first": "stage_1", "relocated": "relocated", "not relocated": "not_relocated"}
+GROUPS = {"first": "stage_1", "moved": "relocated", "not moved": "not_relocated"}
 """Strata as `evonav breakdown` and as the summary name them."""
 
 
@@ -183,7 +183,7 @@ def test_pairs_are_the_same_everywhere(run: Path, summary: dict[str, Any], tmp_p
             "{:+.1f} [{:+.1f}, {:+.1f}]".format(*(100 * x for x in (pair[key], *pair[f"{key}_ci95"])))
             for key in ("sr", "spl")
         )
-        name = f"{b} less {a}"
+        name = f"{b} minus {a}"
         assert (paired[name][1], paired[name][3], paired[name][-1]) == (sr, spl, words)
         assert (overview[name][2], overview[name][4], overview[name][-1]) == (sr, spl, words)
         assert paired[name][2] == overview[name][3]  # p

@@ -77,22 +77,6 @@ def print_table(summaries: "list[AgentSummary]") -> None:
             typer.echo(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
 
 
-def print_failures(run: Path) -> None:
-    """Print how many attempts at stages failed, if any did, and the command that lists them."""
-    from collections import Counter
-
-    from evonav.evaluation.records.store import RunStore
-
-    with RunStore(run) as store:
-        failures = store.failures()
-    for is_retried, what in ((True, "tried again"), (False, "errored")):
-        kinds = Counter(failure.kind.phrase for failure in failures if failure.is_retried is is_retried)
-        for phrase, count in sorted(kinds.items()):
-            typer.echo(f"{count} {'stage' if count == 1 else 'stages'} {what}: {phrase}")
-    if failures:
-        typer.echo(f"why: evonav failures {run}")
-
-
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.1f}"
 

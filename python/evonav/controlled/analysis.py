@@ -167,7 +167,7 @@ def _drop_table(analysis: Analysis) -> Table:
     keys = {(fixed, agent, key) for agent in analysis.paired_agents for key in analysis.keys(agent)}
     num_houses = len({house_of(analysis.outcomes[arm, agent][key].row) for arm, agent, key in keys})
     notes = (
-        f"{num_houses} houses. Rates in %; changes in points, Not Fixed less Fixed, with 95% intervals (bootstrap by "
+        f"{num_houses} houses. Rates in %; changes in points, Not Fixed minus Fixed, with 95% intervals (bootstrap by "
         "house) and paired two-sided p (signs exchanged by house).",
         *_caveats(analysis),
     )
@@ -221,7 +221,7 @@ def _baseline_table(analysis: Analysis) -> Table:
         row += effect_cells(analysis.effect_on_change(BASELINE, agent, MEASURES["SR"]))[2:]
         rows.append(tuple(row))
     columns = ("agent", "pairs", "Fixed", "p", "Not Fixed", "p", "what the change does to it", "p")
-    notes = (f"SR of the agent less that of {BASELINE} on the same pairs, in points; last, Not Fixed less Fixed.",)
+    notes = (f"SR of the agent minus that of {BASELINE} on the same pairs, in points; last, Not Fixed minus Fixed.",)
     return Table("Against searching from scratch", columns, tuple(rows), notes)
 
 

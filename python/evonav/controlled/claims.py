@@ -47,26 +47,28 @@ def claims(analysis: Analysis) -> list[Claim]:
     if BASELINE in analysis.paired_agents:
         for agent in there:
             effect = analysis.effect((fixed, BASELINE), (fixed, agent), MEASURES["SR"])
-            add("Fixed: memory is ahead of Stage-Reset", f"{agent} less {BASELINE}, Fixed", effect)
+            add("Fixed: memory is ahead of Stage-Reset", f"{agent} minus {BASELINE}, Fixed", effect)
         if "fu" in there:
             effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"])
-            add("Not Fixed: FU is behind Stage-Reset", f"{BASELINE} less fu, Not Fixed", effect)
+            add("Not Fixed: FU is behind Stage-Reset", f"{BASELINE} minus fu, Not Fixed", effect)
             moved = moved_keys(analysis, "fu", BASELINE)
             effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"], moved)
-            add("the same", f"{BASELINE} less fu, Not Fixed, where the target moved", effect)
+            add("the same", f"{BASELINE} minus fu, Not Fixed, where the target moved", effect)
     for agent in there:
         effect = analysis.effect((evolved, agent), (fixed, agent), MEASURES["SR"])
-        add("Memory drops when the scene evolves", f"{agent}, Fixed less Not Fixed", effect)
+        add("Memory drops when the scene evolves", f"{agent}, Fixed minus Not Fixed", effect)
     for careful in ("msgnav", "ftu"):
         for trusting in ("3d-mem", "fu"):
             if careful in there and trusting in there:
                 effect = analysis.effect_on_change(trusting, careful, MEASURES["SR"])
-                add("MSGNav and FTU drop less than 3D-Mem and FU", f"drop of {trusting} less that of {careful}", effect)
+                add(
+                    "MSGNav and FTU drop less than 3D-Mem and FU", f"drop of {trusting} minus that of {careful}", effect
+                )
     if "ftu" in there:
         for agent in [*there, BASELINE]:
             if agent != "ftu" and agent in analysis.paired_agents:
                 effect = analysis.effect((evolved, agent), (evolved, "ftu"), MEASURES["SR"])
-                add("Not Fixed: FTU is best", f"ftu less {agent}, Not Fixed", effect)
+                add("Not Fixed: FTU is best", f"ftu minus {agent}, Not Fixed", effect)
     return found
 
 

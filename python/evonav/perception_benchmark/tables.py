@@ -76,7 +76,7 @@ def _differences(found: Sequence[Scores]) -> Table:
     heads = ("AP50", "AP", "precision", "recall", "F1", "located", "memory precision", "memory recall")
     return _table(
         "Perceptions against each other",
-        ((f"{each.word} less {each.less}", each.measures) for each in differences(found)),
+        ((f"{each.word} minus {each.less}", each.measures) for each in differences(found)),
         {head: (name, SIGNED) for head, name in zip(heads, (*COMPARED, *COMPARED_MEMORY), strict=True)},
         f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared.",
         first="perceptions",

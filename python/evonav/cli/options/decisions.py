@@ -92,16 +92,23 @@ def print_estimate(
         table.add_column(heading, justify="left" if heading in ("agent", "by kind") else "right")
     for found in estimates:
         kinds = ", ".join(f"{kind} {count:.0f}" for kind, count in found.kinds.items())
-        error = "?" if found.relative_error == float("inf") else f"+-{100 * found.relative_error:.0f}%"
+        error = _relative(found.relative_error)
         cost = "?" if price is None else f"{price.of(total_usage([found])):.2f}"
         counts = (f"{found.num_requests:.0f}", kinds, f"{found.input_tokens:.0f}", error, f"{found.output_tokens:.0f}")
         table.add_row(found.agent, *counts, cost)
     Console().print(table)
     typer.echo(
-        "Input tokens: 3 characters of text per token, images as gpt-4o counts them; likely too many. "
-        f"Output tokens: {OUTPUT_TOKENS} per answer, assumed. The interval is over tasks. A model that decides "
-        "differently is asked more or less often."
+        "Input tokens assume 3 characters of text per token, and images as gpt-4o counts them: likely too many. "
+        f"Output tokens assume {OUTPUT_TOKENS} per answer. The interval is over tasks (none if all or one were run). "
+        "A model that decides differently may be asked more or less often."
     )
+    if price is None:
+        typer.echo("no dollars: name a file of prices with --prices")
+
+
+def _relative(error: float) -> str:
+    """Return the half width of an interval over tasks; there is none if every task was run, or only one."""
+    return "-" if error in (0.0, float("inf")) else f"+-{100 * error:.0f}%"
 
 
 def print_spending(out: Path) -> None:

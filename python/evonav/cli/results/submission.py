@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_checks, progress_bar, show
+from evonav.cli.display import counted_as, print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
+from evonav.cli.options.shared import RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -49,7 +49,12 @@ def verify(
     workers: "RunSettings",
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A packed run, from `evonav pack`.")],
     tasks: Tasks = None,
-    limit: Limit = None,
+    limit: Annotated[
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="Replay only the first N tasks, and do not require the others. Default: all."
+        ),
+    ] = None,
     subset: Subset = None,
     scores_only: Annotated[
         bool,
@@ -68,10 +73,11 @@ def verify(
 
     from evonav.submission.verify import verdict_json, verify
 
-    with chosen_tasks(tasks, limit, subset) as task_files, progress_bar("replaying actions") as on_progress:
+    with chosen_tasks(tasks, None, subset) as task_files, progress_bar("replaying actions") as on_progress:
         verdict = verify(
             file,
             task_files,
+            limit=limit,
             scores_only=scores_only,
             num_workers=workers.num_workers,
             on_progress=on_progress,
@@ -92,6 +98,9 @@ def _print(file: Path, verdict: "Verdict") -> None:
         f"{file.name}: {'accepted' if verdict.is_accepted else 'REJECTED'}",
         ((check.name, *marks[check.is_passed], check.detail) for check in verdict.checks),
     )
+    num_tasks = 0 if verdict.submission is None else len(verdict.submission.tasks)
+    if verdict.is_accepted and verdict.num_required < num_tasks:
+        typer.echo(f"verified {verdict.num_required} of {counted_as(num_tasks, 'task')}; without --limit, all")
     if verdict.is_accepted and verdict.submission is not None:
         scores = Table(title="SR and SPL in %, as scored again")
         for column in ("agent", "n", "SR", "SPL"):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
+from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
 from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
@@ -22,6 +22,7 @@ from evonav.cli.options.shared import (
     chosen_tasks,
     names_of,
 )
+from evonav.cli.run.failures import print_failures
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Callable, Iterator

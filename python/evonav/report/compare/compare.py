@@ -27,7 +27,7 @@ MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_suc
 """Fields of a row that are compared unless others are asked for."""
 SAME_PROTOCOL = ("protocol.", "tasks", "num_tasks")
 """Settings that two runs have to share."""
-STRATA = {"stage_1": "first", "relocated": "relocated", "not_relocated": "not relocated"}
+STRATA = {"stage_1": "first", "relocated": "moved", "not_relocated": "not moved"}
 ALL = "all"
 GUIDED = EndState.GUIDED.value
 """State of stages that the evaluator guided: no agent is scored on them, and they do not count as missing."""
@@ -96,7 +96,7 @@ def compare(
     baseline: str | None = None,
     allow_differences: bool = False,
 ) -> list[Comparison]:
-    """Compare every pair of agents, or each agent with the baseline.
+    """Compare every pair of agents, the earlier minus the later, or each agent with the baseline.
 
     Of several runs with the same agents, an agent is compared with itself in the other runs.
 
@@ -173,7 +173,7 @@ def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> li
                 f"baseline {baseline!r} is none of {', '.join(compared.name for compared in compared_agents)}"
             )
         return [(first[0], compared) for compared in compared_agents if compared is not first[0]]
-    pairs = list(combinations(compared_agents, 2))
+    pairs = [(later, earlier) for earlier, later in combinations(compared_agents, 2)]
     num_runs = len({compared.run.run_dir.resolve() for compared in compared_agents})
     # Two runs of the same six agents: the question is what the settings changed, agent by agent.
     if 1 < num_runs < len(compared_agents):
@@ -199,9 +199,9 @@ def _compare(a: ComparedAgent, b: ComparedAgent, fields: Sequence[str], allow_di
     settings = config_differences(a, b)
     different = [key for key in settings if key.startswith(SAME_PROTOCOL)]
     if different and not allow_differences:
-        differing = "; ".join(f"{key} {settings[key][0]} and {settings[key][1]}" for key in different)
+        differing = "; ".join(f"{key} {settings[key][1]} and {settings[key][0]}" for key in different)
         raise InvalidArgumentError(
-            f"{a.name} and {b.name} were not run alike ({differing}); "
+            f"{b.name} and {a.name} were not run alike ({differing}); "
             "--allow-differences compares the stages that they have in common"
         )
     dropped: Counter[str] = Counter()
@@ -216,7 +216,7 @@ def _compare(a: ComparedAgent, b: ComparedAgent, fields: Sequence[str], allow_di
             dropped[reason] += 1
     if not pairs:
         reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
-        raise InvalidArgumentError(f"{a.name} and {b.name} have no scored stage in common ({reasons or 'no stages'})")
+        raise InvalidArgumentError(f"{b.name} and {a.name} have no scored stage in common ({reasons or 'no stages'})")
     groups = {ALL: pairs}
     for field in ("stratum", "mode"):
         for pair in pairs:

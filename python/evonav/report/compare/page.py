@@ -19,8 +19,8 @@ def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
     if len(comparisons) == 1:
         (one,) = comparisons
         gaps = tuple(_gap(part.effects["success"], part.label) for part in one.parts)
-        return GapPlot(f"SR of {one.b} less {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
-    gaps = tuple(_gap(one.all.effects["success"], f"{one.b} less {one.a}", "p (Holm)") for one in comparisons)
+        return GapPlot(f"SR of {one.b} minus {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
+    gaps = tuple(_gap(one.all.effects["success"], f"{one.b} minus {one.a}", "p (Holm)") for one in comparisons)
     return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")
 
 
@@ -33,7 +33,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
     """
     sections = [
         {
-            "title": f"{one.b} less {one.a}",
+            "title": f"{one.b} minus {one.a}",
             "plot": plot_elements([comparison_plot([one])])[0],
             "table": wording.part_table(one),
             "winners": [

@@ -38,7 +38,7 @@ MAX_FLIPS = 5
 """Stages that flipped, each way, in a terminal."""
 
 METHOD = f"Differences are of the same stages. {INTERVALS} {VERDICTS}"
-EXPLORING = "Parts are for reading on, not for claims: their p is not adjusted for the number of parts."
+EXPLORING = "Use parts to explore, not as claims: their p is not adjusted for the number of parts."
 
 
 def measure_name(field: str) -> str:
@@ -53,8 +53,8 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
         sr, spl = one.all.effects["success"], one.all.effects.get("spl")
         rows.append(
             (
-                f"{one.b} less {one.a}",
-                f"{100 * sr.mean_a:.1f} to {100 * sr.mean_b:.1f}",
+                f"{one.b} minus {one.a}",
+                f"{100 * sr.mean_b:.1f} and {100 * sr.mean_a:.1f}",
                 *effect_cells(sr),
                 *effect_cells(spl),
                 str(one.all.n),
@@ -78,8 +78,8 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
     )
     notes = (
         f"Percentage points. {METHOD}",
-        "Only: stages where only the first-named, or the second, succeeded. Detectable: the least true difference in "
-        "SR that so many such houses find at 5% four times in five.",
+        "Only: stages where only the first-named agent succeeded, or only the second. Detectable: the smallest true "
+        "difference in SR that this many houses would show at the 5% level four times in five.",
     )
     return Table("Paired differences", columns, tuple(rows), notes)
 
@@ -90,10 +90,11 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     for one in comparisons:
         effect = one.all.effects.get(field)
         if effect is not None:
-            shown = [f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
+            shown = [f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_b, effect.mean_a)]
             cells = effect_cells(effect, scale_of(field))
-            rows.append((f"{one.b} less {one.a}", *shown, *cells, says(one, field)))
-    columns = ("", "second", "first", "difference [95% CI]", p_heading(len(comparisons)), "")
+            rows.append((f"{one.b} minus {one.a}", *shown, *cells, says(one, field)))
+    names = (comparisons[0].b, comparisons[0].a) if len(comparisons) == 1 else ("first", "second")
+    columns = ("", *names, "difference [95% CI]", p_heading(len(comparisons)), "")
     sizes = sorted({one.all.n for one in comparisons})
     return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
 
@@ -112,7 +113,7 @@ def comparison_table(one: Comparison) -> Table:
     )
     columns = ("%", one.b, one.a, "difference [95% CI]", "p", "verdict")
     only = f"Only {one.b} succeeded in {one.all.num_only_b} stages, only {one.a} in {one.all.num_only_a}."
-    return Table(f"{one.b} less {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_notes_on(effects)))
+    return Table(f"{one.b} minus {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_notes_on(effects)))
 
 
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
@@ -126,13 +127,13 @@ def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
             (
                 part.label,
                 str(part.n),
-                *(f"{100 * mean:.1f}" for mean in (sr.mean_a, sr.mean_b)),
+                *(f"{100 * mean:.1f}" for mean in (sr.mean_b, sr.mean_a)),
                 *effect_cells(sr),
             )
             for part, sr in effects
         )
-        columns = ("SR %", "n", one.a, one.b, "difference [95% CI]", "p")
-        tables += [Table(f"SR of {one.b} less {one.a} by kind of stage", columns, rows, (EXPLORING,))]
+        columns = ("SR %", "n", one.b, one.a, "difference [95% CI]", "p")
+        tables += [Table(f"SR of {one.b} minus {one.a} by kind of stage", columns, rows, (EXPLORING,))]
         tables += [_short_flips(one)]
     return [table for table in tables if table.rows]
 
@@ -144,26 +145,26 @@ def _short_flips(one: Comparison) -> Table:
     rows = tuple((f"{flip.task_id} {flip.stage}", flip.category, _stratum(flip), flip.winner) for flip in shown)
     columns = ("Task and stage", "", "", "succeeded")
     num_more = len(one.flips) - len(rows)
-    notes = [f"{num_more} more flipped."] if num_more else []
-    notes.append("--md, --html and --json have them all, with the command that replays each.")
-    return Table(f"Stages that flipped between {one.a} and {one.b}", columns, rows, tuple(notes))
+    notes = [f"{num_more} more stages."] if num_more else []
+    notes.append("--md, --html and --json list all, with the command that replays each.")
+    return Table(f"Stages with different outcomes: {one.b} and {one.a}", columns, rows, tuple(notes))
 
 
 def part_table(one: Comparison) -> Table:
     """Build a table of one pair, on all stages, by stratum and by mode."""
     fields = list(one.all.effects)
-    columns = ["Stages", "n", "only first / second", f"SR % {one.a}", f"SR % {one.b}"]
+    columns = ["Stages", "n", "only first / second", f"SR % {one.b}", f"SR % {one.a}"]
     for field in fields:
         columns += [f"{measure_name(field)} difference [95% CI]", "p"]
     rows = []
     for part in one.parts:
         sr = part.effects["success"]
         cells = [part.label, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
-        cells += [f"{100 * sr.mean_a:.1f}", f"{100 * sr.mean_b:.1f}"]
+        cells += [f"{100 * sr.mean_b:.1f}", f"{100 * sr.mean_a:.1f}"]
         for field in fields:
             cells += effect_cells(part.effects.get(field), scale_of(field))
         rows.append(tuple(cells))
-    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_notes_on(fields)))
+    return Table(f"{one.b} minus {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_notes_on(fields)))
 
 
 def _notes_on(fields: Iterable[str]) -> tuple[str, ...]:
@@ -181,7 +182,7 @@ def flip_table(one: Comparison) -> Table:
         if flip.winner == winner
     ]
     columns = ("Task and stage", "category", "stage is", "succeeded", "failed")
-    return Table(f"Stages that flipped between {one.a} and {one.b}", columns, tuple(rows))
+    return Table(f"Stages with different outcomes: {one.b} and {one.a}", columns, tuple(rows))
 
 
 def statements(comparisons: Sequence[Comparison]) -> list[str]:
@@ -208,8 +209,8 @@ def warnings(comparisons: Sequence[Comparison]) -> list[str]:
             reasons = ", ".join(f"{count} {reason}" for reason, count in one.dropped.items())
             lines.append(f"{one.b} and {one.a}: {sum(one.dropped.values())} stages are not compared: {reasons}.")
         if one.settings:
-            differing = "; ".join(f"{key}: {a} / {b}" for key, (a, b) in one.settings.items())
-            lines.append(f"{one.a} and {one.b} were run with different settings: {differing}.")
+            differing = "; ".join(f"{key}: {b} / {a}" for key, (a, b) in one.settings.items())
+            lines.append(f"{one.b} and {one.a} were run with different settings: {differing}.")
     return lines
 
 
@@ -221,18 +222,18 @@ def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 
     on = f"on {effect.n} stages of {effect.num_clusters} houses"
     verdict = effect.verdict
     if verdict == "equal":
-        return f"{a} and {b} are equal on every one of {effect.n} stages."
+        return f"{a} and {b} are equal on each of {effect.n} stages."
     if verdict == "few":
-        return f"{b} less {a}: {measured} {on}: fewer than {MIN_CLUSTERS} houses, or all alike, are too few to tell."
+        return f"{b} minus {a}: {measured} {on}: with fewer than {MIN_CLUSTERS} houses, or all alike, one cannot tell."
     if verdict == "tie":
         least = "" if effect.detectable is None else f"{amount(effect.detectable, field)} "
         found = f" (a true difference of {least}would be found four times in five)" if least else ""
-        return f"{b} less {a}: {measured} {on}: a tie at this n{found}."
+        return f"{b} minus {a}: {measured} {on}: a tie at this n{found}."
     ahead, behind = (b, a) if verdict == "b" else (a, b)
     if field not in RATES:
-        return f"{b} less {a}: {measured} {on}: they differ."
+        return f"{b} minus {a}: {measured} {on}: they differ."
     relative = "" if effect.relative is None else f", {100 * effect.relative:+.0f}% of {a}'s"
-    return f"{ahead} is ahead of {behind}: {b} less {a} is {measured}{relative} {on}."
+    return f"{ahead} is ahead of {behind}: {b} minus {a} is {measured}{relative} {on}."
 
 
 def says(one: Comparison, field: str = "success") -> str:

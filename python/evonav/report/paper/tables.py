@@ -95,7 +95,7 @@ def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Ta
         needed = "–" if gap == 0 else f"{math.ceil(num_houses * (least / gap) ** 2)}"
         rows.append(
             (
-                f"{pair.b} less {pair.a}",
+                f"{pair.b} minus {pair.a}",
                 f"{100 * gap:+.1f}",
                 f"±{100 * 1.96 * error:.1f}",
                 f"{100 * least:.1f}",
@@ -140,18 +140,18 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
         rows.append((s.agent, *cells, *(number(value, scale=100, is_signed=True) for value in (gap, ours))))
     columns = (
         "Agent",
-        "relocated, paper",
-        "relocated, ours",
-        "not relocated, paper",
-        "not relocated, ours",
+        "moved, paper",
+        "moved, ours",
+        "not moved, paper",
+        "not moved, ours",
         "gap, paper",
         "gap, ours",
     )
     note = (
-        f"SR %. Relocated: the target had ever moved since stage 1; paper n = {NUM_STAGES['relocated']} and "
-        f"{NUM_STAGES['not_relocated']}. Gap: relocated less not relocated, percentage points."
+        f"SR %. Moved (the paper: relocated): the target had ever moved since stage 1; paper n = "
+        f"{NUM_STAGES['relocated']} and {NUM_STAGES['not_relocated']}. Gap: moved minus not moved, percentage points."
     )
-    return Table("Table 2: relocated and not relocated targets", columns, tuple(rows), (note,))
+    return Table("Table 2: moved and not moved targets", columns, tuple(rows), (note,))
 
 
 def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
@@ -199,7 +199,7 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
         ends = pair.sr.ci95
         rows.append(
             (
-                f"{pair.b} less {pair.a}",
+                f"{pair.b} minus {pair.a}",
                 f"{100 * theirs:+.1f}",
                 points(pair.sr),
                 p_words(pair.sr.adjusted_p),

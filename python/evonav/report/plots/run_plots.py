@@ -19,7 +19,7 @@ PLOTTED = (
 TABLED = (("path-length", "success"), ("room-count", "success"), ("radius", "success"))
 """Breakdowns that have no table of their own elsewhere on the page."""
 _CAPTIONS = {
-    "stratum": "First: stage 1. Relocated: the target had moved since stage 1, at any time.",
+    "stratum": "First: stage 1. Moved: the target had moved since stage 1, at any time.",
     "mode": "What changed in the house just before the stage.",
     "path-length": "Shortest path from where the agent began the stage to the target.",
     "earlier-stages": "Number of stages of the task before this one, which memory may know.",
@@ -49,7 +49,7 @@ def run_plots(run: Run) -> list[tuple[Plot, str]]:
         caption = "On the stages that both scored; 95% intervals, bootstrap by house. Blue: ahead, as the table says."
         for name in ("SR", "SPL"):
             gaps = tuple(
-                Gap.of(f"{pair.b} less {pair.a}", f"n = {pair.n}", pair.sr if name == "SR" else pair.spl)
+                Gap.of(f"{pair.b} minus {pair.a}", f"n = {pair.n}", pair.sr if name == "SR" else pair.spl)
                 for pair in run.pairs
             )
             plot = GapPlot(f"{name} differences, points", gaps, "the second is better", "the first is better")

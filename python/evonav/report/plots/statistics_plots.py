@@ -86,13 +86,13 @@ def _goals(found: TaskStatistics) -> BarPlot | None:
     value, paper, ends = goals.raw.value, goals.paper or 0.0, goals.raw.ci95
     others = None if ends is None else (1 - ends[1], 1 - ends[0])
     series = [_series(OURS, (value, 1 - value), (ends, others))]
-    notes = [f"relocated: {_percent(goals.raw)}, paper {100 * paper:.1f}%"]
+    notes = [f"moved: {_percent(goals.raw)}, paper {100 * paper:.1f}%"]
     if goals.reweighted is not None:
         series.append(_series(REWEIGHTED, (goals.reweighted.value, 1 - goals.reweighted.value)))
         notes.append(f"reweighted: {_percent(goals.reweighted)}")
     return BarPlot(
         title="Goals of stages 2 and on",
-        groups=("relocated before", "not relocated"),
+        groups=("moved before", "not moved"),
         series=tuple(series),
         x_label=f"n = {goals.n}",
         references=(100 * paper, 100 * (1 - paper)),

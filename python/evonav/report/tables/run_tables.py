@@ -96,7 +96,7 @@ def statements(run: Run) -> list[str]:
     for pair in pairs:
         effects = (("SR", pair.sr), ("SPL", pair.spl))
         found = (f"{name} {points(one)} points, {tables.verdict_words(pair.a, pair.b, one)}" for name, one in effects)
-        lines.append(f"{pair.b} less {pair.a}, on the {pair.n} stages that both scored: {'; '.join(found)}.")
+        lines.append(f"{pair.b} minus {pair.a}, on the {pair.n} stages that both scored: {'; '.join(found)}.")
     return lines
 
 

@@ -176,8 +176,8 @@ def mode_words(mode: str) -> str:
 
 SPLIT_TITLES = {
     "stage_1": "stage 1",
-    "relocated": "target relocated",
-    "not_relocated": "target not relocated",
+    "relocated": "moved",
+    "not_relocated": "not moved",
     **MODES,
 }
 """The splits of `AgentSummary`, in reading order."""
@@ -186,8 +186,8 @@ SPLIT_TITLES = {
 def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
     """Build the table of SR on stage 1 and on the paper's two strata of the later stages."""
     names = ("stage_1", "relocated", "not_relocated")
-    note = "Relocated: the target had moved since stage 1, at any time. Both columns are of stages 2 and later."
-    return _split_table("By relocation of the target", summaries, names, (note,))
+    note = "Moved: the target had moved since stage 1, at any time. Both columns are of stages 2 and later."
+    return _split_table("By whether the target moved", summaries, names, (note,))
 
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:
@@ -229,7 +229,7 @@ def paired_table(pairs: Sequence[AgentPair]) -> Table:
     )
     rows = tuple(
         (
-            f"{pair.b} less {pair.a}",
+            f"{pair.b} minus {pair.a}",
             *effect_cells(pair.sr),
             verdict_words(pair.a, pair.b, pair.sr),
             *effect_cells(pair.spl),

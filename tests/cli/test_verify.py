@@ -1,0 +1,22 @@
+"""`evonav verify`: what a limit requires, and what it says."""
+
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.evaluation.run.run import evaluate
+from evonav.submission.pack import pack
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
+
+
+def test_a_limit_requires_and_replays_only_the_first_tasks(tmp_path: Path) -> None:
+    with bundled_tasks() as folder:
+        evaluate(["ftu"], task_files(folder, 2), tmp_path / "two", num_workers=0)
+    pack(tmp_path / "two", tmp_path / "two.zip")
+    words = ["verify", str(tmp_path / "two.zip"), "--workers", "0", "--limit"]
+    for limit, code, told in (("1", 0, "verified 1 of 2 tasks"), ("2", 0, "accepted"), ("3", 1, "is missing")):
+        shown = CliRunner().invoke(app, [*words, limit], env={"COLUMNS": "200"})
+        assert (shown.exit_code, told in shown.stdout) == (code, True), shown.stdout
+    assert "verified" not in CliRunner().invoke(app, [*words, "2"]).stdout
