@@ -3,6 +3,7 @@ from .agents.agent import Agent, Move, NavigateTo, SensorConfig, Stop
 from .api.evaluate import evaluate
 from .api.loading import generate_tasks, load_houses, load_tasks
 from .api.run import Run, load_run
+from .api.simulator import Simulator
 from .errors import EvonavError
 from .evaluation.contract.check import check_agent
 from .memory.objects import ObjectMap
@@ -26,6 +27,7 @@ __all__ = [
     "Pose",
     "Run",
     "SensorConfig",
+    "Simulator",
     "Stop",
     "TaskInfo",
     "__version__",

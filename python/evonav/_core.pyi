@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.unigoal.bev import BevConfig
+from evonav.drawing.pictures import Picture
 from evonav.memory.objects import ObjectMapConfig, SightConfig
 from evonav.memory.occupancy import FrontierConfig
 from evonav.sensors.observation import MapFrame, View
@@ -36,7 +37,7 @@ class House:
     Metres in AI2-THOR's frame: x right, y up, z forward.
     """
 
-    def __new__(cls, json: str, *, name: str) -> House:
+    def __new__(cls, json: str, *, name: str = "house") -> House:
         """Read and check one house; `HouseError` names house, object, field and value."""
 
     @property
@@ -85,6 +86,10 @@ class House:
         `HouseError` if an asset is unknown, unless allowed: then it has the size and shape of its category.
         """
 
+    def plot(self) -> Picture:
+        """Draw the house from above, with the names of rooms and furniture."""
+
+    def _repr_html_(self) -> str: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[str], dict[str, Any]]: ...

@@ -12,10 +12,14 @@ def map_css() -> Markup:
     return Markup(text)  # noqa: S704 - our own file
 
 
-def file_css() -> str:
-    """Return the same for a file of its own: colours written out, since few programs know custom properties."""
+def file_css(more: str = "") -> str:
+    """Return the style of a file of its own: colours written out, since few programs know custom properties.
+
+    Args:
+        more: Further rules.
+    """
     _, dark, rules = str(map_css()).split("/* --- */")
-    return f"{light_css()}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
+    return f"{light_css(more)}@media (prefers-color-scheme:dark){{{_inlined(rules + more, dark)}}}"
 
 
 def light_css(more: str = "") -> str:

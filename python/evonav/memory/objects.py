@@ -1,13 +1,18 @@
 """Merge detections into lasting object entries: the object map."""
 
+from collections import Counter
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav._core import ObjectEntry
+from evonav._core import House, ObjectEntry
 from evonav.sensors.observation import View
+
+if TYPE_CHECKING:  # agents start fast, and few draw
+    from evonav.drawing.pictures import Picture
 
 __all__ = ["Comparison", "ObjectEntry", "ObjectMap", "ObjectMapConfig", "ObjectUpdate", "SightConfig"]
 
@@ -134,6 +139,23 @@ class ObjectMap:
     def clear(self) -> None:
         """Remove all entries; the map is as new, ids included."""
         self._map.clear()
+
+    def __repr__(self) -> str:
+        """Return the number of entries and the most common labels."""
+        counts = Counter(entry.label for entry in self.entries).most_common(3)
+        shown = "".join(f", {count} {label}" for label, count in counts)
+        return f"ObjectMap({len(self)} entries{shown}{', ...' if len(self) > sum(n for _, n in counts) else ''})"
+
+    def plot(self, house: House | None = None) -> "Picture":
+        """Draw the entries from above.
+
+        Args:
+            house: A house to draw them over.
+        """
+        from evonav.drawing.pictures import boxes_picture
+
+        boxes = [(entry.label, entry.centre_m, entry.size_m) for entry in self.entries]
+        return boxes_picture(boxes, f"{len(boxes)} object entries", house)
 
     def update(self, view: View) -> ObjectUpdate:
         """Integrate one view.

@@ -2,18 +2,24 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
 from evonav._core import Frontier
-from evonav.sensors.observation import MapFrame, VisibleOccupancy
+from evonav.sensors.observation import MapFrame, View, VisibleOccupancy
+
+if TYPE_CHECKING:  # agents start fast, and few draw
+    from evonav.drawing.pictures import Picture
 
 __all__ = ["BLOCKED", "FREE", "UNKNOWN", "Conflicts", "Frontier", "FrontierConfig", "OccupancyMap"]
 
 UNKNOWN, FREE, BLOCKED = 0, 1, 2
 """Values of `OccupancyMap.cells`."""
+EXPLORED = 3
+"""Value of a free cell that was seen from near, in pictures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +112,25 @@ class OccupancyMap:
         return Conflicts(
             *self._map.integrate(seen.free, seen.blocked, origin_m=origin_m, explored_range_m=self.explored_range_m)
         )
+
+    def update(self, view: View) -> Conflicts:
+        """Integrate the cells that a view saw: `integrate` with the view's own occupancy and position."""
+        return self.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+
+    def __repr__(self) -> str:
+        """Return the size and the numbers of known cells."""
+        cells, frame = self.cells, self.map_frame
+        num_free, num_blocked = int((cells == FREE).sum()), int((cells == BLOCKED).sum())
+        size = f"{frame.rows} x {frame.cols} cells of {frame.cell_m:g} m"
+        return f"OccupancyMap({size}: {num_free} free, {num_blocked} blocked)"
+
+    def plot(self) -> "Picture":
+        """Draw the cells from above, explored ones in blue, with the frontiers."""
+        from evonav.drawing.pictures import cells_picture
+
+        cells = np.where((self.cells == FREE) & self.explored, EXPLORED, self.cells).astype(np.uint8)
+        points = [(f"frontier {frontier.id}", frontier.position_m) for frontier in self.frontiers]
+        return cells_picture(cells, self.map_frame, points, "occupancy map")
 
     def explore_around(self, centre_m: tuple[float, float], radius_m: float = 0.7) -> None:
         """Mark the free cells around `(x, z)` as explored: where the agent has been, it has looked."""

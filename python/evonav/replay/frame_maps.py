@@ -1,26 +1,20 @@
 """Draw what an agent believed and did in one round, as SVG over the map of its house."""
 
-import base64
 import math
 from collections.abc import Mapping
-from io import BytesIO
-
-import numpy as np
-from PIL import Image
 
 from evonav.drawing.floor_plan import Frame
+from evonav.drawing.layers import cells_layer, sector
 from evonav.drawing.svg import cm, cross, escape, join, polyline
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
-from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage
+from evonav.replay.types import ReplayedEntry, ReplayedRound, ReplayedStage
 from evonav.report.maps.stage_map import house_drawing
 from evonav.report.maps.trajectory import ring, start_mark, target_mark
 from evonav.tasks.language import noun_of
 
 MAX_ENTRY_CM = 600.0
-CELL_COLOURS = ((208, 212, 218), (228, 235, 248), (121, 127, 139), (196, 224, 249))
-"""RGB of unknown, free, blocked and explored cells, as in the viewer on a light page."""
 UNKNOWN_COLOUR = "#d0d4da"
-"""The first of these, which also lies beyond the agent's map."""
+"""The colour of unknown cells, which also lies beyond the agent's map."""
 _TAG_UNITS = 2.6
 """Height of the names of entries, in units of a frame."""
 
@@ -52,7 +46,12 @@ def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str
         f'{r:.0f}l{-r:.0f} {-r:.0f}z"/>'
         for x, y in (cm(frontier.position_m) for frontier in step.frontiers)
     )
-    return _cells(step.map) + join(entries) + join(diamonds) + way_layer(stage, step, frame)
+    return (
+        cells_layer(step.map.cells, step.map.cell_m, step.map.corner_m)
+        + join(entries)
+        + join(diamonds)
+        + way_layer(stage, step, frame)
+    )
 
 
 def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
@@ -80,7 +79,7 @@ def way_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
     return (
         ("" if start is None else start_mark(cm((start.x_m, start.z_m)), frame, "start"))
         + _trail(stage, step, u)
-        + join(_sight(at, yaw_rad, stage.fov_rad, reach_cm, css) for yaw_rad, reach_cm, css in sights)
+        + join(sector(at, yaw_rad, stage.fov_rad, reach_cm, css) for yaw_rad, reach_cm, css in sights)
         + f'<circle class="agent" cx="{at[0]}" cy="{at[1]}" r="{1.5 * u:.1f}" stroke-width="{0.5 * u:.1f}"/>'
     )
 
@@ -124,28 +123,3 @@ def _entry(entry: ReplayedEntry, frame: Frame, *, is_candidate: bool, is_chosen:
         tag = f'<text class="tag {css}" {size} {place}>{escape(name)}</text>'
     line = f'stroke-width="{(0.75 if is_chosen else 0.35) * u:.1f}"'
     return f'<g class="entry {css}" {line}><rect {box}/>{mark}</g>{tag}'
-
-
-def _cells(found: ReplayedMap) -> str:
-    """Return an agent's map as an image."""
-    rows, cols = found.cells.shape
-    picture = Image.fromarray(np.ascontiguousarray(found.cells[::-1]))
-    picture.putpalette([value for colour in CELL_COLOURS for value in colour])
-    buffer = BytesIO()
-    picture.save(buffer, "PNG", compress_level=1)
-    cell_cm = 100 * found.cell_m
-    x, y = cm(found.corner_m)
-    box = f'x="{x}" y="{y - rows * cell_cm:.0f}" width="{cols * cell_cm:.0f}" height="{rows * cell_cm:.0f}"'
-    look = 'preserveAspectRatio="none" image-rendering="optimizeSpeed"'
-    uri = f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
-    return f'<image {box} {look} href="{uri}"/>'
-
-
-def _sight(at: tuple[int, int], yaw_rad: float, fov_rad: float, reach_cm: float, css: str) -> str:
-    """Return the sector that a view looks at."""
-    (ax, ay), (bx, by) = (
-        (at[0] + reach_cm * math.sin(turn), at[1] - reach_cm * math.cos(turn))
-        for turn in (yaw_rad - fov_rad / 2, yaw_rad + fov_rad / 2)
-    )
-    arc = f"A{reach_cm:.0f} {reach_cm:.0f} 0 0 1 {bx:.0f} {by:.0f}"
-    return f'<path class="{css}" d="M{at[0]} {at[1]}L{ax:.0f} {ay:.0f}{arc}z"/>'

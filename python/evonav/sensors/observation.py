@@ -1,6 +1,6 @@
 """An agent's input in a decision round, without simulator ids and oracle data."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,13 @@ from evonav.world.simulator import Intrinsics
 class Detections:
     """Objects found in one image. Detection `i` covers `masks == i`; its number means nothing in other views."""
 
-    masks: NDArray[np.int32]
+    masks: NDArray[np.int32] = field(repr=False)
     """`(H, W)` index of the detection, -1 where nothing was detected."""
     labels: tuple[str, ...]
     """The detections' labels; with perfect perception, ProcTHOR's object types."""
-    confidences: NDArray[np.float32]
+    confidences: NDArray[np.float32] = field(repr=False)
     """`(N,)` confidences, 0 to 1."""
-    features: NDArray[np.float32] | None = None
+    features: NDArray[np.float32] | None = field(default=None, repr=False)
     """`(N, D)` unit image features (CLIP), if the perception computes them."""
 
 
@@ -27,9 +27,9 @@ class Detections:
 class VisibleOccupancy:
     """Cells of the oracle occupancy that rays from a camera pose reach: free ones and each ray's first blocked one."""
 
-    free: NDArray[np.int32]
+    free: NDArray[np.int32] = field(repr=False)
     """`(F, 2)` free cells `[row, col]`, sorted."""
-    blocked: NDArray[np.int32]
+    blocked: NDArray[np.int32] = field(repr=False)
     """`(B, 2)` blocked cells `[row, col]`, sorted."""
 
 
@@ -43,11 +43,11 @@ class View:
     Its `y_m` is the height of the optical centre above the floor; that of `Observation.pose` is the body's.
     """
     intrinsics: Intrinsics
-    depth_m: NDArray[np.float32]
+    depth_m: NDArray[np.float32] = field(repr=False)
     """`(H, W)` planar depth in metres, `inf` where nothing is."""
     detections: Detections
     occupancy: VisibleOccupancy
-    rgb: NDArray[np.uint8] | None = None
+    rgb: NDArray[np.uint8] | None = field(default=None, repr=False)
     """`(H, W, 3)` colours; `None` if the agent declared that it does not need them."""
 
 
@@ -80,7 +80,7 @@ class Observation:
 
     The agent must look and remember, and must not expect the effects of its own actions.
     """
-    goal_feature: NDArray[np.float32] | None = None
+    goal_feature: NDArray[np.float32] | None = field(default=None, repr=False)
     """`(D,)` unit text feature of the stage's instruction, if the perception computes one.
 
     It is comparable with `Detections.features`.

@@ -1,6 +1,6 @@
 """The public part of a task: all that an agent receives."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,5 +34,5 @@ class Goal:
     basic_instruction: str
     appearance_instruction: str
     unified_instruction: str
-    reference_image: NDArray[np.uint8]
+    reference_image: NDArray[np.uint8] = field(repr=False)
     """`(300, 300, 3)` RGB image."""

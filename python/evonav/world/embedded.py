@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.errors import SimulationError
+from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
@@ -25,7 +25,7 @@ class EmbeddedSimulator:
 
     Example:
         >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
-        >>> simulator.reset(house.to_json())  # doctest: +SKIP
+        >>> simulator.reset(house)  # doctest: +SKIP
         >>> simulator.render(rgb=False).depth_m.shape  # doctest: +SKIP
         (300, 300)
     """
@@ -38,6 +38,10 @@ class EmbeddedSimulator:
             allow_unknown_assets: Whether to draw assets that the catalogue lacks (Objaverse's) in the usual size of
                 their category; otherwise such a house is refused.
         """
+        if config is not None and not isinstance(config, SimulatorConfig):
+            raise InvalidArgumentError(
+                f"config = {config!r}: expected a `SimulatorConfig`; give a house to `reset`, or to `evonav.Simulator`"
+            )
         self.config = config or SimulatorConfig()
         self.allow_unknown_assets = allow_unknown_assets
         self.intrinsics = self.config.intrinsics
@@ -46,16 +50,16 @@ class EmbeddedSimulator:
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._objects: tuple[SceneObject, ...] | None = None
 
-    def reset(self, house_json: str, pose: Pose | None = None, *, name: str = "house") -> Pose:
+    def reset(self, house: str | _core.House, pose: Pose | None = None, *, name: str | None = None) -> Pose:
         """Load a house; the agent stands at `pose`, or at the house's own start.
 
         If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
 
         Args:
-            house_json: A ProcTHOR house.
+            house: A ProcTHOR house, or its JSON.
             pose: Requested pose of the agent.
-            name: Name of the house in errors.
+            name: Name of the house in errors. Default: its own, or `house`.
 
         Returns:
             The effective pose.
@@ -64,9 +68,13 @@ class EmbeddedSimulator:
             HouseError: The house is malformed or contains an unknown asset.
             SimulationError: The agent fits nowhere.
         """
+        if isinstance(house, _core.House):
+            name = name or house.name
+            house = house.to_json()
+        self._house_name = name or "house"
         core = _core.EmbeddedSimulator(
-            house_json,
-            name=name,
+            house,
+            name=self._house_name,
             image_px=(self.config.width_px, self.config.height_px),
             vertical_fov_rad=self.intrinsics.vertical_fov_rad,
             clip_m=(self.config.near_m, self.config.far_m),
@@ -75,7 +83,6 @@ class EmbeddedSimulator:
             agent_height_m=self.config.agent_height_m,
             allow_unknown_assets=self.allow_unknown_assets,
         )
-        self._house_name = name
         return self._enter(core, pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
@@ -125,9 +132,18 @@ class EmbeddedSimulator:
         return self._objects
 
     def step(self, action: Action) -> bool:
-        """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
+        """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing.
+
+        Raises:
+            InvalidArgumentError: It is no `Action`.
+            SimulationError: There is no house yet.
+        """
+        if not isinstance(action, Action):
+            names = ", ".join(f"Action.{one.name}" for one in Action)
+            raise InvalidArgumentError(f"action = {action!r}: expected one of {names}")
+        world = self._world
         requested = self.config.stepped(self._pose, action)
-        if action is Action.MOVE_FORWARD and not self._world.can_move(_on_ground(self._pose), _on_ground(requested)):
+        if action is Action.MOVE_FORWARD and not world.can_move(_on_ground(self._pose), _on_ground(requested)):
             return False
         if action is not Action.STOP:
             self._pose = requested

@@ -13,7 +13,16 @@ use crate::error;
 /// Id, category, and outline, lowest and highest height of each convex part.
 type ObjectFootprints = (String, String, Vec<(Vec<Vec2>, f64, f64)>);
 
-/// Shapes, units and errors: `_core.pyi` and `evonav_core::house`.
+/// A ProcTHOR house (schema 0.0.1 or 1.0.0), checked; the document is stored without loss.
+///
+/// Metres in AI2-THOR's frame: x right, y up, z forward. `plot()` draws it from above.
+///
+/// Example:
+///     >>> import evonav
+///     >>> house = evonav.load_houses("bundled")[1]
+///     >>> [room.room_type for room in house.rooms]
+///     ['Bedroom', 'LivingRoom']
+///     >>> picture = house.plot()
 #[pyclass(frozen, eq, module = "evonav._core")]
 #[derive(PartialEq)]
 pub struct House {
@@ -72,7 +81,7 @@ pub struct HouseObject {
 #[pymethods]
 impl House {
     #[new]
-    #[pyo3(signature = (json, *, name))]
+    #[pyo3(signature = (json, *, name = "house"))]
     fn new(py: Python<'_>, json: &str, name: &str) -> PyResult<Self> {
         let inner = py.detach(|| house::House::from_json(name, json)).map_err(error::to_py)?;
         Ok(Self { inner })
@@ -91,6 +100,14 @@ impl House {
         let house = &self.inner;
         let (num_rooms, num_objects) = (house.rooms.len(), house.objects.len());
         format!("House({:?}, {num_rooms} rooms, {num_objects} objects)", house.name)
+    }
+
+    fn plot<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("evonav.drawing.pictures")?.call_method1("house_picture", (slf,))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::plot(slf)?.call_method0("_repr_html_")
     }
 
     #[getter]
@@ -160,6 +177,49 @@ impl House {
     #[getter]
     fn objects(&self) -> Vec<HouseObject> {
         self.inner.objects.iter().map(|entry| object(&self.inner, entry)).collect()
+    }
+}
+
+#[pymethods]
+impl Room {
+    fn __repr__(&self) -> String {
+        let corners = self.polygon_m.iter().zip(self.polygon_m.iter().cycle().skip(1));
+        let doubled: f64 = corners.map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum();
+        let area_m2 = doubled.abs() / 2.0;
+        format!("Room(id={:?}, type={:?}, area_m2={area_m2:.1})", self.id, self.room_type)
+    }
+}
+
+#[pymethods]
+impl Wall {
+    fn __repr__(&self) -> String {
+        let ((x0, z0), (x1, z1)) = (self.from_m, self.to_m);
+        let (id, room) = (&self.id, &self.room_id);
+        format!(
+            "Wall(id={id:?}, room_id={room:?}, from_m=({x0:.2}, {z0:.2}), to_m=({x1:.2}, {z1:.2}))"
+        )
+    }
+}
+
+#[pymethods]
+impl Opening {
+    fn __repr__(&self) -> String {
+        let (a, b) = &self.room_ids;
+        format!("Opening(id={:?}, room_ids=({a:?}, {b:?}), openness={:?})", self.id, self.openness)
+    }
+}
+
+#[pymethods]
+impl HouseObject {
+    fn __repr__(&self) -> String {
+        let (x, y, z) = self.position_m;
+        let text =
+            |name: &Option<String>| name.as_ref().map_or("None".into(), |t| format!("{t:?}"));
+        let (category, room) = (text(&self.category), text(&self.room_id));
+        format!(
+            "HouseObject(id={:?}, category={category}, position_m=({x:.2}, {y:.2}, {z:.2}), room_id={room})",
+            self.id
+        )
     }
 }
 

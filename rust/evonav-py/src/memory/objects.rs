@@ -50,6 +50,17 @@ impl ObjectEntry {
     }
 }
 
+#[pymethods]
+impl ObjectEntry {
+    fn __repr__(&self) -> String {
+        let ((x, y, z), id, label) = (self.centre_m, self.id, &self.label);
+        let num = self.num_detections;
+        format!(
+            "ObjectEntry(id={id}, label={label:?}, centre_m=({x:.2}, {y:.2}, {z:.2}), num_detections={num})"
+        )
+    }
+}
+
 /// Detections merged into lasting entries.
 #[pyclass(module = "evonav._core")]
 pub struct ObjectMap(objects::ObjectMap);

@@ -21,6 +21,11 @@ pub struct Frontier(frontiers::Frontier);
 
 #[pymethods]
 impl Frontier {
+    fn __repr__(&self) -> String {
+        let ([x, z], num_cells) = (self.0.position_m, self.0.cells.len());
+        format!("Frontier(id={}, position_m=({x:.2}, {z:.2}), num_cells={num_cells})", self.0.id)
+    }
+
     #[getter]
     fn id(&self) -> u64 {
         self.0.id
