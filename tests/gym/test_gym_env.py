@@ -58,6 +58,7 @@ def test_gymnasiums_checker_finds_nothing(settings):
         "assert not any('evonav' in type(finder).__module__ for finder in sys.meta_path)",
         "import gymnasium; import evonav; make, name = gymnasium.make, 'evonav/LifelongNav-v0'",
         "from gymnasium import make; name = 'evonav:evonav/LifelongNav-v0'",
+        "import evonav.gym; from gymnasium import make; name = 'evonav/LifelongNav-v0'",
     ],
 )
 def test_the_environment_can_be_made_whatever_was_imported_first(code):

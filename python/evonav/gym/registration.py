@@ -1,12 +1,12 @@
 """Register the environment's id without importing the simulator or tasks."""
 
-import gymnasium
-
 ENV_ID = "evonav/LifelongNav-v0"
 
 
 def register() -> None:
     """Register the id for `gymnasium.make` and `gymnasium.make_vec`; safe to call twice."""
+    import gymnasium  # importing it may call this function, which must be there by then
+
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(
             id=ENV_ID,
