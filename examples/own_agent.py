@@ -3,16 +3,13 @@
     evonav check-agent ./examples/own_agent.py:OwnAgent
     evonav evaluate --agent ./examples/own_agent.py:OwnAgent --agent fu --out out/mine
 
-An agent is any class with these three methods; there is nothing to inherit from. This one looks at no instruction but
-the category, and believes what it remembers: it stops where a thing has been.
+An agent is any class with these three methods, and `explain` for pictures; there is nothing to inherit from. This one
+looks at no instruction but the category, and believes what it remembers: it stops where a thing has been.
 """
 
 import math
 
-from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop
-from evonav.memory import ObjectMap, OccupancyMap
-from evonav.sensors.observation import Observation
-from evonav.tasks.public import Goal, TaskInfo
+from evonav import Explanation, Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, SensorConfig, Stop, TaskInfo
 
 
 class OwnAgent:
@@ -30,7 +27,7 @@ class OwnAgent:
         self.category = goal.category
         self.target_m: tuple[float, float] | None = None
 
-    def act(self, observation: Observation) -> AgentAction:
+    def act(self, observation: Observation) -> NavigateTo | Stop:
         """One decision round."""
         here = (observation.pose.x_m, observation.pose.z_m)
         for view in observation.views:
@@ -48,3 +45,7 @@ class OwnAgent:
             return Stop("nothing left to explore")
         nearest = min(frontiers, key=lambda frontier: math.dist(frontier.position_m, here))
         return NavigateTo(nearest.position_m)
+
+    def explain(self) -> Explanation:
+        """What `evonav view` draws: the map and the remembered objects."""
+        return Explanation(map=self.map, objects=self.objects)

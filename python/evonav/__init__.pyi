@@ -1,5 +1,6 @@
 from ._core import House, __version__
 from .agents.agent import Agent, Move, NavigateTo, SensorConfig, Stop
+from .agents.explanation import Explanation
 from .api.evaluate import evaluate
 from .api.loading import generate_tasks, load_houses, load_tasks
 from .api.run import Run, load_run
@@ -17,6 +18,7 @@ __all__ = [
     "Action",
     "Agent",
     "EvonavError",
+    "Explanation",
     "Goal",
     "House",
     "Move",

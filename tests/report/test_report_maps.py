@@ -160,7 +160,7 @@ def test_strip_of_what_is_not_there_names_it(write_run: WriteRun, tmp_path: Path
 def test_rounds_are_told_in_runs() -> None:
     stale = entry("DiningTable", (0, 0, 0), is_stale=True)
     record = stage_record("fu", "t", 1, EndState.FAILURE, chosen=stale)
-    assert choices(record.trace) == ["object 7 (dining table, stale) ×3", "object 7 (dining table, stale), stop"]
+    assert choices(record.trace) == ["dining table #7 (stale) ×3", "dining table #7 (stale), stop"]
 
 
 def test_slugs_are_safe_and_differ() -> None:

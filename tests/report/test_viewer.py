@@ -163,7 +163,7 @@ def test_a_map_that_grows_begins_anew_and_one_that_stays_does_not() -> None:
 def test_what_became_of_a_stale_entry(truth: Truth | None, now: object, words: str) -> None:
     (step,) = made_up_page([made_up_round(0, truth, ReplayedMap(np.zeros((1, 1), np.uint8), 0.1, (0.0, 0.0)))])
     assert (step["truth"], step["e"][0][9]) == (words, now)
-    assert (step["kind"], step["choice"]) == ("stale", "object 7 (plate)")
+    assert (step["kind"], step["choice"]) == ("stale", "plate #7")
 
 
 def test_a_lost_memory_is_told() -> None:
@@ -187,7 +187,7 @@ def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: lis
     for shown, stage in zip(data["stages"], stages, strict=True):
         for data_round, step in zip(shown["rounds"], stage.rounds, strict=True):
             assert len(data_round.get("q", [])) == len(step.questions)
-            for (kind, outcome, answer, prompt, offered), question in zip(
+            for (kind, outcome, answer, prompt, offered, meaning), question in zip(
                 data_round.get("q", []), step.questions, strict=True
             ):
                 outcomes.append(outcome)
@@ -201,6 +201,8 @@ def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: lis
                     content for _, content in question.parts if isinstance(content, str)
                 ]
                 assert (offered != "") == bool(question.offered)
+                assert bool(meaning) == (outcome == "answered" and bool(question.offered))
+                assert not meaning or f"{answer.splitlines()[0]} is {meaning}" in offered
     assert {"answered", "refusal", "invalid"} <= set(outcomes)
     assert len(set(data["images"])) == len(data["images"])
     for image in data["images"]:
@@ -271,6 +273,7 @@ def test_the_index_keeps_earlier_pages_and_the_report_links_to_them(
 def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: str) -> None:
     for stage in data_of(pages / page_name(task_id, "random-walk"))["stages"]:
         assert not stage["hasBelief"]
+        assert not stage["tells"]
         assert all(step["v"] and "cells" not in step and "q" not in step for step in stage["rounds"])
 
 

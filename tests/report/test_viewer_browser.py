@@ -61,6 +61,7 @@ def test_every_round_can_be_gone_to_and_fills_its_panels(pages: dict[str, Path],
             assert shown["images"]
             assert shown["overflow"] <= 0
             assert shown["bold"] == 0
+            assert (shown["untold"], shown["toggles"]) == (False, 3)
             assert shown["terminal"] == (at == num - 1)
     assert any(shown["stale"] for shown in rounds)
     last_stage = len(stages[-1]["rounds"])
@@ -78,3 +79,4 @@ def test_an_agent_that_tells_nothing_has_a_page_too(pages: dict[str, Path], tmp_
     assert found["errors"] == []
     assert all(shown["images"] and shown["entries"] == 0 and shown["cells"] == 0 for shown in found["rounds"])
     assert all(shown["agent"] for shown in found["rounds"])
+    assert all(shown["untold"] and shown["knows"] and shown["toggles"] == 0 for shown in found["rounds"])

@@ -34,6 +34,9 @@
       terminal: [...document.querySelectorAll("#ends [data-of]")].filter((part) => part.style.display !== "none").flatMap((part) => [...part.querySelectorAll(".terminal")]).filter((part) => part.style.display !== "none").length,
       images: [...document.images].every(loaded),
       overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
+      untold: !$("untold").hidden,
+      toggles: [...document.querySelectorAll(".layers .belief")].filter((part) => !part.hidden).length,
+      knows: $("facts").textContent.includes("this agent does not tell"),
       bold: document.querySelectorAll(".answer b b, #reason b").length,
     });
   };

@@ -10,19 +10,18 @@ from evonav.agents.agent import (
     AgentAction,
     Belief,
     EntryBelief,
-    FrontierBelief,
     NavigateTo,
     RoundDiagnostics,
     SensorConfig,
     Stop,
 )
+from evonav.agents.explanation import entry_belief, frontier_beliefs
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import FrontierCandidate, Pixels, Point2
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
 from evonav.memory import Frontier
-from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -105,7 +104,7 @@ class NavigatorAgent(ABC):
         entry = None if entry_id is None else navigator.objects.entry(entry_id)
         self._diagnostics = RoundDiagnostics(
             choice=choice,
-            chosen_entry=None if entry is None else _belief_of(entry),
+            chosen_entry=None if entry is None else entry_belief(entry),
             num_entries=len(navigator.objects),
             num_frontiers=len(navigator.explorer.frontiers),
             counters=dict(self._round_counters()),
@@ -126,7 +125,7 @@ class NavigatorAgent(ABC):
 
     def entries(self) -> Sequence[EntryBelief]:
         """Return the object memory."""
-        return [_belief_of(entry) for entry in self._navigator.objects.entries]
+        return [entry_belief(entry) for entry in self._navigator.objects.entries]
 
     def belief(self) -> Belief:
         """Return entries, map, frontiers, and the questions of the last round."""
@@ -134,14 +133,9 @@ class NavigatorAgent(ABC):
         return Belief(
             entries=self.entries(),
             candidate_ids=self._candidates,
-            frontiers=[FrontierBelief(f.id, f.position_m, f.direction_rad) for f in explorer.frontiers],
+            frontiers=frontier_beliefs(explorer.map),
             cells=explorer.map.cells,
             map_frame=explorer.map.map_frame,
             queries=tuple(self._queries.log),
             explored=explorer.map.explored,
         )
-
-
-def _belief_of(entry: ObjectEntry) -> EntryBelief:
-    """Return an entry as records state it."""
-    return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)

@@ -27,9 +27,10 @@ from evonav.replay.types import (
     ReplayedStage,
     Truth,
 )
+from evonav.report.maps.round_words import choice_words, entry_name, reason_words
 from evonav.report.maps.stage_map import change_words, outcome_words
-from evonav.report.maps.trajectory import choice_words
 from evonav.report.tables.causes import sentence
+from evonav.report.tables.numbers import count
 from evonav.tasks.language import noun_of
 
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
@@ -100,6 +101,7 @@ class PageData:
             "unit": round(frame.unit, 2),
             "whyNot": stage.why_not,
             "differences": list(stage.differences),
+            "tells": any(_tells(step.record) for step in stage.rounds),
             "hasBelief": any(step.map is not None for step in stage.rounds),
             "end": _end(record),
             "rounds": [rounds.data(step) for step in stage.rounds],
@@ -143,8 +145,16 @@ class _Rounds:
         if step.candidate_ids:
             found["cand"] = list(step.candidate_ids)
         if step.questions:
-            found["q"] = [[a.kind, a.outcome, a.answer, self._page.prompt(a), _offer_words(a)] for a in step.questions]
+            found["q"] = [self._question(question) for question in step.questions]
         return found
+
+    def _question(self, question: ReplayedQuestion) -> list[Any]:
+        """`[kind, outcome, answer, prompt, names, meaning]`: the meaning is the answer's object as the map names it."""
+        head, *rest = question.answer.split("\n")
+        names = _offered_names(question)
+        answer = "\n".join((head, *map(reason_words, rest)))
+        meaning = names.get(head.strip(), "")
+        return [question.kind, question.outcome, answer, self._page.prompt(question), _names_text(names), meaning]
 
     def _decision(self, record: RoundRecord) -> dict[str, Any]:
         action = record.action
@@ -160,7 +170,7 @@ class _Rounds:
         if action.position_m is not None:
             found["to"] = list(cm(action.position_m))
         if action.reason:
-            found["why"] = action.reason
+            found["why"] = reason_words(action.reason)
         if not record.is_action_success:
             found["failed"] = True
         if record.chosen_entry is not None:
@@ -170,6 +180,8 @@ class _Rounds:
             found["frontier"] = int(number)
         if record.details:
             found["details"] = _plain(record.details)
+            if isinstance(reason := record.details.get("reason"), str):
+                found["details"]["reason"] = reason_words(reason)
         counters = {name: count for name, count in record.counters.items() if self._counters.get(name) != count}
         if counters:
             found["counters"] = counters
@@ -197,18 +209,23 @@ class _Rounds:
         return {**({"e": changed} if changed else {}), **({"x": gone} if gone else {})}
 
 
+def _tells(record: RoundRecord | None) -> bool:
+    """Return whether the agent described a round."""
+    return record is not None and bool(record.choice or record.num_entries or record.num_frontiers)
+
+
 def _turn_deg(from_rad: float, to_rad: float) -> int:
     """Return the smallest turn from one heading to another, positive to the right."""
     return round(math.degrees(math.remainder(to_rad - from_rad, math.tau)))
 
 
-def _offer_words(question: ReplayedQuestion) -> str:
-    """Describe which entries and frontiers the numbers of a prompt refer to."""
-    offers = [
-        f"{name} is {what if what == 'frontier' else noun_of(what)} #{number}"
-        for name, what, number in question.offered
-    ]
-    return "; ".join(offers) + ("." if offers else "")
+def _offered_names(question: ReplayedQuestion) -> dict[str, str]:
+    """Return the names on the map of what a prompt offers: `Object 0` is `vase #1`."""
+    return {name: entry_name(what, number) for name, what, number in question.offered}
+
+
+def _names_text(names: Mapping[str, str]) -> str:
+    return "On the map: " + "; ".join(f"{name} is {shown}" for name, shown in names.items()) + "." if names else ""
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - JSON
@@ -337,10 +354,10 @@ def _facts(record: StageRecord) -> list[list[str]]:
     if record.path_length_m is not None:
         facts.append(("walked", f"{record.path_length_m:.1f} m"))
     if record.reference_length_m is not None:
-        facts.append(("shortest way", f"{record.reference_length_m:.1f} m"))
+        facts.append(("shortest path", f"{record.reference_length_m:.1f} m"))
     if record.terminal_distance_m is not None:
         facts.append(("target at the end", f"{record.terminal_distance_m:.2f} m away"))
-    facts.append(("target in view", f"{record.num_target_visible_rounds} rounds"))
+    facts.append(("target in view", count(record.num_target_visible_rounds, "round")))
     if record.has_stopped:
         facts.append(("stopped", record.stop_reason or "yes"))
     elif record.terminal is not None:

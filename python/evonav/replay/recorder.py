@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.agents.agent import Agent, Belief, InspectableAgent
+from evonav.agents.agent import Agent, Belief
+from evonav.agents.explanation import inspectable
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture
 from evonav.decision.query import QueryLogEntry
@@ -145,10 +146,11 @@ class Recorder:
         return ReplayedStage(outcome.record, floor_plan, tuple(rounds), "", (), self._fov_rad)
 
     def _with_belief(self, seen: ReplayedRound) -> ReplayedRound:
-        if not isinstance(self.agent, InspectableAgent):
+        agent = inspectable(self.agent)
+        if agent is None:
             return seen
         try:
-            belief = self.agent.belief()
+            belief = agent.belief()
             bodies = self._places[-1]
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(

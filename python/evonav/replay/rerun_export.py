@@ -19,8 +19,8 @@ from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.parallel.folders import replacing
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
+from evonav.report.maps.round_words import choice_words
 from evonav.report.maps.stage_map import outcome_words
-from evonav.report.maps.trajectory import choice_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 

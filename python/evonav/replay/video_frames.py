@@ -9,22 +9,24 @@ from evonav.drawing.files import png_of
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.style import light_css
 from evonav.drawing.svg import escape, join, text_lines
-from evonav.evaluation.records.schema import EndState, FloorPlan
+from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import ReplayedRound, ReplayedStage
+from evonav.report.maps.round_words import choice_words, reason_words
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
-from evonav.report.maps.trajectory import choice_words
 from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence
 
 SIZE = (1280, 720)
 MARGIN = 16
 TOP = 122
-VIEW_PX = 396
-MAP_PX = 414
-SIDE_PX = 96
-LEFTS = (MARGIN, MARGIN + VIEW_PX + 14, MARGIN + VIEW_PX + 14 + MAP_PX + 10)
+VIEW_PX = 280
+MAP_PX = 468
+GAP_PX = 4
+NUM_SIDES = 3
+"""Largest number of side views in a row."""
+LEFTS = (MARGIN, VIEW_PX + 2 * MARGIN, VIEW_PX + MAP_PX + 3 * MARGIN)
 """Left edges of the view, the belief and the truth."""
 FOOT_TOP = TOP + MAP_PX
 """Upper edge of what stands below the maps."""
@@ -73,9 +75,9 @@ class _StageFilm:
         record = self._stage.record
         css = {EndState.SUCCESS: "success", EndState.FAILURE: "failure"}.get(record.state, "other-end")
         outcome = outcome_words(record)
-        box = f'x="{MARGIN}" y="34" width="{28 + _LETTER * 26 * len(outcome):.0f}" height="44" rx="10"'
-        verdict = f'<rect class="{css}" {box}/>{_text("end-text", MARGIN + 14, 65, outcome)}'
-        cause, _ = _paragraph("cause", 112, sentence(record), 20, 2)
+        box = f'x="{MARGIN}" y="30" width="{28 + _LETTER * 26 * len(outcome):.0f}" height="44" rx="10"'
+        verdict = f'<rect class="{css}" {box}/>{_text("end-text", MARGIN + 14, 61, outcome)}'
+        cause = _paragraph("cause", MARGIN, 100, sentence(record), 20, SIZE[0] - 2 * MARGIN, 1)
         return self._picture(len(self._stage.rounds) - 1, verdict + cause)
 
     def _picture(self, index: int, captions: str) -> Image.Image:
@@ -112,8 +114,9 @@ def _header(stage: ReplayedStage, maps: Mapping[int, FloorPlan]) -> str:
     record = stage.record
     agent = record.agent[-40:]
     task_left = MARGIN + _LETTER * 26 * len(agent) + 18
-    heads = ("what it sees", "what it believes: map and memory", f"what is true: {change_words(record, maps)}")
     changed = " changed" if record.transition.relocations else ""
+    truth = change_words(record, maps) if changed else f"what is true: {change_words(record, maps)}"
+    heads = ("what it sees", "what it knows: map and memory", truth)
     return (
         _text("agent-name", MARGIN, 36, agent)
         + _text("task", task_left, 35, _fitted(record.task_id, 16, SIZE[0] - MARGIN - task_left))
@@ -131,7 +134,7 @@ def _position(stage: ReplayedStage, index: int, budget: int) -> str:
     step, record = stage.rounds[index], stage.record
     where = f"stage {record.stage} of {record.num_stages} · round {index + 1} of {len(stage.rounds)}"
     if step.map is None:
-        note = step.note or "this agent does not tell what it believes"
+        note = step.note or "this agent does not tell what it knows"
     else:
         num_stale = sum(entry.record.is_stale for entry in step.entries)
         note = f"{len(step.entries)} entries, {num_stale} stale (red; the evaluator's knowledge)"
@@ -141,15 +144,18 @@ def _position(stage: ReplayedStage, index: int, budget: int) -> str:
 
 
 def _paste_views(picture: Image.Image, step: ReplayedRound) -> None:
-    """Paste the heading view, and the others in a row below it."""
+    """Paste the heading view, and the others in two rows below it."""
     if not step.views:
         return
     *others, heading = step.views
-    seen = _scaled(heading.jpeg, VIEW_PX, VIEW_PX - 92 if others else VIEW_PX)
+    seen = _scaled(heading.jpeg, VIEW_PX, VIEW_PX)
     picture.paste(seen, (LEFTS[0] + (VIEW_PX - seen.width) // 2, TOP))
-    width = min(SIDE_PX, (VIEW_PX - 4 * (len(others) - 1)) // max(1, len(others)))
-    for i, view in enumerate(others):
-        picture.paste(_scaled(view.jpeg, width, SIDE_PX), (LEFTS[0] + i * (width + 4), TOP + seen.height + 8))
+    num_columns = min(NUM_SIDES, max(2, len(others)))
+    width = (VIEW_PX - (num_columns - 1) * GAP_PX) // num_columns
+    for i, view in enumerate(others[: 2 * num_columns]):
+        row, column = divmod(i, num_columns)
+        top = TOP + seen.height + 6 + row * (width + GAP_PX)
+        picture.paste(_scaled(view.jpeg, width, width), (LEFTS[0] + column * (width + GAP_PX), top))
 
 
 def _scaled(jpeg: bytes, width: int, height: int) -> Image.Image:
@@ -161,26 +167,30 @@ def _scaled(jpeg: bytes, width: int, height: int) -> Image.Image:
 
 
 def _captions(stage: ReplayedStage, step: ReplayedRound) -> str:
-    """Return what the round chose and why, and what the evaluator knows of it, as far as there is room."""
-    top, record = 50, step.record
-    choice = "error" if record is None else choice_words(record)
-    lines = []
-    if step.questions:
+    """Return what the round chose and why on the left, and what the evaluator knows of it on the right."""
+    record = step.record
+    choice = "error" if record is None else f"chosen: {choice_words(record)}"
+    why = f"why: {reason}" if (reason := _reason(record)) else ""
+    if step.questions and step.questions[-1].outcome != "answered":
         last = step.questions[-1]
-        lines.append(("caption", f"asked ({last.kind}), {last.outcome}: {last.answer}"))
-    if record is not None and record.action.reason:
-        lines.append(("caption", f"because: {record.action.reason}"))
-    if known := evaluator_words(stage.record, step):
-        lines.append(("caption evaluator", f"evaluator: {known}"))
-    if record is not None and record.is_target_visible:
-        lines.append(("caption seen", "the target is in view"))
-    drawn, y = [_text("choice", MARGIN, top, _fitted(choice, 22, SIZE[0] - 2 * MARGIN))], top + 30
-    for css, line in lines:
-        text, num_lines = _paragraph(css, y, line, 17, 2)
-        y += 22 * num_lines
-        if y <= SIZE[1] - FOOT_TOP:
-            drawn.append(text)
-    return join(drawn)
+        why = f"the question “{last.kind}” has no valid answer ({last.outcome}): {last.answer}"
+    known = evaluator_words(stage.record, step)
+    seen = "the target is in view" if record is not None and record.is_target_visible else ""
+    left, width = LEFTS[2], MAP_PX
+    return (
+        _text("choice", MARGIN, 50, _fitted(choice, 22, left - 2 * MARGIN))
+        + _paragraph("caption", MARGIN, 78, why, 17, left - 2 * MARGIN, 2)
+        + _paragraph("caption evaluator", left, 50, f"evaluator: {known}" if known else "", 17, width, 2)
+        + _text("caption seen", left, 100, seen)
+    )
+
+
+def _reason(record: RoundRecord | None) -> str:
+    """Return the reason of a round in plain words; empty where the agent gives none."""
+    if record is None:
+        return ""
+    reason = record.action.reason or record.details.get("reason")
+    return reason_words(reason) if isinstance(reason, str) else ""
 
 
 def _timeline(stage: ReplayedStage, index: int) -> str:
@@ -196,11 +206,11 @@ def _timeline(stage: ReplayedStage, index: int) -> str:
     return join(drawn)
 
 
-def _paragraph(css: str, top: float, text: str, size_px: int, max_lines: int) -> tuple[str, int]:
-    """Return lines of text as wide as a picture, and their number."""
-    lines = text_lines(text, int((SIZE[0] - 2 * MARGIN) / (_LETTER * size_px)), max_lines)
+def _paragraph(css: str, left: float, top: float, text: str, size_px: int, width_px: float, max_lines: int) -> str:
+    """Return lines of text that fit a width."""
+    lines = text_lines(text, int(width_px / (_LETTER * size_px)), max_lines)
     spacing = round(1.3 * size_px)
-    return join(_text(css, MARGIN, top + spacing * i, line) for i, line in enumerate(lines)), len(lines)
+    return join(_text(css, left, top + spacing * i, line) for i, line in enumerate(lines))
 
 
 def _fitted(text: str, size_px: int, width_px: float) -> str:

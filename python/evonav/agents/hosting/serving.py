@@ -21,7 +21,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
-from evonav.agents.agent import Agent, ExplainingAgent
+from evonav.agents.agent import Agent
+from evonav.agents.explanation import explaining
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean, describe, traceback_of
 from evonav.agents.registry import agent_factory, new_agent
@@ -183,9 +184,9 @@ class _Server:
         """Run a decision round, and return the action and the agent's diagnostics."""
         agent = self.agent
         parts = {"action": wire.write_action(agent.act(observation))}
-        if isinstance(agent, ExplainingAgent):
+        if (explaining_agent := explaining(agent)) is not None:
             try:
-                parts["diagnostics"] = wire.DIAGNOSTICS.write(agent.diagnostics())
+                parts["diagnostics"] = wire.DIAGNOSTICS.write(explaining_agent.diagnostics())
             except DecisionError as error:
                 parts["diagnostics_failure"] = _failed("decision", clean(str(error)), error)
             except Exception as error:
@@ -193,9 +194,9 @@ class _Server:
         return parts
 
     def do_entries(self) -> dict[str, bytes]:
-        """Return the object memory, if the agent is an `ExplainingAgent`."""
-        agent = self.agent
-        return {"entries": wire.ENTRIES.write(list(agent.entries()))} if isinstance(agent, ExplainingAgent) else {}
+        """Return the object memory, if the agent explains itself."""
+        explaining_agent = explaining(self.agent)
+        return {} if explaining_agent is None else {"entries": wire.ENTRIES.write(list(explaining_agent.entries()))}
 
     def do_costs(self) -> dict[str, bytes]:
         """Return the decision model's costs since it was made, and this process's peak memory."""

@@ -103,7 +103,7 @@ def _budget(probe: Probe, records: Sequence[StageRecord]) -> Check:
 
 def _diagnostics(probe: Probe) -> Check:
     if not probe.explains:
-        finding = "no `diagnostics()` and `entries()`: reports cannot show what the agent believes"
+        finding = "no `explain()`: pages cannot show what the agent knows; return Explanation(map=..., objects=...)"
         return Check("diagnostics", "warn", finding)
     if (error := probe.errors.get("diagnostics")) is not None:
         return Check("diagnostics", "fail", f"{describe(error, caller=PACKAGE)}; see `RoundDiagnostics`")

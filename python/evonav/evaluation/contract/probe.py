@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, SensorConfig
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
+from evonav.agents.explanation import explaining
 from evonav.agents.hosting import wire
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -25,7 +26,7 @@ class Probe:
     def __init__(self, agent: Agent) -> None:
         """Wrap an agent."""
         self.agent = agent
-        self.explains = isinstance(agent, ExplainingAgent)
+        self.explains = explaining(agent) is not None
         self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "diagnostics": 0, "entries": 0}
         self.errors: dict[str, BaseException] = {}
         self.seconds: list[float] = []
@@ -71,18 +72,18 @@ class Probe:
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return the agent's diagnostics of the round, as they are after JSON."""
-        if not isinstance(self.agent, ExplainingAgent):
+        agent = explaining(self.agent)
+        if agent is None:
             return RoundDiagnostics()
-        agent = self.agent
         text = self._call("diagnostics", lambda: wire.DIAGNOSTICS.write(agent.diagnostics()))
         self.largest_diagnostics = max(self.largest_diagnostics, len(text))
         return self._call("diagnostics", lambda: wire.DIAGNOSTICS.read(text))
 
     def entries(self) -> Sequence[EntryBelief]:
         """Return the agent's object memory, as it is after JSON."""
-        if not isinstance(self.agent, ExplainingAgent):
+        agent = explaining(self.agent)
+        if agent is None:
             return ()
-        agent = self.agent
         found = self._call("entries", lambda: wire.ENTRIES.read(wire.ENTRIES.write(list(agent.entries()))))
         self.num_entries += len(found)
         self.outside += [problem for entry in found if (problem := self._misplaced(entry)) is not None]

@@ -385,7 +385,7 @@ class Stage:
         )
 
     def _entries(self) -> Sequence[EntryBelief] | None:
-        """Return the agent's object memory; None if it is no `ExplainingAgent`."""
+        """Return the agent's object memory; None if it does not explain itself."""
         with self._stopwatch.timing("agent"):
             return self._agent.entries()
 

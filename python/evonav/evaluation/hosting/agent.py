@@ -3,7 +3,8 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, SensorConfig
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
+from evonav.agents.explanation import explaining
 from evonav.agents.hosting import wire
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
@@ -45,7 +46,7 @@ class HostedAgent(ABC):
 
     @abstractmethod
     def entries(self) -> Sequence[EntryBelief] | None:
-        """Return the object memory; None if the agent is no `ExplainingAgent`."""
+        """Return the object memory; None if the agent does not explain itself."""
 
     def costs(self) -> Mapping[str, float]:
         """Return what its decision model has cost so far, by field of `StageCosts`; empty where that is not known."""
@@ -58,7 +59,7 @@ class LocalAgent(HostedAgent):
     def __init__(self, agent: Agent) -> None:
         """Host an agent."""
         self._agent = agent
-        self._explaining = agent if isinstance(agent, ExplainingAgent) else None
+        self._explaining = explaining(agent)
 
     @property
     def sensors(self) -> SensorConfig:
@@ -84,7 +85,7 @@ class LocalAgent(HostedAgent):
         return wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(self._explaining.diagnostics()))
 
     def entries(self) -> Sequence[EntryBelief] | None:
-        """Return the object memory; None if the agent is no `ExplainingAgent`."""
+        """Return the object memory; None if the agent does not explain itself."""
         if self._explaining is None:
             return None
         return wire.ENTRIES.read(wire.ENTRIES.write(list(self._explaining.entries())))
@@ -153,7 +154,7 @@ class RemoteAgent(HostedAgent):
         return RoundDiagnostics() if text is None else wire.DIAGNOSTICS.read(text)
 
     def entries(self) -> Sequence[EntryBelief] | None:
-        """Return the object memory; None if the agent is no `ExplainingAgent`."""
+        """Return the object memory; None if the agent does not explain itself."""
         text = self._ask("entries").get("entries")
         return None if text is None else wire.ENTRIES.read(text)
 

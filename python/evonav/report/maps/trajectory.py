@@ -16,6 +16,7 @@ from evonav.evaluation.records.schema import (
     StageRecord,
     TargetRecord,
 )
+from evonav.report.maps.round_words import choice_words
 from evonav.tasks.language import noun_of
 
 NUM_TIMES = 10
@@ -290,17 +291,6 @@ def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visit
     box = f'x="{x - width / 2:.0f}" y="{y - height / 2:.0f}" width="{width:.0f}" height="{height:.0f}"'
     mark = f'<path d="{cross((x, y), 0.9 * u)}"/>' if is_stressed else ""
     return f'<g class="{css}">{title(text)}<rect {box}/>{mark}</g>'
-
-
-def choice_words(entry: RoundRecord, *, has_truth: bool = False) -> str:
-    """Describe what a round chose, and with `has_truth` whether the entry was stale and the action failed."""
-    text = entry.choice or entry.action.kind.replace("_", " ")
-    if entry.chosen_entry is not None:
-        stale = ", stale" if has_truth and entry.chosen_entry.is_stale else ""
-        text += f" ({noun_of(entry.chosen_entry.label)}{stale})"
-    if entry.action.kind == "stop":
-        text += ", stop"
-    return f"{text}, action failed" if has_truth and not entry.is_action_success else text
 
 
 def _choice(entry: RoundRecord) -> str:

@@ -148,7 +148,7 @@
     const u = stage.unit, group = $("frontiers");
     group.replaceChildren();
     for (const [id, x, y, deg] of round.frontiers) {
-      const g = svg("g", { class: `frontier${id === round.frontier ? " chosen" : ""}`, transform: `translate(${x} ${y})rotate(${deg})` }, group, `frontier ${id}`);
+      const g = svg("g", { class: `frontier${id === round.frontier ? " chosen" : ""}`, transform: `translate(${x} ${y})rotate(${deg})` }, group, `frontier #${id}`);
       const s = id === round.frontier ? 1.5 * u : u;
       svg("path", { d: `M0 ${-1.3 * s}L${s} ${1.2 * s}L0 ${0.5 * s}L${-s} ${1.2 * s}Z`, "stroke-width": 0.25 * u }, g);
     }
@@ -212,7 +212,7 @@
     list("facts", [
       ...(isError ? [] : [["action", round.action + (round.failed ? ", failed" : "") + (round.why ? ` (${round.why})` : "")]]),
       ...(round.len === undefined ? [] : [["walked", `${round.len.toFixed(2)} m`]]),
-      ...(round.n ? [["knows", `${count(round.n[0], "entry", "entries")}, ${count(round.n[1], "frontier", "frontiers")}`]] : []),
+      ...(round.n ? [["knows", stage.tells ? `${count(round.n[0], "entry", "entries")}, ${count(round.n[1], "frontier", "frontiers")}` : "this agent does not tell"]] : []),
       ["stands at", `x ${(round.p[0] / 100).toFixed(2)} m, z ${(-round.p[1] / 100).toFixed(2)} m, looks ${Math.round(((round.p[2] % 360) + 360) % 360)}°`],
       ...Object.entries(details).filter(([, value]) => value !== null).map(([name, value]) => [name.replaceAll("_", " "), words(value)]),
       ...(round.note ? [["note", round.note]] : []),
@@ -229,7 +229,7 @@
     if (!round.q) {
       let last = now - 1;
       while (last >= 0 && !rounds[last].q) last--;
-      const none = last < 0 ? "None." : "None: it goes on with what it decided in ";
+      const none = last < 0 ? "No question so far." : "No question in this round: the agent follows its decision of ";
       const line = html("p", none, "quiet");
       if (last >= 0) {
         const link = html("a", `round ${last + 1}`);
@@ -239,14 +239,16 @@
       box.append(line);
       return;
     }
-    round.q.forEach(([kind, outcome, answer, prompt, offered], index) => {
+    round.q.forEach(([kind, outcome, answer, prompt, offered, meaning], index) => {
       const div = html("div", "", "question");
       const tries = round.q.length > 1 ? ` ${index + 1} of ${round.q.length}` : "";
       div.append(html("b", `${kind}${tries} `), html("span", outcome, `chip ${outcome}`));
       const text = html("p", "", "answer"), [head, ...rest] = answer.split("\n");
-      text.append(html("b", head), rest.join("\n"));
-      const details = html("details", "", "prompt"), summary = html("summary", "What it was asked");
+      text.append(html("b", meaning || head), rest.join("\n"));
+      if (meaning) text.append(html("span", `In the prompt's words: ${head}`, "quiet"));
+      const details = html("details", "", "prompt"), summary = html("summary", "The prompt");
       details.append(summary);
+      if (offered) details.append(html("p", offered, "quiet offered"));
       let said = "", pictures = null;
       for (const part of prompts[prompt]) {
         const [role, content] = Array.isArray(part) ? part : ["user", part];
@@ -274,7 +276,7 @@
       details.open = isPromptOpen ?? round.q.length < 4;
       summary.addEventListener("click", () => { isPromptOpen = !details.open; });
       const isAgain = index > 0 && round.q[index - 1][3] === prompt;
-      div.append(text, ...(isAgain ? [html("p", "It was asked the same again.", "quiet")] : [...(offered ? [html("p", offered, "quiet offered")] : []), details]));
+      div.append(text, ...(isAgain ? [html("p", "The same question again.", "quiet")] : [details]));
       box.append(div);
     });
   };
@@ -347,8 +349,8 @@
     badge.classList.toggle("poor", !isSame);
     warning.hidden = isSame;
     warning.textContent = !stage.whyNot
-      ? `Run again, this stage went otherwise than recorded: the agent is not deterministic, or something it depends on has changed. Shown is the new run. ${stage.differences.join("; ")}.`
-      : `Not run again: shown is what the record holds, without views, map and questions. ${stage.whyNot}`;
+      ? `This stage did not repeat as recorded: the agent is not deterministic, or something that it depends on has changed. The new run is shown. ${stage.differences.join("; ")}.`
+      : `Not run again: this is what the record holds, without views, map and questions. ${stage.whyNot}`;
     svgMap.style.setProperty("--u", stage.unit);
     slider.max = Math.max(0, stage.rounds.length - 1);
   };
@@ -372,7 +374,10 @@
       return;
     }
     const round = rounds[now];
-    for (const id of ["questions", "memory"]) cardOf(id).hidden = !stage.hasBelief;
+    cardOf("memory").hidden = !stage.hasBelief;
+    cardOf("questions").hidden = !stage.rounds.some(({ q }) => q);
+    for (const part of document.querySelectorAll(".belief")) part.hidden = !stage.hasBelief;
+    $("untold").hidden = stage.hasBelief || Boolean(stage.whyNot);
     $("where").textContent = `round ${now + 1} of ${rounds.length} (budget ${stage.budget})`;
     slider.setAttribute("aria-valuetext", `round ${now + 1}: ${round.choice ?? "error"}`);
     timeline.querySelector(".now").setAttribute("x", now * 1000 / rounds.length);
