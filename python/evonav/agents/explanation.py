@@ -27,7 +27,7 @@ _NO_MAP = MapFrame(rows=1, cols=1, cell_m=0.05, corner_m=(0.0, 0.0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """What an agent knows and chose: the answer of its method `explain`, which is called after every `act`.
+    """Answer of an agent's method `explain`, which is called after every `act`: what the agent knows and chose.
 
     Records then contain the object entries, and `evonav view` draws them with the map. Nothing of it is scored.
 
