@@ -119,6 +119,7 @@ def generate_dataset(
         "limit": limit,
         "subset": subset,
         "options": options.model_dump(mode="json"),
+        **({} if texts.completion is None else {"completed": dict(texts.completion.identity)}),
     }
     out = out.resolve()  # workers of a cluster have other working directories
     with writing(out), closing(Journal(out, identity)) as journal:

@@ -3,12 +3,12 @@
 import gzip
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, NamedTuple
+from typing import IO, TYPE_CHECKING, NamedTuple, Protocol
 
 from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
@@ -16,9 +16,9 @@ from evonav.errors import HouseError, InvalidArgumentError
 if TYPE_CHECKING:
     from evonav.house.procthor10k import HouseSet
 
-SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 BUNDLED = "bundled"
-"""The word that stands for the bundled houses where a path of houses is asked for."""
+"""Names the houses that come with evonav; `bundled:3` is the third of them."""
+SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 
 
 def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
@@ -26,8 +26,8 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name; or a fetched split, `procthor-10k:val`; or `bundled`, for the
-            houses that come with evonav.
+            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; or `bundled` (all
+            bundled houses) or `bundled:3` (the third).
         limit: Number of houses after which to stop.
 
     Yields:
@@ -51,14 +51,28 @@ class HouseText(NamedTuple):
     text: str
 
 
+class HouseCompletion(Protocol):
+    """Completes houses as they are read (`evonav.world.house_options.HouseOptions`)."""
+
+    @property
+    def identity(self) -> Mapping[str, str]:
+        """Everything that decides the result."""
+        ...
+
+    def complete(self, name: str, text: str) -> str:
+        """Return a house with what it lacks."""
+        ...
+
+
 class HouseTexts:
     """The houses of a file or a directory as text, one at a time, with the progress of reading."""
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, completion: HouseCompletion | None = None) -> None:
         """Find the files.
 
         Args:
             path: A path, as for `load_houses`.
+            completion: Completes each house as it is read.
 
         Raises:
             DatasetError: The split was not fetched, or is incomplete.
@@ -67,16 +81,22 @@ class HouseTexts:
         """
         self.published: HouseSet | None = None
         """The published split that is read; `None` for a file or a directory."""
+        self.completion = completion
         self._path = Path(path)
-        is_bundled = str(path) == BUNDLED and not self._path.exists()
-        if is_bundled:
+        self._number: int | None = None
+        """Number of the one bundled house that is read."""
+        if str(path).partition(":")[0] == BUNDLED and not self._path.exists():
+            self._number = _bundled_number(str(path))
             self._path = Path(str(resources.files("evonav") / "data" / "houses.jsonl.gz"))
-        if str(path).startswith("procthor-10k") and not self._path.exists():
+            self.name = BUNDLED
+        elif str(path).startswith("procthor-10k") and not self._path.exists():
             from evonav.house.procthor10k import house_set, split_path
 
             self.published = house_set(path)
             self._path = split_path(self.published)
-        self.name = str(path if self.published or is_bundled else self._path)
+            self.name = str(path)
+        else:
+            self.name = str(self._path)
         self.files = files_of(self._path)
         """The files to read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
@@ -90,11 +110,21 @@ class HouseTexts:
         return min(1.0, (self._num_bytes_before + position) / max(1, self._num_bytes))
 
     def __iter__(self) -> Iterator[HouseText]:
-        """Yield houses from the first one on.
+        """Yield houses from the first one on, completed.
 
         Raises:
-            HouseError: A file cannot be read, or a list of houses is malformed.
+            HouseError: A file cannot be read, or a list of houses is malformed; or there is no bundled house of the
+                number.
         """
+        found = self._read() if self._number is None else islice(self._read(), self._number - 1, self._number)
+        is_empty = True
+        for house in found:
+            is_empty = False
+            yield house if self.completion is None else house._replace(text=self.completion.complete(*house))
+        if is_empty and self._number is not None:
+            raise HouseError(f"bundled:{self._number}: there are fewer bundled houses")
+
+    def _read(self) -> Iterator[HouseText]:
         self._num_bytes_before = 0
         for file in self.files:
             name = self.name if file == self._path else str(file)
@@ -105,6 +135,14 @@ class HouseTexts:
                 raise HouseError(f"{file}: cannot be read: {error}") from error
             self._num_bytes_before += file.stat().st_size
             self._raw = None
+
+
+def _bundled_number(path: str) -> int | None:
+    """Return the number N of `bundled:N`; `None` for `bundled`."""
+    _, colon, number = path.partition(":")
+    if colon and (not number.isdigit() or int(number) < 1):
+        raise HouseError(f"{path}: expected `bundled` or `bundled:N`, where N is a number from 1")
+    return int(number) if colon else None
 
 
 def files_of(path: Path) -> list[Path]:

@@ -261,11 +261,12 @@ fn opening(opening: &house::Opening) -> Opening {
 
 fn object(house: &house::House, object: &house::Object) -> HouseObject {
     let id = |&index: &usize| house.objects[index].id.clone();
-    let known = Catalogue::bundled().get(&object.asset_id);
+    let known = Catalogue::bundled().get(&object.asset_id).map(|asset| asset.category.clone());
+    let own = || house.own_assets.get(&object.asset_id).map(|asset| asset.category.clone());
     HouseObject {
         id: object.id.clone(),
         asset_id: object.asset_id.clone(),
-        category: known.map(|asset| asset.category.clone()).or_else(|| object.object_type.clone()),
+        category: known.or_else(own).or_else(|| object.object_type.clone()),
         position_m: object.position_m.into(),
         rotation_deg: object.rotation_deg.into(),
         parent_id: object.parent.as_ref().map(id),

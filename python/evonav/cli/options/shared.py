@@ -11,6 +11,7 @@ from evonav.cli.options import completion
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
 
 EXIT_INCOMPLETE = 3
@@ -81,6 +82,23 @@ Houses = Annotated[
     Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}. Default: use --tasks.")
 ]
 SomeHouses = Annotated[Path, typer.Option("--houses", metavar="HOUSES", help=f"Houses: {HOUSES}.")]
+AssetFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--assets",
+        metavar="FILE",
+        help="JSON file of sizes for assets that are missing from the catalogue, such as Objaverse's in Holodeck's "
+        "houses.",
+    ),
+]
+StartOfHouses = Annotated[
+    str,
+    typer.Option(
+        "--start",
+        metavar="file|auto",
+        help="Where the agent starts in a house without a start: nowhere (file), or at a free place (auto).",
+    ),
+]
 Tasks = Annotated[
     Path | None,
     typer.Option(
@@ -124,6 +142,16 @@ RetryErrored = Annotated[
     bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run; an unfinished run is resumed.")]
+
+
+def read_houses(houses: "Path | str", assets: Path | None, start: str) -> "HouseTexts":
+    """Return houses, with the sizes of `--assets` and the starts of `--start`."""
+    from evonav.house.files import HouseTexts
+    from evonav.world.house_options import HouseOptions
+
+    if start not in ("file", "auto"):
+        raise typer.BadParameter(f"--start {start}: expected file or auto")
+    return HouseTexts(houses, HouseOptions.of(assets, "auto" if start == "auto" else "file"))
 
 
 def names_of(agents: "Sequence[str] | None") -> list[str]:

@@ -12,15 +12,18 @@ from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     Agents,
+    AssetFile,
     Houses,
     Limit,
     Out,
     RetryErrored,
     Seed,
+    StartOfHouses,
     Subset,
     Tasks,
     chosen_tasks,
     names_of,
+    read_houses,
 )
 from evonav.cli.run.failures import print_failures
 
@@ -31,6 +34,7 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.run.run import Progress, RunConfig
     from evonav.evaluation.run.run_settings import RunSettings
     from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings, SpendingSettings
+    from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
 
 
@@ -44,6 +48,8 @@ def evaluate(
     spending: "SpendingSettings",
     agent: Agents = None,
     houses: Houses = None,
+    assets: AssetFile = None,
+    start: StartOfHouses = "file",
     tasks: Tasks = None,
     limit: Limit = None,
     subset: Subset = None,
@@ -60,6 +66,8 @@ def evaluate(
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
+    if houses is None and (assets is not None or start != "file"):
+        raise typer.BadParameter("--assets and --start belong to --houses: tasks hold houses as they were generated")
     workforce = run.workforce()
     backend = Backend(
         simulator=simulation.component(),
@@ -69,7 +77,8 @@ def evaluate(
     config = run.config(seed, backend, decisions)
     names = names_of(agent)
     allows_any = simulation.allow_unknown_assets
-    with run_tasks(out, houses, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
+    texts = None if houses is None else read_houses(houses, assets, start)
+    with run_tasks(out, texts, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
         if dry_run:
             print_estimate(spending, names, task_files, config, run.num_workers)
             return
@@ -88,7 +97,7 @@ def evaluate(
 @contextmanager
 def run_tasks(
     out: Path,
-    houses: Path | None = None,
+    houses: "HouseTexts | None" = None,
     tasks: Path | None = None,
     limit: int | None = None,
     subset: str | None = None,
@@ -99,7 +108,6 @@ def run_tasks(
     """Yield the tasks of a run: of a folder, generated from houses into the run's folder, or bundled."""
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
-    from evonav.house.files import HouseTexts
     from evonav.parallel.worker import Workforce
     from evonav.tasks.listing import task_file
 
@@ -107,12 +115,11 @@ def run_tasks(
         with chosen_tasks(tasks, limit, subset) as found:
             yield found
         return
-    texts = HouseTexts(houses)
-    dataset, split = inherited_names(texts)
+    dataset, split = inherited_names(houses)
     options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
     with interruptible(out / "tasks"), generation_progress() as show:
         generated = generate_dataset(
-            texts,
+            houses,
             out / "tasks",
             options=options,
             limit=limit,

@@ -7,7 +7,17 @@ import typer
 
 from evonav.cli.display import counted_as, generation_progress, interruptible
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AnyAsset, GeneratorFile, Limit, Seed, SomeHouses, Subset
+from evonav.cli.options.shared import (
+    AnyAsset,
+    AssetFile,
+    GeneratorFile,
+    Limit,
+    Seed,
+    SomeHouses,
+    StartOfHouses,
+    Subset,
+    read_houses,
+)
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -48,15 +58,16 @@ def generate(
         str | None, typer.Option(metavar="NAME", help="Name of the dataset to record. Default: that of the houses.")
     ] = None,
     allow_unknown_assets: AnyAsset = False,
+    assets: AssetFile = None,
+    start: StartOfHouses = "file",
 ) -> None:
     """Generate a task from every house with several rooms; run again to resume."""
     from evonav.generation.config import read_parameters
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
-    from evonav.house.files import HouseTexts
 
     workforce = pool.workforce()
-    texts = HouseTexts(houses)
+    texts = read_houses(houses, assets, start)
     dataset, inherited_split = inherited_names(texts)
     options = GenerationOptions(
         seed=seed,

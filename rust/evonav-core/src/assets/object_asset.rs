@@ -4,7 +4,7 @@ use crate::{
     Error,
     assets::{Asset, Catalogue},
     geometry::{Vec2, Vec3, distance_2d_m},
-    house::{House, Object},
+    house::{House, Object, OwnAsset},
 };
 
 /// Treatment of asset ids that the catalogue does not contain (Objaverse assets).
@@ -73,9 +73,10 @@ const MAX_CHILD_HEIGHT_M: f64 = 0.4;
 const MAX_WALL_DISTANCE_M: f64 = 0.25;
 
 impl Catalogue {
-    /// Return the asset of an object of `house`.
+    /// Return the asset of an object of `house`: the catalogue's, or else the one whose size the
+    /// house's own document gives ([`House::own_assets`]), with the colours of a similar category.
     ///
-    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not contain gets
+    /// With [`UnknownAssets::CategoryDefault`] an asset that neither contains gets
     /// * its `objectType`, without Objaverse's prefix `Obja`, as its category;
     /// * the proportions of the nearest catalogue category (by name), or of a block;
     /// * the height that its place implies: twice the height of its centre above the floor or
@@ -91,19 +92,49 @@ impl Catalogue {
         object: &Object,
         unknown: UnknownAssets,
     ) -> Result<Asset, Error> {
-        match (self.get(&object.asset_id), unknown) {
-            (Some(asset), _) => Ok(asset.clone()),
+        match (self.known(house, &object.asset_id), unknown) {
+            (Some(asset), _) => Ok(asset),
             (None, UnknownAssets::CategoryDefault) => Ok(category_default(self, house, object)),
             (None, UnknownAssets::Error) => Err(Error::House {
                 house: house.name.clone(),
                 object: object.id.clone(),
                 field: "assetId".to_owned(),
                 message: format!(
-                    "is {:?}, of which the catalogue knows no size; category defaults would guess one",
+                    "is {:?}, of which the catalogue knows no size: give a file of sizes \
+                     (--assets), or let its category guess one (--allow-unknown-assets)",
                     object.asset_id
                 ),
             }),
         }
+    }
+}
+
+impl Catalogue {
+    /// Return the asset of an id, if its size is not a guess: the catalogue or the house gives it.
+    fn known(&self, house: &House, asset_id: &str) -> Option<Asset> {
+        let own = || house.own_assets.get(asset_id).map(|own| own_asset(self, asset_id, own));
+        self.get(asset_id).cloned().or_else(own)
+    }
+
+    /// Return whether the size of an asset is not a guess: the catalogue or the house gives it.
+    pub fn knows_size(&self, house: &House, asset_id: &str) -> bool {
+        self.get(asset_id).is_some() || house.own_assets.contains_key(asset_id)
+    }
+}
+
+/// Return the asset that a house's own document describes.
+fn own_asset(catalogue: &Catalogue, asset_id: &str, own: &OwnAsset) -> Asset {
+    Asset {
+        id: asset_id.to_owned(),
+        category: own.category.clone(),
+        size_m: own.size_m,
+        surfaces_m: if own.is_receptacle { vec![own.size_m[1]] } else { Vec::new() },
+        colours: palette(catalogue, like(catalogue, &own.category), asset_id),
+        is_pickupable: own.is_pickupable,
+        is_moveable: own.is_moveable,
+        is_receptacle: own.is_receptacle,
+        is_openable: own.is_openable,
+        ..Asset::default()
     }
 }
 
@@ -162,7 +193,7 @@ fn height_above_support_m(catalogue: &Catalogue, house: &House, object: &Object)
     let Some(parent) = object.parent.and_then(|index| house.objects.get(index)) else {
         return y;
     };
-    let Some(asset) = catalogue.get(&parent.asset_id) else {
+    let Some(asset) = catalogue.known(house, &parent.asset_id) else {
         // The parent is unknown too, and its centre lies below: take half of the distance.
         return 0.5 * (y - parent.position_m[1]).abs();
     };

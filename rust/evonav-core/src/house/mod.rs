@@ -9,4 +9,6 @@ mod schema;
 mod validate;
 
 pub use delta::{AddedObject, HouseDelta, ObjectMove, StateChange};
-pub use schema::{Condition, EXTERIOR, House, Object, Opening, Room, Start, Surface, Wall};
+pub use schema::{
+    Condition, EXTERIOR, House, Object, Opening, OwnAsset, Room, Start, Surface, Wall,
+};

@@ -118,6 +118,21 @@ impl<'a> Node<'a> {
         Ok(entries.map(|(index, value)| self.child(value, Step::Index(index))))
     }
 
+    /// Return the keys and values of an object that has at most `limit` of them.
+    pub(super) fn entries(
+        &self,
+        limit: usize,
+    ) -> Result<impl Iterator<Item = (&'a str, Node<'_>)>, Error> {
+        let map = self.map()?;
+        if map.len() > limit {
+            return Err(self.error(format!("has {} entries, at most {limit} are read", map.len())));
+        }
+        let entry = |(key, value): (&'a String, &'a Value)| {
+            (key.as_str(), self.child(value, Step::Key(key)))
+        };
+        Ok(map.iter().map(entry))
+    }
+
     /// Return whether the value is null.
     pub(super) fn is_null(&self) -> bool {
         self.value.is_null()

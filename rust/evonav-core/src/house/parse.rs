@@ -1,13 +1,15 @@
 //! Build the typed view of a house document. Both schemas are read: 0.0.1 (openings with
 //! `boundingBox`, materials as strings) and 1.0.0 (`holePolygon`, materials as objects).
 
+use std::collections::HashMap;
+
 use serde_json::Value;
 
 use crate::{
     Error,
     geometry::Vec2,
     house::{
-        EXTERIOR, House, Object, Opening, Room, Start, Surface, Wall,
+        EXTERIOR, House, Object, Opening, OwnAsset, Room, Start, Surface, Wall,
         node::{MAX_COORDINATE_M, Node},
     },
 };
@@ -24,6 +26,8 @@ const MAX_HEIGHT_M: f64 = 30.0;
 const MAX_FOOT_M: f64 = 0.01;
 /// Largest Euler angle; recorded ones are within two turns of zero.
 const MAX_ANGLE_DEG: f64 = 3600.0;
+/// Smallest and largest edge of an asset whose size the document gives.
+const ASSET_EDGE_M: [f64; 2] = [0.001, 30.0];
 const SCHEMAS: [&str; 2] = ["0.0.1", "1.0.0"];
 
 /// Build the view. Each field is checked here on its own; [`super::validate`] checks whether the
@@ -37,6 +41,8 @@ pub(super) fn view(name: &str, document: Value) -> Result<House, Error> {
         return Err(schema.expected("schema 0.0.1 or 1.0.0"));
     }
     let start = metadata.maybe("agent")?.map(|agent| start(&agent)).transpose()?;
+    let own_assets =
+        metadata.maybe("evonav_assets")?.map(|sizes| own_assets(&sizes)).transpose()?;
     let parameters = root.maybe("proceduralParameters")?;
     let ceiling = parameters.as_ref().map_or_else(|| Ok(Surface::default()), ceiling)?;
     let rooms: Vec<Room> =
@@ -58,6 +64,7 @@ pub(super) fn view(name: &str, document: Value) -> Result<House, Error> {
         objects,
         ceiling,
         start,
+        own_assets: own_assets.unwrap_or_default(),
         index,
         document: Value::Null,
     };
@@ -72,6 +79,28 @@ fn start(agent: &Node<'_>) -> Result<Start, Error> {
         position_m: agent.get("position")?.point()?,
         yaw_deg: agent.get("rotation")?.vector(MAX_ANGLE_DEG)?[1],
         horizon_deg,
+    })
+}
+
+fn own_assets(sizes: &Node<'_>) -> Result<HashMap<String, OwnAsset>, Error> {
+    sizes.entries(MAX_OBJECTS)?.map(|(id, node)| Ok((id.to_owned(), own_asset(&node)?))).collect()
+}
+
+fn own_asset(node: &Node<'_>) -> Result<OwnAsset, Error> {
+    let size = node.get("size_m")?;
+    let [low, high] = ASSET_EDGE_M;
+    let edges = size.list(3)?.map(|edge| edge.number(low, high)).collect::<Result<Vec<_>, _>>()?;
+    let [x, y, z] = edges[..] else {
+        return Err(size.expected("three edge lengths, [x, y, z]"));
+    };
+    let flag = |key| node.maybe(key)?.map_or(Ok(false), |flag| flag.boolean());
+    Ok(OwnAsset {
+        category: node.get("category")?.name()?.to_owned(),
+        size_m: [x, y, z],
+        is_pickupable: flag("pickupable")?,
+        is_moveable: flag("moveable")?,
+        is_receptacle: flag("receptacle")?,
+        is_openable: flag("openable")?,
     })
 }
 

@@ -32,6 +32,8 @@ pub struct House {
     pub ceiling: Surface,
     /// The house's default start (`metadata.agent`); absent in a few houses.
     pub start: Option<Start>,
+    /// Facts about assets by id that the document itself gives (`metadata.evonav_assets`).
+    pub own_assets: HashMap<String, OwnAsset>,
     /// Indices in [`House::objects`] by id.
     pub(super) index: HashMap<String, usize>,
     /// The document as it was read.
@@ -131,6 +133,23 @@ pub struct Object {
     pub openness: Option<f64>,
     /// `isOn` of the object, if given.
     pub is_on: Option<bool>,
+}
+
+/// Facts about an asset that the catalogue lacks, as a house document gives them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnAsset {
+    /// Object type, for example `DiningTable`.
+    pub category: String,
+    /// Size of the asset's box at zero yaw, `[x, y, z]`.
+    pub size_m: Vec3,
+    /// Whether a robot can carry it.
+    pub is_pickupable: bool,
+    /// Whether it can be pushed.
+    pub is_moveable: bool,
+    /// Whether it can hold other objects, on its top.
+    pub is_receptacle: bool,
+    /// Whether it has doors, drawers or a lid.
+    pub is_openable: bool,
 }
 
 /// The agent's start as the house file gives it.

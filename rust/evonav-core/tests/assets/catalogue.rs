@@ -152,6 +152,7 @@ fn unknown_assets_are_refused_or_sized_by_their_place() {
     };
     assert_eq!((id.as_str(), field.as_str()), (object.id.as_str(), "assetId"));
     assert!(message.contains("08b0b11c1ffe4080b0b17418e65fb30c"));
+    assert!(message.contains("--assets") && message.contains("--allow-unknown-assets"));
     let asset =
         catalogue.asset_of(&house, object, UnknownAssets::CategoryDefault).expect("a default");
     assert_eq!(asset.category, "Bookcase");
@@ -159,4 +160,32 @@ fn unknown_assets_are_refused_or_sized_by_their_place() {
     let known = house.objects.iter().find(|o| catalogue.get(&o.asset_id).is_some()).expect("one");
     let same = catalogue.asset_of(&house, known, UnknownAssets::Error).expect("known");
     assert_eq!(Some(&same), catalogue.get(&known.asset_id));
+}
+
+#[test]
+fn a_house_may_give_the_sizes_of_assets_that_the_catalogue_lacks() {
+    let catalogue = Catalogue::bundled();
+    let mut document: Value = serde_json::from_str(HOUSE).expect("valid JSON");
+    document["objects"][0]["assetId"] = "08b0b11c1ffe4080b0b17418e65fb30c".into();
+    let own =
+        serde_json::json!({"category": "Dresser", "size_m": [1.1, 0.9, 0.4], "receptacle": true});
+    let known = document["objects"][1]["assetId"].as_str().expect("id").to_owned();
+    document["metadata"]["evonav_assets"] =
+        serde_json::json!({"08b0b11c1ffe4080b0b17418e65fb30c": own, known.as_str(): own});
+    let house = House::from_json("house", &document.to_string()).expect("valid");
+    let asset_of = |index: usize| {
+        catalogue.asset_of(&house, &house.objects[index], UnknownAssets::Error).expect("known")
+    };
+    let asset = asset_of(0);
+    assert_eq!((asset.category.as_str(), asset.size_m), ("Dresser", [1.1, 0.9, 0.4]));
+    assert_eq!((asset.surfaces_m.as_slice(), asset.is_pickupable), (&[0.9][..], false));
+    let other = house.objects.iter().find(|object| object.asset_id == known).expect("one");
+    let same = catalogue.asset_of(&house, other, UnknownAssets::Error).expect("known");
+    assert_eq!(Some(&same), catalogue.get(&known), "the catalogue's own facts come first");
+    document["metadata"]["evonav_assets"]["08b0b11c1ffe4080b0b17418e65fb30c"]["size_m"][1] =
+        (-0.9).into();
+    let error = House::from_json("house", &document.to_string()).expect_err("a negative edge");
+    let text = error.to_string();
+    let field = "metadata.evonav_assets.08b0b11c1ffe4080b0b17418e65fb30c.size_m[1]";
+    assert!(text.contains(field) && text.contains("-0.9"), "{text}");
 }

@@ -279,9 +279,9 @@ impl Modifier<'_> {
     /// Move each small object of the room to a receptacle of the room.
     fn move_small(&mut self, result: &mut Modification, in_room: &[usize]) -> bool {
         let items = &result.layout.items;
-        // The size of an object that the catalogue does not contain was guessed from its place, so
-        // it moves only with its support.
-        let is_known = |index: usize| self.catalogue.get(&items[index].asset.id).is_some();
+        // A size that neither catalogue nor house gives was guessed from the object's place, so it
+        // moves only with its support.
+        let is_known = |index: usize| self.catalogue.knows_size(self.house, &items[index].asset.id);
         let is_small = |&&index: &&usize| {
             let item = &items[index];
             item.placement.parent.is_some() && !is_fitting(item) && is_known(index)

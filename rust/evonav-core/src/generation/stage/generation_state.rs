@@ -38,7 +38,10 @@ impl State {
         let house = &world.house;
         let rejected = |reason, detail| Err(Rejected { reason, stage: 0, detail });
         let Some(start) = house.start else {
-            return rejected(RejectReason::NoStart, "no metadata.agent".to_owned());
+            return rejected(
+                RejectReason::NoStart,
+                "no metadata.agent; `--start auto` chooses a free place".to_owned(),
+            );
         };
         let [x, y, z] = start.position_m;
         let Some([x, z]) = start_near(world, [x, z]) else {

@@ -230,7 +230,7 @@ fn placed(
 ) -> Result<Body, Error> {
     let asset = catalogue.asset_of(house, object, unknown)?;
     let parent = object.parent.and_then(|index| {
-        let is_known = catalogue.get(&house.objects.get(index)?.asset_id).is_some();
+        let is_known = catalogue.knows_size(house, &house.objects.get(index)?.asset_id);
         Some((before.get(index)?, is_known))
     });
     Ok(Body::object(object, &asset, parent))
