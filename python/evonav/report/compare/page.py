@@ -4,6 +4,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from markupsafe import Markup
+
 from evonav.report.compare import wording
 from evonav.report.compare.compare import Comparison, Flip
 from evonav.report.pages.template import page_text, text_of
@@ -14,14 +16,22 @@ from evonav.report.tables.table import p_words
 from evonav.statistics import PairedEffect
 
 
-def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
-    """Plot SR differences: of one pair by parts, or of several pairs on all stages."""
+def comparison_plot(comparisons: Sequence[Comparison], field: str = "success") -> GapPlot:
+    """Plot differences of SR, or of `spl`: of one pair by parts, or of several pairs on all stages."""
+    name = wording.measure_name(field)
     if len(comparisons) == 1:
         (one,) = comparisons
-        gaps = tuple(_gap(part.effects["success"], part.label) for part in one.parts)
-        return GapPlot(f"SR of {one.b} minus {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
-    gaps = tuple(_gap(one.all.effects["success"], f"{one.b} minus {one.a}", "p (Holm)") for one in comparisons)
-    return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")
+        gaps = tuple(_gap(part.effects[field], part.label) for part in one.parts if field in part.effects)
+        return GapPlot(f"{name} of {one.b} minus {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
+    pairs = [one for one in comparisons if field in one.all.effects]
+    gaps = tuple(_gap(one.all.effects[field], f"{one.b} minus {one.a}", "p (Holm)") for one in pairs)
+    return GapPlot(f"{name} differences, points", gaps, "the second is better", "the first is better")
+
+
+def _plots(comparisons: Sequence[Comparison]) -> list[Markup]:
+    """Return the plots of SR and SPL, side by side."""
+    found = [comparison_plot(comparisons, field) for field in ("success", "spl")]
+    return plot_elements([plot for plot in found if plot.gaps], are_even=True)
 
 
 def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = None) -> str:
@@ -34,8 +44,8 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
     sections = [
         {
             "title": f"{one.b} minus {one.a}",
-            "plot": plot_elements([comparison_plot([one])])[0],
-            "table": wording.part_table(one),
+            "plots": _plots([one]),
+            "tables": wording.part_tables(one),
             "winners": [
                 (winner, [_shown(flip, out_dir) for flip in one.flips if flip.winner == winner])
                 for winner in (one.b, one.a)
@@ -51,7 +61,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
         statements=wording.findings(comparisons),
         warnings=wording.warnings(comparisons),
         pairs=wording.pair_table(comparisons),
-        overview=plot_elements([comparison_plot(comparisons)])[0] if len(comparisons) > 1 else "",
+        overview=_plots(comparisons) if len(comparisons) > 1 else [],
         sections=sections,
     )
 
@@ -62,9 +72,8 @@ def _gap(effect: PairedEffect, name: str, p_name: str = "p") -> Gap:
 
 def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:
     links = [
-        (name, _relative(page, out_dir))
+        (name, None if page is None else _relative(page, out_dir))
         for name, page in zip((flip.winner, flip.loser), flip.pages, strict=True)
-        if page is not None
     ]
     return {"flip": flip, "where": wording.where(flip), "links": links}
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
+from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip, Part
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, points
 from evonav.report.tables.table import (
@@ -56,11 +56,12 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
                 f"{one.b} minus {one.a}",
                 f"{100 * sr.mean_b:.1f} and {100 * sr.mean_a:.1f}",
                 *effect_cells(sr),
+                says(one),
                 *effect_cells(spl),
+                NONE if spl is None else says(one, "spl"),
                 str(one.all.n),
                 f"{one.all.num_only_b} / {one.all.num_only_a}",
                 NONE if sr.detectable is None else f"{100 * sr.detectable:.1f}",
-                says(one),
             )
         )
     p_name = p_heading(len(comparisons))
@@ -69,12 +70,13 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
         "SR %",
         "SR difference [95% CI]",
         p_name,
+        "SR verdict",
         "SPL difference [95% CI]",
         p_name,
+        "SPL verdict",
         "n",
         "only first / second",
         "detectable",
-        "SR says",
     )
     notes = (
         f"Percentage points. {METHOD}",
@@ -153,18 +155,53 @@ def _short_flips(one: Comparison) -> Table:
 def part_table(one: Comparison) -> Table:
     """Build a table of one pair, on all stages, by stratum and by mode."""
     fields = list(one.all.effects)
-    columns = ["Stages", "n", "only first / second", f"SR % {one.b}", f"SR % {one.a}"]
-    for field in fields:
-        columns += [f"{measure_name(field)} difference [95% CI]", "p"]
+    columns, rows = _part_heads(one)
+    return Table(
+        f"{one.b} minus {one.a}",
+        (*columns, *_field_columns(fields)),
+        tuple((*row, *_field_cells(part, fields)) for row, part in zip(rows, one.parts, strict=True)),
+        (METHOD, EXPLORING, *_notes_on(fields)),
+    )
+
+
+def part_tables(one: Comparison) -> list[Table]:
+    """Build the same as tables that a page is wide enough for: SR and SPL with the counts, then other metrics."""
+    fields = list(one.all.effects)
+    first = [field for field in fields if field in ("success", "spl")]
+    others = [field for field in fields if field not in first]
+    columns, rows = _part_heads(one)
+    parts = [(columns, rows, first), *((columns[:2], [row[:2] for row in rows], part) for part in _in_threes(others))]
+    return [
+        Table(
+            f"{one.b} minus {one.a}",
+            (*heads, *_field_columns(shown)),
+            tuple((*row, *_field_cells(part, shown)) for row, part in zip(lines, one.parts, strict=True)),
+            (METHOD, EXPLORING, *_notes_on(shown)) if shown is first else _notes_on(shown),
+        )
+        for heads, lines, shown in parts
+    ]
+
+
+def _in_threes(fields: Sequence[str]) -> list[Sequence[str]]:
+    return [fields[i : i + 3] for i in range(0, len(fields), 3)]
+
+
+def _part_heads(one: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the columns and rows that describe the parts themselves."""
     rows = []
     for part in one.parts:
         sr = part.effects["success"]
-        cells = [part.label, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
-        cells += [f"{100 * sr.mean_b:.1f}", f"{100 * sr.mean_a:.1f}"]
-        for field in fields:
-            cells += effect_cells(part.effects.get(field), scale_of(field))
-        rows.append(tuple(cells))
-    return Table(f"{one.b} minus {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING, *_notes_on(fields)))
+        only, rates = f"{part.num_only_b} / {part.num_only_a}", (f"{100 * x:.1f}" for x in (sr.mean_b, sr.mean_a))
+        rows.append((part.label, str(part.n), only, *rates))
+    return ("Stages", "n", "only first / second", f"SR % {one.b}", f"SR % {one.a}"), rows
+
+
+def _field_columns(fields: Sequence[str]) -> list[str]:
+    return [name for field in fields for name in (f"{measure_name(field)} difference [95% CI]", "p")]
+
+
+def _field_cells(part: Part, fields: Sequence[str]) -> list[str]:
+    return [cell for field in fields for cell in effect_cells(part.effects.get(field), scale_of(field))]
 
 
 def _notes_on(fields: Iterable[str]) -> tuple[str, ...]:
