@@ -25,6 +25,7 @@ from evonav.cli.run.controlled import controlled_app
 from evonav.cli.run.demo import demo
 from evonav.cli.run.evaluate import evaluate
 from evonav.cli.run.failures import failures
+from evonav.cli.run.new_agent import new_agent
 from evonav.cli.run.sweep import sweep
 from evonav.cli.tasks.app import tasks_app
 from evonav.cli.tasks.houses import houses_app
@@ -32,7 +33,7 @@ from evonav.cli.tasks.houses import houses_app
 EXIT_ERROR = 1
 DEBUG_VARIABLE = "EVONAV_DEBUG"
 PANELS = {
-    "Start": (demo, doctor),
+    "Start": (demo, doctor, new_agent),
     "Run": (evaluate, sweep, check_agent, agents),
     "Results": (report, view, compare, breakdown, failures, export),
     "Data": (houses_app, tasks_app),

@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.display import counted_as, print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
+from evonav.cli.options.shared import Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -49,12 +49,7 @@ def verify(
     workers: "RunSettings",
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A packed run, from `evonav pack`.")],
     tasks: Tasks = None,
-    limit: Annotated[
-        int | None,
-        typer.Option(
-            min=1, metavar="N", help="Replay only the first N tasks, and do not require the others. Default: all."
-        ),
-    ] = None,
+    limit: Limit = None,
     subset: Subset = None,
     scores_only: Annotated[
         bool,
@@ -67,7 +62,8 @@ def verify(
 ) -> None:
     """Check a packed run by replaying its actions and scoring them again.
 
-    The exit code is 1 if anything was altered or is missing.
+    The exit code is 1 if anything was altered or is missing. With --limit, only the first tasks are required and
+    replayed.
     """
     import json
 

@@ -1,8 +1,9 @@
 """`evonav evaluate`: run agents on tasks."""
 
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -37,6 +38,8 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
 
+DEVELOP_PANEL = "For agents under development"
+
 
 @with_settings("run", "simulation", "perception", "decisions", "spending")
 def evaluate(
@@ -55,6 +58,22 @@ def evaluate(
     subset: Subset = None,
     seed: Seed = 0,
     retry_errored: RetryErrored = False,
+    fail_fast: Annotated[
+        bool,
+        typer.Option(
+            "--fail-fast",
+            rich_help_panel=DEVELOP_PANEL,
+            help="Stop at the first stage that errors and print its traceback; the next call runs it again.",
+        ),
+    ] = False,
+    pdb: Annotated[
+        bool,
+        typer.Option(
+            "--pdb",
+            rich_help_panel=DEVELOP_PANEL,
+            help="Open the debugger where an agent raises, then stop. Agents run in this process; it needs a terminal.",
+        ),
+    ] = False,
     dry_run: DryRun = False,
 ) -> None:
     """Evaluate agents on tasks, by default on the bundled ones; run again to resume.
@@ -68,6 +87,11 @@ def evaluate(
         raise typer.BadParameter("give --houses or --tasks, not both")
     if houses is None and (assets is not None or start != "file"):
         raise typer.BadParameter("--assets and --start belong to --houses: tasks hold houses as they were generated")
+    if pdb:
+        from evonav.evaluation.hosting.debugger import check_terminal
+
+        check_terminal()
+        run = run.model_copy(update={"workers": 0, "in_process": True})
     workforce = run.workforce()
     backend = Backend(
         simulator=simulation.component(),
@@ -75,6 +99,7 @@ def evaluate(
         decision=decision_component(decisions, spending, out, seed, run.num_workers, dry_run=dry_run),
     )
     config = run.config(seed, backend, decisions)
+    config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))
     names = names_of(agent)
     allows_any = simulation.allow_unknown_assets
     texts = None if houses is None else read_houses(houses, assets, start)
@@ -82,13 +107,13 @@ def evaluate(
         if dry_run:
             print_estimate(spending, names, task_files, config, run.num_workers)
             return
-        with running(out, config) as show:
+        with running(out, config, has_bar=not pdb) as show, stopping_early(out):
             (summaries,) = evaluate_all(
                 [RunRequest(tuple(names), tuple(task_files), out, config)],
                 workforce,
                 num_retries=run.num_retries,
-                retry_errored=retry_errored,
-                on_progress=lambda _, state: show(state),
+                retry_errored=retry_errored or fail_fast or pdb,
+                on_progress=lambda _, state: show(stopped_early(state, pdb) if fail_fast or pdb else state),
             )
     print_results(out, summaries)
     exit_if_incomplete(summaries)
@@ -131,13 +156,51 @@ def run_tasks(
 
 
 @contextmanager
-def running(out: Path, config: "RunConfig") -> "Iterator[Callable[[Progress], None]]":
-    """Show the progress of a run, which the yielded function updates; an interrupt says how to resume."""
+def running(out: Path, config: "RunConfig", *, has_bar: bool = True) -> "Iterator[Callable[[Progress], None]]":
+    """Show the progress of a run, which the yielded function updates; an interrupt says how to resume.
+
+    Args:
+        out: Folder of the run.
+        config: Its configuration.
+        has_bar: Show a bar; a debugger needs the terminal for itself.
+    """
     with interruptible(out):
         with status("Starting the simulator"):
             config.backend.check()
+        if not has_bar:
+            yield lambda _: None
+            return
         with progress() as show:
             yield show
+
+
+class _StageErroredError(Exception):
+    """A stage errored in a run that stops at the first such stage."""
+
+
+def stopped_early(state: "Progress", is_brief: bool) -> "Progress":
+    """Return the progress, unless it reports an errored stage.
+
+    Raises:
+        _StageErroredError: The latest stage errored; the message says why, with the traceback unless it is brief.
+    """
+    latest = state.latest
+    if latest is not None and latest.failure is not None:
+        failure = latest.failure
+        traceback = "" if is_brief else failure.traceback
+        raise _StageErroredError(f"{traceback}{latest.label}: {failure.kind.phrase}: {failure.message}")
+    return state
+
+
+@contextmanager
+def stopping_early(out: Path) -> "Iterator[None]":
+    """Print why a run stopped at its first errored stage, and end the command."""
+    try:
+        yield
+    except _StageErroredError as error:
+        typer.echo(str(error), err=True)
+        typer.echo(f"stopped at the first errored stage; the stages before it are in {out}", err=True)
+        raise typer.Exit(EXIT_INCOMPLETE) from None
 
 
 def print_results(out: Path, summaries: "list[AgentSummary]") -> None:

@@ -76,6 +76,8 @@ class AgentHosting:
     """Largest address space of an agent's process; default: no limit."""
     log: str | None = None
     """File to which the output of agents is appended; default: the evaluator's standard error."""
+    is_debugged: bool = False
+    """Open Python's debugger where an agent raises; only in the evaluator's own process, on a terminal."""
 
 
 class AgentProcess:

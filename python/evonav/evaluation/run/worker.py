@@ -116,9 +116,18 @@ class WorkerContext:
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
             return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed)
         try:
+            if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINES:
+                return self._debugged_agent(job)
             return make_agent(job.agent, self.config.backend.decision.create(job.seed))
         except Exception as error:
             return _FailedAgent(error)
+
+    def _debugged_agent(self, job: EpisodeJob) -> HostedAgent:
+        """Make a fresh agent whose exceptions open the debugger."""
+        from evonav.evaluation.hosting.debugger import DebuggedAgent, post_mortem
+
+        with post_mortem():
+            return DebuggedAgent(make_agent(job.agent, self.config.backend.decision.create(job.seed)))
 
     def close_simulator(self) -> None:
         """Close the simulator, as after an episode that did not end; the next episode starts another one."""
