@@ -14,13 +14,12 @@ from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedStage, agents_in_order, load_run
-from evonav.report.tables.numbers import NONE
+from evonav.report.tables.numbers import NONE, points
 from evonav.report.tables.table import Table
-from evonav.statistics import Interval, PairedEffect, paired_effect
+from evonav.statistics import PairedEffect, paired_effect
 
 BASELINE = "stage-reset"
 """Agent that forgets everything between stages; memory is compared with it."""
-MINUS = "\N{MINUS SIGN}"
 SPLITS = {
     "target": "the target moved",
     "room": "its room changed, not it",
@@ -263,20 +262,9 @@ def effect_cells(effect: PairedEffect | None) -> list[str]:
     return [
         f"{100 * effect.mean_a:.1f}",
         f"{100 * effect.mean_b:.1f}",
-        signed(effect.difference, effect.ci95),
+        points(effect),
         p_words(effect.p),
     ]
-
-
-def signed(value: float, interval: Interval | None) -> str:
-    """Return a difference in points with its interval: `-6.3 (-13.9 to +1.2)`."""
-    ends = "" if interval is None else f" ({_point(interval[0])} to {_point(interval[1])})"
-    return f"{_point(value)}{ends}"
-
-
-def _point(value: float) -> str:
-    text = f"{100 * value:+.1f}"
-    return "0.0" if text in ("+0.0", "-0.0") else text.replace("-", MINUS)
 
 
 def p_words(p: float) -> str:

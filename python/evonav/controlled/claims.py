@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys, p_words, signed
+from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys, p_words
+from evonav.report.tables.numbers import points
 from evonav.report.tables.table import Table
 from evonav.statistics import LEVEL, MIN_CLUSTERS, PairedEffect
 
@@ -79,7 +80,7 @@ def claim_table(analysis: Analysis) -> Table:
             one.paper,
             one.what,
             str(one.effect.n),
-            signed(one.effect.difference, one.effect.ci95),
+            points(one.effect),
             p_words(one.effect.p),
             one.verdict,
         )

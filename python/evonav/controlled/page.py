@@ -82,7 +82,7 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
         name=directory.resolve().name,
         kind=analysis.record.kind,
         record=analysis.record,
-        plots=plot_elements(plots),
+        plots=plot_elements(plots, are_even=True),
         tables=tables,
         highlights=_write_highlights(analysis, out) if is_pairs else [],
         pairs=_write_pairs(analysis, out) if is_pairs else [],
@@ -167,10 +167,11 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
         items = [] if stage_map is None else [item for item in stage_map.objects if item.object_id in moving]
         changed = change(one.record, one.maps, frame)
         names = "" if stage_map is None else labels(stage_map, frame)
-        defs.append(f'<g class="map" id="arm{i}">{furniture(items, frame)}{changed}{names}</g>')
+        defs.append(f'<g class="map" id="arm{i}">{furniture(items, frame)}{changed}</g>')
+        defs.append(f'<g class="map" id="names{i}">{names}</g>')
 
     def cell(i: int, one: Rollout) -> dict[str, Any]:
-        drawn = f'<use href="#house"/><use href="#arm{i}"/>{walk_and_course(one, frame)}'
+        drawn = f'<use href="#house"/><use href="#arm{i}"/>{walk_and_course(one, frame)}<use href="#names{i}"/>'
         svg = f'<svg class="map" viewBox="{frame.view_box}" role="img">{drawn}</svg>'
         return stage_cell(one.record, Markup(svg))  # noqa: S704 - our own SVG
 

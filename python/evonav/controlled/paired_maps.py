@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evonav.controlled.analysis import SPLITS, Analysis, Key, has_moved_far, split_of
@@ -18,6 +18,8 @@ from evonav.report.maps.stage_map import change_words, house_drawing, success_ra
 from evonav.report.maps.trajectory import course
 from evonav.report.tables.causes import sentence
 
+MARKER_SCALE = 0.75
+"""Size of markers and letters beside that of other maps: pairs are drawn larger."""
 PANEL_PX, GAP_PX, HEAD_PX, FOOT_PX, IMAGE_PX = 560, 20, 96, 58, 84
 ARM_WORDS = {"fixed": "Fixed", "evolved": "Not Fixed"}
 REASONS = {
@@ -112,7 +114,7 @@ def pair_svg(pair: Sequence[Rollout]) -> str:
 def pair_frame(pair: Sequence[Rollout]) -> Frame:
     """Return the frame that all arms of a pair share."""
     maps = {i: stage_map for i, one in enumerate(pair) for stage_map in one.maps.values()}
-    return task_frame(maps, [one.record for one in pair])
+    return replace(task_frame(maps, [one.record for one in pair]), marker_scale=MARKER_SCALE)
 
 
 def _panel(rollout: Rollout, frame: Frame, left_px: int) -> str:
@@ -123,7 +125,7 @@ def _panel(rollout: Rollout, frame: Frame, left_px: int) -> str:
         ("quiet", 34, text_lines(sentence(record), 90, 1)[0]),
         (css, 50, text_lines(change_sentence(rollout), 90, 1)[0]),
     ]
-    drawing = house_drawing(record, rollout.maps, frame) + walk_and_course(rollout, frame)
+    drawing = house_drawing(record, rollout.maps, frame, on_it=walk_and_course(rollout, frame))
     return panel(record, drawing, frame, (left_px, HEAD_PX), PANEL_PX, (arm_words(rollout.arm), verdict), captions)
 
 

@@ -27,9 +27,9 @@ class Crossover:
         return 0.0 <= self.rate <= 1.0
 
     def text(self) -> str:
-        """Return the rate with its interval, `0.62 (0.31 to >1)`, or that there is none, or that it is undetermined."""
+        """Return the rate with its interval, `0.62 [0.31, >1]`, or that there is none, or that it is undetermined."""
         low, high = self.ci95
-        interval = f"({_rate_words(low)} to {_rate_words(high)})"
+        interval = f"[{_rate_words(low)}, {_rate_words(high)}]"
         if low > 1.0:
             return f"none found: memory is ahead at every rate {interval}"
         if high < 0.0:

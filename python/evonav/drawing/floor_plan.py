@@ -56,11 +56,13 @@ class Frame:
     top: int
     width: int
     height: int
+    marker_scale: float = 1.0
+    """Size of markers, lines and letters: below 1 for maps that are shown large."""
 
     @property
     def unit(self) -> float:
         """One hundredth of a map's size: what markers and letters scale with, so that all maps look alike."""
-        return max(4.0, max(self.width, self.height) / 100)
+        return self.marker_scale * max(4.0, max(self.width, self.height) / 100)
 
     @property
     def view_box(self) -> str:

@@ -97,9 +97,11 @@ def stage_drawing(
     return house_drawing(record, maps, frame, names) + course(record, frame, success_radius_m)
 
 
-def house_drawing(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, item_names: str = "") -> str:
-    """Return the house of a stage, with what moved before it and the names of its rooms."""
+def house_drawing(
+    record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, item_names: str = "", *, on_it: str = ""
+) -> str:
+    """Return the house of a stage, with what moved before it, `on_it`, and the names of its rooms on top."""
     stage_map, changed = maps.get(record.stage), change(record, maps, frame)
     if stage_map is None:
-        return changed
-    return ground(stage_map, frame) + changed + item_names + labels(stage_map, frame)
+        return changed + on_it
+    return ground(stage_map, frame) + changed + item_names + on_it + labels(stage_map, frame)
