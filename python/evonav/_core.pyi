@@ -228,8 +228,6 @@ def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[
 def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int64]:
     """Return `(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
 
-# png
-
 def encode_png(rgb: NDArray[np.uint8]) -> bytes:
     """Encode an `(H, W, 3)` image as PNG, without metadata."""
 

@@ -10,6 +10,7 @@ use evonav_core::{
     sensors::{
         camera::{Camera, View},
         instance_masks::instance_areas,
+        png::encode_png,
         raster::{FrameBuffer, Want, render, visible_px},
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
@@ -69,6 +70,12 @@ fn bench_raster(c: &mut Criterion) {
     render(&mesh, &cameras_300[0], want, &mut frame).expect("a camera in the house");
     c.bench_function("ground_truth/instance_areas_300x300", |b| {
         b.iter(|| instance_areas(black_box(&frame.instances), scene.bodies.len()));
+    });
+    // A reference image of a task.
+    render(&mesh, &cameras_300[0], Want { rgb: true, instances: false }, &mut frame)
+        .expect("a camera in the house");
+    c.bench_function("png/encode_300x300", |b| {
+        b.iter(|| encode_png(black_box(&frame.rgb), [300, 300]));
     });
     // The twin that shares no idea with it: a ray a pixel.
     let caster = RayCaster::build(&mesh);

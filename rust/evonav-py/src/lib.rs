@@ -9,7 +9,6 @@ mod house;
 mod inspection;
 mod memory;
 mod perception;
-mod png;
 mod sensors;
 mod simulator;
 mod unigoal;
@@ -41,8 +40,7 @@ mod _core {
                 distort_masks, draw_normals, mask_outlines, noisy_depth, paint_blobs, surface_sites,
             },
         },
-        png::encode_png,
-        sensors::{instance_areas, mask_extents, number_instances, visible_cells},
+        sensors::{encode_png, instance_areas, mask_extents, number_instances, visible_cells},
         simulator::{
             batch::{PyBatchSimulator, PyGeodesicField},
             embedded::{PyEmbeddedSimulator, map_spec},

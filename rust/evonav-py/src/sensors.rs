@@ -1,11 +1,14 @@
 //! `evonav_core::sensors`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
+    Error,
     grid::GridSpec,
-    sensors::{instance_masks, visible_cells::visible_cells as cast_rays},
+    sensors::{instance_masks, png, visible_cells::visible_cells as cast_rays},
 };
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::prelude::*;
+use numpy::{
+    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::{prelude::*, types::PyBytes};
 
 use crate::{arrays, error};
 
@@ -83,4 +86,19 @@ pub fn mask_extents<'py>(
         [extent.area_px, left, top, right, bottom].map(|px| px as i64)
     };
     arrays::rows_of(py, extents.into_iter().map(row).collect())
+}
+
+/// Encode an RGB image as PNG.
+#[pyfunction]
+pub fn encode_png<'py>(
+    py: Python<'py>,
+    rgb: PyReadonlyArray3<'py, u8>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let bytes = arrays::elements("rgb", &rgb)?;
+    let &[height_px, width_px, 3] = rgb.shape() else {
+        let found = format!("of shape {:?}", rgb.shape());
+        return Err(error::to_py(Error::invalid("rgb", found, "an (H, W, 3) array")));
+    };
+    let file = py.detach(|| png::encode_png(bytes, [height_px, width_px]));
+    Ok(PyBytes::new(py, &file.map_err(error::to_py)?))
 }

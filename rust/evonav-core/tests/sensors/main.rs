@@ -5,6 +5,7 @@
 mod scenes;
 
 mod images;
+mod png;
 mod raster;
 mod visible_bodies;
 mod visible_px;
