@@ -162,14 +162,17 @@ class ToySimulator:
         up = np.array([sin_yaw * sin_pitch, cos_pitch, cos_yaw * sin_pitch])
         rays = forward + u[None, :, None] * right - v[:, None, None] * up
         origin = np.array([pose.x_m, config.camera_height_m, pose.z_m])
+        enter, leave = -np.inf, np.inf
         with np.errstate(divide="ignore", invalid="ignore"):
-            near = (self._low - origin) / rays[:, :, None, :]
-            far = (self._high - origin) / rays[:, :, None, :]
-        enter = np.nanmax(np.minimum(near, far), axis=-1)
-        leave = np.nanmin(np.maximum(near, far), axis=-1)
+            for axis in range(3):  # bodies first, then pixels
+                ray = rays[..., axis]
+                near = (self._low[:, axis] - origin[axis])[:, None, None] / ray
+                far = (self._high[:, axis] - origin[axis])[:, None, None] / ray
+                enter = np.fmax(enter, np.minimum(near, far))
+                leave = np.fmin(leave, np.maximum(near, far))
         depth = np.where((enter <= leave) & (enter > 0.05), enter, np.inf)
-        index = depth.argmin(axis=-1)
-        nearest = depth.min(axis=-1)
+        index = depth.argmin(axis=0)
+        nearest = depth.min(axis=0)
         ids = np.where(np.isfinite(nearest), index + 1, 0).astype(np.int32)
         return Frame(
             pose=replace(pose, y_m=config.camera_height_m),
