@@ -44,6 +44,7 @@ PARSED_ONLY = {
     "evonav mock-vlm": "serves until it is stopped: tests/decision",
     "my_package": "a package that is not there",
     "--open": "opens a browser",
+    "--assets": "a file of sizes that is not here: tests/house",
     "delay=": "waits",
 }
 """Commands with these words are not run here, only parsed."""

@@ -145,7 +145,7 @@ def test_one_bundled_house_is_named_by_its_number():
     (house,) = load_houses("bundled:3")
     assert house.name == "bundled:3"
     assert [one.name for one in load_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
-    with pytest.raises(HouseError, match="fewer bundled houses"):
+    with pytest.raises(HouseError, match="bundled has fewer houses"):
         list(load_houses("bundled:1000"))
     with pytest.raises(HouseError, match="where N is a number from 1"):
         load_houses("bundled:first")

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 import zlib
 from collections.abc import Iterator, Mapping
 from importlib import resources
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 BUNDLED = "bundled"
 """Names the houses that come with evonav; `bundled:3` is the third of them."""
+_NUMBERED = re.compile(r"(.+):([1-9]\d*)")
 SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 
 
@@ -26,8 +28,8 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; or `bundled` (all
-            bundled houses) or `bundled:3` (the third).
+            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; or `bundled`, for the
+            houses that come with evonav. `bundled:3` and `houses.jsonl:3` are the third house.
         limit: Number of houses after which to stop.
 
     Yields:
@@ -84,11 +86,14 @@ class HouseTexts:
         self.completion = completion
         self._path = Path(path)
         self._number: int | None = None
-        """Number of the one bundled house that is read."""
+        """Number of the one house that is read; `None` for all."""
         if str(path).partition(":")[0] == BUNDLED and not self._path.exists():
             self._number = _bundled_number(str(path))
             self._path = Path(str(resources.files("evonav") / "data" / "houses.jsonl.gz"))
             self.name = BUNDLED
+        elif not self._path.exists() and (numbered := _NUMBERED.fullmatch(str(path))) and Path(numbered[1]).is_file():
+            self._path, self._number = Path(numbered[1]), int(numbered[2])
+            self.name = numbered[1]
         elif str(path).startswith("procthor-10k") and not self._path.exists():
             from evonav.house.procthor10k import house_set, split_path
 
@@ -122,7 +127,7 @@ class HouseTexts:
             is_empty = False
             yield house if self.completion is None else house._replace(text=self.completion.complete(*house))
         if is_empty and self._number is not None:
-            raise HouseError(f"bundled:{self._number}: there are fewer bundled houses")
+            raise HouseError(f"{self.name}:{self._number}: {self.name} has fewer houses")
 
     def _read(self) -> Iterator[HouseText]:
         self._num_bytes_before = 0
