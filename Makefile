@@ -93,7 +93,7 @@ readme: setup  ## renew the table and the picture of the README
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/update_readme.py out/demo
-	$(BIN)/evonav strip out/demo --agent ftu --out docs/images/episode.svg
+	$(BIN)/evonav strip out/demo --task bundled-0085-5f3096-s0 --stage 2,3 --agent fu,ftu --out docs/images/episode.svg
 
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs

@@ -17,7 +17,15 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "out" / "docs-source"
 SITE = ROOT / "out" / "docs"
-PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "benches/README.md", "docs/**/*.md")
+PAGES = (
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "benches/README.md",
+    "examples/README.md",
+    "docs/**/*.md",
+)
 # The README is the package's page on its index too, so its links into the repository are absolute.
 _REPOSITORY = re.compile(r"https://(?:github\.com/evonav/evonav/blob|raw\.githubusercontent\.com/evonav/evonav)/main/")
 _LINK = re.compile(r"(!?\[[^\]]*\])\(([^)#\s]+)(#[^)\s]*)?\)")

@@ -17,7 +17,8 @@ import typer
 from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
-from evonav.agents.agent import NavigateTo
+import evonav
+from evonav.agents.agent import NavigateTo, Stop
 from evonav.cli import app
 from evonav.evaluation.run.components import check_agent_name
 from evonav.evaluation.run.run import evaluate
@@ -215,6 +216,8 @@ def test_python_of_a_page_runs(page: Path, place: Path, monkeypatch: pytest.Monk
         for value in namespace.values():
             if type(value).__name__ == "Controller":
                 value.stop()
+    states = [state for run in namespace.values() if isinstance(run, evonav.Run) for state in run.stages["state"]]
+    assert set(states) <= {"success", "failure"}
 
 
 def test_no_script_of_a_page_guards_against_being_imported_by_workers() -> None:
@@ -223,23 +226,41 @@ def test_no_script_of_a_page_guards_against_being_imported_by_workers() -> None:
     assert guarded == []
 
 
-def test_the_doubting_agent_of_the_tutorial_forgets_an_object_that_is_gone() -> None:
+@pytest.fixture(scope="module")
+def tutorial() -> dict[str, Any]:
+    """The names that the tutorial defines, without its evaluation."""
     namespace: dict[str, Any] = {}
     for text in python_texts(Path("docs/tutorial-agent.md")):
-        exec(compile(text, "tutorial-agent.md", "exec", dont_inherit=True), namespace)
-    agent = namespace["Doubter"]()
-    agent.begin_task(TaskInfo("a-task", 1, 50, MapFrame(40, 60, 0.1, (-3.0, -1.0)), 0))
-    goal = "Please find the mug."
-    agent.begin_stage(Goal(1, "Mug", goal, goal, goal, np.zeros((8, 8, 3), np.uint8)))
+        if "evonav.evaluate" not in text:
+            exec(compile(text, "tutorial-agent.md", "exec", dont_inherit=True), namespace)
+    return namespace
 
-    target = agent.act(observation_of("Mug"))
-    assert len(agent.objects.entries) == 1
-    assert isinstance(target, NavigateTo)
-    assert math.dist(target.position_m, (0.0, 2.0)) < 0.2
+
+@pytest.mark.parametrize(
+    ("name", "seen_again", "stops"),
+    [
+        ("Believer", False, True),
+        ("Looker", True, True),
+        ("Looker", False, False),
+        ("Checker", True, True),
+        ("Checker", False, False),
+    ],
+)
+def test_an_agent_of_the_tutorial_stops_at_a_remembered_object(
+    name: str, seen_again: bool, stops: bool, tutorial: dict[str, Any]
+) -> None:
+    agent = tutorial[name]()
+    agent.begin_task(TaskInfo("a-task", 2, 50, MapFrame(40, 60, 0.1, (-3.0, -1.0)), 0))
+    goal = "Please find the mug."
+    for stage in (1, 2):
+        agent.begin_stage(Goal(stage, "Mug", goal, goal, goal, np.zeros((8, 8, 3), np.uint8)))
+        target = agent.act(observation_of(*["Mug"] * (stage == 1)))
+        assert isinstance(target, NavigateTo)
+        assert math.dist(target.position_m, (0.0, 2.0)) < 0.2
     assert agent.act(observation_of()) == target, "still on its way"
-    agent.act(observation_of(has_arrived=True))
-    assert agent.objects.entries == []
-    assert agent.target is None
+    answer = agent.act(observation_of(*["Mug"] * seen_again, has_arrived=True))
+    assert isinstance(answer, Stop) == (stops or (not agent.objects.entries and not agent.map.frontiers))
+    assert len(agent.objects.entries) == stops
 
 
 def observation_of(*labels: str, has_arrived: bool = False) -> Observation:

@@ -15,6 +15,7 @@ WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 FORMS = sorted(path for path in (ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml") if path.name != "config.yml")
 YAML = [*ROOT.glob(".github/**/*.yml"), ROOT / ".pre-commit-config.yaml"]
 SYSTEMS = {"ubuntu": "POSIX :: Linux", "macos": "MacOS", "windows": "Microsoft :: Windows"}
+ARXIV = "2609.08292"
 REPOSITORY_PATH = re.compile(r"(?<![\w./-])(?:\.ci|benches|docs|examples|scripts|tests)/[\w./-]*\w")
 
 
@@ -144,10 +145,18 @@ def test_addresses_are_of_one_repository(pyproject: dict[str, Any], cargo: dict[
     repository = cargo["package"]["repository"]
     urls = pyproject["project"]["urls"]
     assert urls["Source"] == repository
+    assert urls.pop("Paper") == f"https://arxiv.org/abs/{ARXIV}"
     assert all(url.startswith(repository) for url in urls.values())
     for url in urls.values():
         _, _, path = url.partition("/main/")
         assert (ROOT / path).exists(), url
+
+
+def test_readme_and_citation_name_the_paper_by_its_number() -> None:
+    paper = load_yaml(ROOT / "CITATION.cff")["preferred-citation"]
+    assert paper["url"] == f"https://arxiv.org/abs/{ARXIV}"
+    assert paper["identifiers"][0]["value"] == f"arXiv:{ARXIV}"
+    assert f"[arXiv:{ARXIV}](https://arxiv.org/abs/{ARXIV})" in read(ROOT / "README.md")
 
 
 def test_image_copies_what_the_wheel_is_made_of() -> None:
