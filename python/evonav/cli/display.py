@@ -15,26 +15,74 @@ LINE_EVERY_S = 60.0
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from rich.table import Table
+    from rich.table import Table as RichTable
 
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress
     from evonav.generation.dataset import GenerationProgress
+    from evonav.report.tables.table import Table
 
 
-MAX_WIDTH = 200
-"""Largest width of a table where there is no terminal, in characters."""
+_GAP = 3
+"""Width of the space between two columns of a table, in characters."""
 
 
-def show(table: "Table") -> None:
-    """Print a table without cutting anything off, however narrow the terminal is."""
+def show(table: "RichTable") -> None:
+    """Print a table of a terminal's own; cells that are not wrapped are never cut off."""
     from rich.console import Console
     from rich.measure import Measurement
 
     console = Console()
-    needed = Measurement.get(console, console.options.update(max_width=MAX_WIDTH), table)
-    width = needed.minimum if console.is_terminal else min(needed.maximum, MAX_WIDTH)
-    Console(width=max(console.width, width)).print(table)
+    needed = Measurement.get(console, console.options, table).minimum
+    Console(width=max(console.width, needed)).print(table)
+
+
+def show_tables(tables: "Iterable[Table]") -> None:
+    """Print tables of a report; one that is wider than the terminal is printed in parts, below each other."""
+    from rich.console import Console
+
+    console = Console()
+    for table in tables:
+        for part in in_parts(table, console.width):
+            console.print(part.rich())
+        if table.notes:
+            console.print("\n".join(table.notes), style="dim italic", markup=False, highlight=False)
+
+
+def in_parts(table: "Table", width: int) -> "list[Table]":
+    """Split the columns of a table, without its notes, so that no line is longer than `width`.
+
+    Every part repeats the columns that name a row: the first, and those after it without a heading. A cell wider than
+    the space that these leave is wrapped.
+    """
+    from dataclasses import replace
+
+    def width_of(column: int) -> int:
+        words = table.columns[column].split()
+        return _GAP + max(len(text) for text in ("", *words, *(row[column] for row in table.rows)))
+
+    num_keys = 1 + next((k for k, name in enumerate(table.columns[1:]) if name), 0)
+    widths = [width_of(column) for column in range(len(table.columns))]
+    taken = 1 + min(sum(widths[:num_keys]), width // 2)
+    groups: list[list[int]] = [[]]
+    for column in range(num_keys, len(widths)):
+        if groups[-1] and taken + sum(widths[other] for other in [*groups[-1], column]) > width:
+            groups.append([])
+        groups[-1].append(column)
+    parts = []
+    for number, group in enumerate(groups):
+        columns = [*range(num_keys), *group]
+        parts.append(
+            replace(
+                table,
+                title=table.title if number == 0 else f"{table.title}, continued",
+                columns=tuple(table.columns[column] for column in columns),
+                rows=tuple(tuple(row[column] for column in columns) for row in table.rows),
+                notes=(),
+                best=frozenset((row, columns.index(column)) for row, column in table.best if column in columns),
+            )
+        )
+    return parts
 
 
 def counted_as(number: int, noun: str) -> str:

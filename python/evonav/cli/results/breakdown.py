@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.display import write_texts
+from evonav.cli.display import show_tables, write_texts
 from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile, PlotFile, listed
 
 
@@ -31,8 +31,6 @@ def breakdown(
 
     Each rate has its number of stages and a 95% interval over houses.
     """
-    from rich.console import Console
-
     from evonav.report.compare import breakdown as made
     from evonav.report.compare.selection import read_compared_agents
     from evonav.report.plots.render import check_plot, write_plots
@@ -44,9 +42,7 @@ def breakdown(
     found = [made.breakdown(compared, name, measure) for name in listed(by) or made.STANDARD]
     found = [one for one in found if one.groups]
     tables = [made.breakdown_table(one) for one in found]
-    console = Console()
-    for one in found:
-        console.print(made.breakdown_table(one, is_brief=True).rich())
+    show_tables(made.breakdown_table(one, is_brief=True) for one in found)
     write_texts(
         (md, lambda: markdown_tables(tables)),
         (latex, lambda: latex_tables(tables)),

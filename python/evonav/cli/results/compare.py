@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.display import write_texts
+from evonav.cli.display import show_tables, write_texts
 from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile, PlotFile, listed
 
 
@@ -56,8 +56,7 @@ def compare(
         read_compared_agents(runs), measures=listed(measure), baseline=baseline, allow_differences=allow_differences
     )
     console = Console()
-    for table in wording.terminal_tables(found):
-        console.print(table.rich())
+    show_tables(wording.terminal_tables(found))
     for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
         console.print(line, markup=False, highlight=False)
     console.print(wording.METHOD, style="dim", highlight=False)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import write_texts
+from evonav.cli.display import show_tables, write_texts
 from evonav.cli.options.shared import MarkdownFile, RunFolder
 
 if TYPE_CHECKING:
@@ -42,8 +42,6 @@ def paper(
 
     Also shows the order of the agents in both, and how large a difference the run could detect.
     """
-    from rich.console import Console
-
     from evonav.errors import StoreError
     from evonav.report.paper.latex import paper_latex
     from evonav.report.paper.tables import paper_tables, power_table
@@ -53,10 +51,8 @@ def paper(
     loaded = load_run(run)
     if not any(summary.n for summary in loaded.summaries):
         raise StoreError(f"{run}: no stage is scored yet; `evonav evaluate` with the same options resumes the run")
-    console = Console()
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
-    for table in tables:
-        console.print(table.rich())
+    show_tables(tables)
     runs: dict[Perception, Run] = {perception.value: loaded}
     if latex is not None and prediction is not None:
         runs["prediction"] = load_run(prediction)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import interruptible, progress_bar, show
+from evonav.cli.display import interruptible, progress_bar, show_tables
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
@@ -93,8 +93,7 @@ def perception(
             typer.echo(f"failed: {word} {task_id}: {why}", err=True)
         if measured.tasks:
             page, shown = write_perception_report(out)
-            for table in perception_tables(shown, is_brief=True):
-                show(table.rich())
+            show_tables(perception_tables(shown, is_brief=True))
             typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
     if measured.failures:
         typer.echo(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_table, write_texts
+from evonav.cli.display import print_table, show_tables, write_texts
 from evonav.cli.options.shared import (
     Exchanges,
     MarkdownFile,
@@ -98,15 +98,11 @@ def _report_sweep(
 
 def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> None:
     """Print the tables of metrics of a run, and write them to a Markdown file if one is named."""
-    from rich.console import Console
-
     from evonav.report.tables.metric_tables import measures_tables
     from evonav.report.tables.table import markdown_tables
 
     tables = [table for table in measures_tables(run, agents) if table.rows]
-    console = Console()
-    for table in tables:
-        console.print(table.rich())
+    show_tables(tables)
     write_texts((md, lambda: markdown_tables(tables)))
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import interruptible, print_table, status
+from evonav.cli.display import interruptible, print_table, show_tables, status
 from evonav.cli.group import Command, new_app
 from evonav.cli.options.decisions import decision_component
 from evonav.cli.options.settings import with_settings
@@ -155,14 +155,10 @@ def report(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: FOLDER/report.")] = None,
 ) -> None:
     """Print the tables, and write a page with them, plots and all pairs."""
-    from rich.console import Console
-
     from evonav.controlled.analysis import load_analysis
     from evonav.controlled.page import tables_of, write_controlled_report
 
-    console = Console()
-    for table in tables_of(load_analysis(directory)):
-        console.print(table.rich())
+    show_tables(tables_of(load_analysis(directory)))
     typer.echo(f"page: {write_controlled_report(directory, out)}")
 
 

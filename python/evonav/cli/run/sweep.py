@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import EXIT_INTERRUPTED, show
+from evonav.cli.display import EXIT_INTERRUPTED, show, show_tables
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
 
@@ -135,8 +135,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
     from evonav.sweeps.tables import sweep_tables
 
     rows = write_sweep_summary(out)
-    for table in sweep_tables(rows):
-        show(table.rich())
+    show_tables(sweep_tables(rows))
     print_spending(out)
     typer.echo(f"summary: {out / 'summary.md'}, .csv, .json; runs: {out / 'runs'}")
     missing = [row for row in rows if row.is_incomplete and row.cell in selected]

@@ -108,9 +108,9 @@ class Table:
         """Return the table for `rich.print`."""
         notes = "\n".join(self.notes)
         table = RichTable(
-            title=self.title,
+            title=Text(self.title),
             title_justify="left",
-            caption=notes,
+            caption=Text(notes),
             caption_justify="left",
             box=SIMPLE_HEAD,
             pad_edge=False,
