@@ -58,8 +58,8 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
     from dataclasses import replace
 
     def width_of(column: int) -> int:
-        words = table.columns[column].split()
-        return _GAP + max(len(text) for text in ("", *words, *(row[column] for row in table.rows)))
+        heading = table.columns[column].split()
+        return _GAP + max(len(text) for text in ("", *heading, *(row[column] for row in table.rows)))
 
     num_keys = 1 + next((k for k, name in enumerate(table.columns[1:]) if name), 0)
     widths = [width_of(column) for column in range(len(table.columns))]

@@ -20,8 +20,9 @@ class _Shown:
         for param in params:
             if getattr(param, "is_flag", False):
                 param.metavar = ""
-            elif param.param_type_name == "argument" and param.metavar is None:
-                param.metavar = str(param.name).upper()
+            elif param.param_type_name == "argument":
+                param.metavar = param.metavar or str(param.name).upper()
+                param.display_type_rich = _without_type
         return params
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ANN401 - click's
@@ -31,6 +32,10 @@ class _Shown:
         }
         pieces: list[str] = super().collect_usage_pieces(ctx)  # type: ignore[misc]
         return [piece for piece in pieces if piece not in hidden]
+
+
+def _without_type(ctx: Any) -> None:  # noqa: ANN401 - click's
+    """Stand for the type of an argument, which its name tells."""
 
 
 def _pieces(param: Any, ctx: Any) -> list[str]:  # noqa: ANN401 - click's

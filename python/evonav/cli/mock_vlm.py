@@ -21,11 +21,11 @@ def mock_vlm(
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed that decides which requests fail.")] = 0,
     latency: Annotated[float, typer.Option(min=0.0, metavar="X", help="Seconds before each answer.")] = 0.0,
 ) -> None:
-    """Serve a simulated model on this machine, to test `--decision vlm` without a real one.
+    """Serve a simulated model, to test runs that ask one.
 
-    It has an OpenAI-compatible API and answers by simple rules. Faults: rate_limit (429 with Retry-After), server_error
-    (500), hang, disconnect, malformed (broken JSON around the answer), broken_json (in it), truncated, refusal,
-    filtered, empty, off_topic.
+    It has an OpenAI-compatible API on this machine and answers by rules. Faults: rate_limit (429 with Retry-After),
+    server_error (500), hang, disconnect, malformed (broken JSON around the answer), broken_json (in it), truncated,
+    refusal, filtered, empty, off_topic.
     """
     import time
 

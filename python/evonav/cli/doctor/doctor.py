@@ -23,7 +23,7 @@ def doctor(
         bool, typer.Option("--json", help="Print JSON instead of a table, for programs and bug reports.")
     ] = False,
 ) -> None:
-    """Check what works on this machine, and say how to install the rest.
+    """Check what works on this machine, and how to install the rest.
 
     The exit code is 1 if an essential part does not work.
     """

@@ -21,6 +21,14 @@ if TYPE_CHECKING:  # the command must start fast
 
 MODEL_PANEL = "Decision model"
 """Heading of the options of decision models in the help."""
+_METAVARS = {
+    "base_url": "URL",
+    "exchanges": "FILE",
+    "models": "FOLDER",
+    "noise": "NAME=RATE",
+    "prices": "FILE",
+}
+"""Placeholders of the values of some fields in the help."""
 WORKER_PANEL = "Workers and limits"
 """Heading of the options of workers in the help."""
 
@@ -88,7 +96,7 @@ class Options:
             text = f"{what} Default: the file's{', else ' + default if default else '.'}"
         flags = f"{self.flag(name)}/--no-{self.flag(name)[2:]}" if found.default is True else self.flag(name)
         least: Any = next((limit.ge for limit in found.metadata if isinstance(limit, Ge)), None)
-        metavar = None if name in self.parse else _metavar(found.annotation)
+        metavar = _METAVARS.get(name) or _metavar(found.annotation)
         return typer.Option(
             flags, min=least, help=text, rich_help_panel=self.panel, hidden=self.hidden, metavar=metavar
         )

@@ -46,7 +46,8 @@ RunTasks = Annotated[
     ),
 ]
 RunTask = Annotated[
-    str | None, typer.Option("--task", metavar="ID", help="Task of the run. Default: the most telling one.")
+    str | None,
+    typer.Option("--task", metavar="ID", help="Task of the run. Default: the one that best shows how agents differ."),
 ]
 OldTask = Annotated[str | None, typer.Argument(metavar="ID", hidden=True)]
 """A task's id without `--task`, as before."""

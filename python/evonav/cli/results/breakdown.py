@@ -27,7 +27,7 @@ def breakdown(
     csv: CsvFile = None,
     plot: PlotFile = None,
 ) -> None:
-    """Show rates by kind of stage, such as by room count or path length.
+    """Show rates by kind of stage, such as by room count.
 
     Each rate has its number of stages and a 95% interval over houses.
     """

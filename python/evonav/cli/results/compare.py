@@ -37,7 +37,7 @@ def compare(
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
     plot: PlotFile = None,
 ) -> None:
-    """Compare agents on the same stages: `compare A B` shows A minus B.
+    """Compare agents on the same stages: `compare A B` is A minus B.
 
     Differences have 95% intervals and p-values, and the stages with different outcomes are listed.
     """

@@ -20,7 +20,10 @@ def export(
         bool, typer.Option("--rounds", help="Write one row per decision round instead of one per stage.")
     ] = False,
 ) -> None:
-    """Write every metric to a file: one row per stage, or per decision round."""
+    """Write every metric of a run as CSV, JSON lines or Parquet.
+
+    There is one row per stage, or with --rounds one per decision round.
+    """
     from evonav.report import export as made
 
     names = listed(agent) or None

@@ -61,7 +61,7 @@ def perception(
     seed: Seed = 0,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Measure what perceptions detect, and the memory built from it, against the truth.
+    """Measure what perceptions find and remember, against the truth.
 
     Every perception sees the same views. Run again to resume. Writes report.html, summary.json, .csv and .md.
     """

@@ -40,16 +40,17 @@ def report(
         typer.Option(
             metavar="all|N|none",
             help="Episodes to replay in the report: a number, all or none. Default: the "
-            f"{NUM_REPLAYS} most telling ones, none for sweeps.",
+            f"{NUM_REPLAYS} that best show how agents differ, none for sweeps.",
         ),
     ] = None,
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
     maps: Annotated[bool, typer.Option("--maps", help="Also write the map of every stage to maps/*.svg.")] = False,
 ) -> None:
-    """Write one HTML page about a run or sweep: tables, plots, maps and replays.
+    """Write an HTML page about a run: tables, plots, maps, replays.
 
-    `--text` prints metrics that explain the rates instead: other definitions of success, stale entries, memory, costs.
+    A sweep gets a page for each run and one for all. With --text, nothing is written, and metrics that explain
+    rates are printed: other definitions of success, stale entries, memory, costs.
     """
     from evonav.sweeps.run import SWEEP_NAME
 
@@ -120,7 +121,7 @@ def strip(
         ),
     ] = None,
 ) -> None:
-    """Draw one task of a run as a picture, with a column per stage and a row per agent."""
+    """Draw one task of a run: a column per stage, a row per agent."""
     from evonav.report import load_run, write_strip
 
     numbers = numbers_of("--stage", stage) or None

@@ -30,7 +30,10 @@ def pack(
         str, typer.Option(metavar="TEXT", help="Model, prompts, training data and what else readers should know.")
     ] = "",
 ) -> None:
-    """Pack a complete run into one file to hand in: records, configuration and checksums of the tasks."""
+    """Pack a complete run into one file to submit.
+
+    The file holds the records, the configuration and checksums of the tasks.
+    """
     from evonav.submission.pack import SUFFIX, About, pack
 
     run = run.absolute()
@@ -60,10 +63,10 @@ def verify(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON instead of a table.")] = False,
 ) -> None:
-    """Check a packed run by replaying its actions and scoring them again.
+    """Check a packed run by replaying its actions.
 
-    The exit code is 1 if anything was altered or is missing. With --limit, only the first tasks are required and
-    replayed.
+    The scores are computed again. The exit code is 1 if anything was altered or is missing. With --limit, only the
+    first tasks are required and replayed.
     """
     import json
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Agent = Annotated[
     str | None,
-    typer.Option("--agent", metavar="NAME", help="Agent of the run. Default: that of the most telling episode."),
+    typer.Option("--agent", metavar="NAME", help="Agent of the run. Default: the one that best shows differences."),
 ]
 
 ACTIONS_FPS, ROUNDS_FPS = 12.0, 2.0
@@ -53,7 +53,10 @@ def video(
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Write an episode as an MP4 video: views, the agent's map and memory, and the truth."""
+    """Write an episode as an MP4 video.
+
+    It shows the views, the agent's map and memory, and the truth.
+    """
     from evonav.replay.video import check_video, write_video
     from evonav.replay.video_frames import episode_frame, stage_frames
 
@@ -86,7 +89,10 @@ def rerun(
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Write an episode as a recording for the rerun viewer: views, map, memory and the truth."""
+    """Write an episode as a recording for the rerun viewer.
+
+    It shows the views, the agent's map and memory, and the truth.
+    """
     from evonav.replay.rerun_export import check_recording, write_recording
 
     out = out or run / "episode.rrd"

@@ -34,7 +34,10 @@ def view(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: RUN/view.")] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Show episodes round by round as HTML pages: views, map, memory, questions and answers."""
+    """Show episodes round by round: views, map, memory, answers.
+
+    Writes HTML pages, and an index of them.
+    """
     stages = numbers_of("--stage", stage)
     pages, index = make_pages(run, task, listed(agent), stages=stages, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:

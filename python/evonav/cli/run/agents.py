@@ -9,7 +9,7 @@ OWN = {
 
 
 def agents() -> None:
-    """List the agents and oracle baselines that `--agent` takes."""
+    """List the agents and oracle baselines by name."""
     from evonav.agents.registry import agent_descriptions
     from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 

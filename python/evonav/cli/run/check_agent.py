@@ -31,9 +31,10 @@ def check_agent(
         float, typer.Option(min=0.1, metavar="X", help="Seconds to wait for an agent's answer.")
     ] = 60.0,
 ) -> None:
-    """Check in seconds that an agent works, also where agents crash: a target that moved, or was never found.
+    """Check in seconds that an agent works, also where many crash.
 
-    It runs in bundled houses. The exit code is 1 if a check fails.
+    It runs in bundled houses: with a target that moved, one that is never found, and more. The exit code is 1 if a
+    check fails.
     """
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend

@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # the command must start fast
 
 controlled_app = new_app(
     "controlled",
-    help="Measure what a change in the house costs, all else equal: Fixed / Not Fixed pairs, or several change rates.",
+    help="Measure what a change costs: the same tasks, one difference.",
 )
 
 Directory = Annotated[
@@ -66,7 +66,10 @@ def generate(
     config: GeneratorFile = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Generate the same tasks in several arms that differ in one thing; run again to resume."""
+    """Generate the same tasks in arms that differ in one thing.
+
+    Run again to resume.
+    """
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
@@ -114,7 +117,10 @@ def evaluate(
     seed: Seed = 0,
     retry_errored: RetryErrored = False,
 ) -> None:
-    """Evaluate agents in every arm, into FOLDER/runs/ARM; run again to resume, or to add agents."""
+    """Evaluate agents in every arm; run again to resume.
+
+    Results go to FOLDER/runs/ARM. Run again with other agents to add them.
+    """
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
     from evonav.evaluation.run.components import Backend
@@ -167,7 +173,7 @@ def picture(
     directory: Directory,
     old_task: OldTask = None,
     task: Annotated[
-        str | None, typer.Option(metavar="ID", help="Task of the analysis. Default: the most telling one.")
+        str | None, typer.Option(metavar="ID", help="Task of the analysis. Default: the one with the largest effect.")
     ] = None,
     agent: Annotated[str, typer.Option(metavar="NAME", help="Agent to draw.")] = "fu",
     out: Annotated[
@@ -178,7 +184,7 @@ def picture(
         ),
     ] = None,
 ) -> None:
-    """Draw how one agent moved in one pair: Fixed on the left, Not Fixed on the right."""
+    """Draw one agent in one pair: Fixed left, Not Fixed right."""
     from evonav.controlled.analysis import load_analysis
     from evonav.controlled.paired_maps import highlighted_pairs, write_pair
     from evonav.errors import InvalidArgumentError

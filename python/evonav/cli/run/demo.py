@@ -27,7 +27,10 @@ def demo(
     seed: Seed = 0,
     dry_run: HiddenDryRun = False,
 ) -> None:
-    """Run three agents on the bundled tasks, and write a report with replays; it takes a minute or two."""
+    """Run three agents on bundled tasks and write a report.
+
+    It takes a minute or two. The report is a page with tables, maps and replays of one task.
+    """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import evaluate
     from evonav.report import write_report

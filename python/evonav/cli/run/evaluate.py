@@ -76,9 +76,10 @@ def evaluate(
     ] = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Evaluate agents on tasks, by default on the bundled ones; run again to resume.
+    """Evaluate agents on tasks; run again to resume.
 
-    Results go to the folder OUT. Look at them with `evonav report OUT` and `evonav view OUT`.
+    By default, three agents run on the bundled tasks. Look at the results with `evonav report OUT` and `evonav view
+    OUT`.
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunRequest, evaluate_all

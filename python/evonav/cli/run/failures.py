@@ -22,7 +22,10 @@ def failures(
     agent: RunAgents = None,
     brief: Annotated[bool, typer.Option("--brief", help="Leave out tracebacks.")] = False,
 ) -> None:
-    """List failed attempts at stages with their tracebacks, equal ones once; retried attempts too."""
+    """List why stages failed, with tracebacks; equal failures once.
+
+    Attempts that were tried again are listed, too.
+    """
     from evonav.evaluation.records.store import RunStore
 
     names = listed(agent)

@@ -14,7 +14,10 @@ def new_agent(
         "my_agent.py"
     ),
 ) -> None:
-    """Write an agent with a memory as a Python file to change, and say how to run it."""
+    """Write a Python file with an agent to begin with.
+
+    The agent maps the house, remembers objects and explores. The commands that check and evaluate it are printed.
+    """
     from importlib.resources import files
 
     from evonav.errors import InvalidArgumentError

@@ -48,9 +48,10 @@ def sweep(
         bool, typer.Option("--schema", help="Print the JSON Schema of sweep files, which editors use.")
     ] = False,
 ) -> None:
-    """Evaluate every combination of agents, perceptions, tasks and seeds that a file lists; run again to resume.
+    """Run many evaluations that one file lists; run again to resume.
 
-    Each combination is a cell with a run of its own in OUT/runs. Also writes summary.json, .csv and .md.
+    Every combination of agents, perceptions, decision models, tasks and seeds is a cell, with a run of its own in
+    OUT/runs. Also writes summary.json, .csv and .md.
     """
     if schema:
         _print_schema()

@@ -26,7 +26,7 @@ tasks_app = new_app(help="Generate, check, draw and describe tasks.")
 
 @tasks_app.command(name="list", cls=Command)
 def list_tasks(folder: TaskFolder = None, limit: Limit = None) -> None:
-    """List tasks with their rooms and stages, and the stages before which the house changes."""
+    """List tasks, their rooms and stages, and when houses change."""
     from evonav.tasks import load_tasks
 
     with task_folder(folder) as found:
@@ -52,7 +52,7 @@ def schema(
         typer.Option(metavar="FOLDER", help="Folder to write NAME.schema.json files to. Default: print them."),
     ] = None,
 ) -> None:
-    """Print or write the JSON Schemas of task files, which editors and validators use."""
+    """Print or write the JSON Schemas of task files."""
     from evonav.tasks.schema import MODELS, schema_text, write_schemas
 
     if out is not None:
@@ -80,7 +80,10 @@ def show(
     ] = None,
     limit: Limit = None,
 ) -> None:
-    """Draw tasks as pages: the house before each stage, what changes unseen, goals and answers."""
+    """Draw tasks: the house, what changes unseen, goals and answers.
+
+    Writes a gallery of all tasks, or a page or picture of one.
+    """
     from evonav.drawing.files import SUFFIXES
     from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
@@ -147,7 +150,10 @@ def subset(
         typer.Option(metavar="FILE", help="File to write the task ids to, one per line. Default: print them."),
     ] = None,
 ) -> None:
-    """List the tasks of a named subset, which is the same for everyone with the same houses."""
+    """List the tasks of a named subset, such as test-90.
+
+    A subset is the same for everyone with the same houses.
+    """
     from evonav.errors import TaskError
     from evonav.tasks.subsets import subset_roots
 

@@ -61,7 +61,10 @@ def generate(
     assets: AssetFile = None,
     start: StartOfHouses = "file",
 ) -> None:
-    """Generate a task from every house with several rooms; run again to resume."""
+    """Generate tasks from houses; run again to resume.
+
+    Every house with several rooms gives a task.
+    """
     from evonav.generation.config import read_parameters
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions

@@ -147,7 +147,10 @@ def fetch_houses(
         typer.Option(metavar="FOLDER", help="Folder of the download. Default: EVONAV_CACHE, else ~/.cache/evonav."),
     ] = None,
 ) -> None:
-    """Download a published dataset of houses, or verify the checksums of the downloaded files."""
+    """Download a published dataset of houses.
+
+    If it was downloaded before, the checksums of its files are verified.
+    """
     from evonav.house.procthor10k import NAME, REVISION, SPLITS
     from evonav.house.procthor10k_fetch import fetch_procthor10k
 

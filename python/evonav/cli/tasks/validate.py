@@ -31,9 +31,9 @@ def validate(
     ] = False,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Check tasks: files, records, physics, reference views and paths, and that agents cannot read the answers.
+    """Check that tasks are complete, correct and hide the answers.
 
-    The exit code is 1 if a task is invalid.
+    Files, records, physics, reference views and paths are checked. The exit code is 1 if a task is invalid.
     """
     from evonav.generation.validation import validate_folder
 

@@ -28,9 +28,10 @@ def write(
     dry_run: DryRun = False,
     limit: Limit = None,
 ) -> None:
-    """Let a model rewrite the instructions of tasks with the paper's prompts; run again to resume.
+    """Let a model rewrite instructions; run again to resume.
 
-    It describes how goals look and merges the parts of each instruction. The key is read from OPENAI_API_KEY.
+    With the paper's prompts, it describes how goals look and merges the parts of each instruction. The key is read from
+    OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.client import VlmClient, VlmConfig
