@@ -15,14 +15,26 @@ from evonav.world.simulator import Action
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """One discrete action."""
+    """One discrete action.
+
+    Example:
+        >>> import evonav
+        >>> evonav.Move(evonav.Action.TURN_LEFT)
+        Move(action=<Action.TURN_LEFT: 'TURN_LEFT'>)
+    """
 
     action: Action
 
 
 @dataclass(frozen=True, slots=True)
 class NavigateTo:
-    """Go towards a point along planner waypoints, at most `SensorConfig.max_travel_m` this round."""
+    """Go towards a point along planner waypoints, at most `SensorConfig.max_travel_m` this round.
+
+    Example:
+        >>> import evonav
+        >>> evonav.NavigateTo((3.5, 2.0))
+        NavigateTo(position_m=(3.5, 2.0), face_m=None)
+    """
 
     position_m: tuple[float, float]
     """`(x, z)`; snapped to the nearest free point."""
@@ -32,7 +44,13 @@ class NavigateTo:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """End the stage here."""
+    """End the stage here.
+
+    Example:
+        >>> import evonav
+        >>> evonav.Stop("nothing left to explore")
+        Stop(reason='nothing left to explore')
+    """
 
     reason: str = "arrived"
     """`arrived`, or why the agent gave up; recorded, not scored."""
@@ -51,7 +69,14 @@ class ViewSchedule:
 
 @dataclass(frozen=True, slots=True)
 class SensorConfig:
-    """The sensors that an agent needs (default: 3D-Mem's schedule), within the limits of `ProtocolConfig`."""
+    """The sensors that an agent needs (default: 3D-Mem's schedule), within the limits of `ProtocolConfig`.
+
+    Example:
+        >>> import evonav
+        >>> sensors = evonav.SensorConfig(needs_rgb=True)
+        >>> sensors.first_round
+        ViewSchedule(count=7, spacing_deg=40.0)
+    """
 
     first_round: ViewSchedule = ViewSchedule(7, 40.0)
     later_rounds: ViewSchedule = ViewSchedule(3, 60.0)
@@ -64,7 +89,21 @@ class SensorConfig:
 
 
 class Agent(Protocol):
-    """An agent as evonav evaluates it: a subclass, or any class with these methods and `sensors`."""
+    """An agent as evonav evaluates it: a subclass, or any class with these methods and `sensors`.
+
+    Example:
+        >>> import evonav
+        >>> class Bold(evonav.Agent):
+        ...     def begin_stage(self, goal):
+        ...         self.category = goal.category
+        ...
+        ...     def act(self, observation):
+        ...         view = observation.views[-1]
+        ...         if self.category in view.detections.labels:
+        ...             return evonav.Stop()
+        ...         return evonav.Move(evonav.Action.TURN_LEFT)
+        >>> run = evonav.evaluate(Bold, limit=1)
+    """
 
     sensors: SensorConfig = SensorConfig()
     """The sensors that the agent needs."""

@@ -135,7 +135,7 @@ def load_tasks(source: str | Path = BUNDLED, limit: int | None = None) -> TaskLi
     Example:
         >>> import evonav
         >>> tasks = evonav.load_tasks("bundled")
-        >>> tasks[0].public(stage=1).category
+        >>> tasks[1].public(stage=1).category
         'Vase'
     """
     return LazyList(_files_of(source, limit), lambda file: load_task(file.path))
@@ -171,7 +171,7 @@ def generate_tasks(
         >>> import evonav
         >>> tasks = evonav.generate_tasks("bundled", limit=1, workers=0)
         >>> tasks[0].num_stages
-        4
+        5
     """
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     texts = _house_texts(_house_path(houses, folder))

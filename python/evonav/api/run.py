@@ -38,6 +38,11 @@ class Run:
         >>> difference = run.compare("random-walk", "stay-still")
     """
 
+    path: Path
+    """Folder of the run."""
+    config: Mapping[str, Any]
+    """Settings that decide the records: seed, protocol, simulator, perception, decision model."""
+
     def __init__(self, path: str | Path) -> None:
         """Open a run.
 
@@ -49,7 +54,7 @@ class Run:
         """
         self.path = Path(path)
         with RunStore(self.path) as store:
-            self.config: Mapping[str, Any] = store.meta("config") or {}
+            self.config = store.meta("config") or {}
 
     @cached_property
     def _recorded(self) -> RecordedRun:

@@ -33,7 +33,7 @@ class Simulator:
 
     Example:
         >>> import evonav
-        >>> house = evonav.load_houses("bundled")[1]
+        >>> house = evonav.load_houses("bundled")[2]
         >>> simulator = evonav.Simulator(house)
         >>> simulator.step("TURN_LEFT")
         True
@@ -42,9 +42,14 @@ class Simulator:
         (300, 300, 3)
         >>> memory = evonav.ObjectMap()
         >>> update = memory.update(view)
-        >>> path = simulator.path_to("Bed")
+        >>> path = simulator.path_to("Fridge")
         >>> picture = simulator.plot(path)
     """
+
+    house: House
+    """The house, as it was loaded."""
+    embedded: EmbeddedSimulator
+    """The simulator behind this one, with all that it can do."""
 
     def __init__(
         self,
@@ -67,7 +72,6 @@ class Simulator:
             SimulationError: The agent fits nowhere.
         """
         self.embedded = EmbeddedSimulator(config, allow_unknown_assets=allow_unknown_assets)
-        """The simulator behind this one, with all that it can do."""
         self._perception = GroundTruthPerception()
         self.house = _house_of(house)
         self.reset(None, pose)

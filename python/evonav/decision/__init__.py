@@ -1,1 +1,8 @@
-"""Decision models: what agents ask, and a model that answers without a network."""
+"""Decision models: what agents ask, and a model that answers without a network.
+
+Names are imported on first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -95,6 +95,17 @@ class ObjectMap:
     A detection joins the entry with the largest sum of spatial similarity (the share of its points within
     `overlap_radius_m` of the entry's) and visual similarity (cosine of features; without features, 1 for the same
     label), if that exceeds `match_threshold`. Otherwise it becomes an entry. Simulator ids are not used.
+
+    Example:
+        >>> import evonav
+        >>> simulator = evonav.Simulator(evonav.load_houses()[2])
+        >>> memory = evonav.ObjectMap()
+        >>> for _ in range(24):
+        ...     update = memory.update(simulator.look(rgb=False))
+        ...     has_turned = simulator.step("TURN_LEFT")
+        >>> "Toilet" in {entry.label for entry in memory.entries}
+        True
+        >>> picture = memory.plot()
     """
 
     def __init__(self, config: ObjectMapConfig | None = None) -> None:

@@ -62,7 +62,17 @@ class Conflicts:
 class OccupancyMap:
     """Unknown, free and blocked cells, the cells seen from near (*explored*), and the frontiers.
 
-    Only `integrate` sets cells; the last observation of a cell counts.
+    Only `update` (or `integrate`) sets cells; the last observation of a cell counts.
+
+    Example:
+        >>> import evonav
+        >>> simulator = evonav.Simulator(evonav.load_houses()[2])
+        >>> cells = evonav.OccupancyMap(simulator.map_frame)
+        >>> conflicts = cells.update(simulator.look(rgb=False))
+        >>> frontiers = cells.update_frontiers((simulator.pose.x_m, simulator.pose.z_m))
+        >>> len(frontiers) > 0
+        True
+        >>> picture = cells.plot()
     """
 
     def __init__(

@@ -1,1 +1,8 @@
-"""An agent's input: observations and visible occupancy."""
+"""An agent's input: observations and visible occupancy.
+
+Names are imported on first use.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

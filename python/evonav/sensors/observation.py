@@ -64,7 +64,16 @@ class MapFrame:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """The input of one decision round: views around the agent, the heading view last."""
+    """The input of one decision round: views around the agent, the heading view last.
+
+    Example:
+        >>> import evonav
+        >>> simulator = evonav.Simulator(evonav.load_houses()[0])
+        >>> view = simulator.look()
+        >>> observation = evonav.Observation((view,), simulator.pose, is_action_success=True, num_rounds_left=50)
+        >>> observation.views[-1].depth_m.shape
+        (300, 300)
+    """
 
     views: tuple[View, ...]
     pose: Pose

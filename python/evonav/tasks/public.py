@@ -10,7 +10,15 @@ from evonav.sensors.observation import MapFrame
 
 @dataclass(frozen=True, slots=True)
 class TaskInfo:
-    """An agent's information before the first stage."""
+    """An agent's information before the first stage.
+
+    Example:
+        >>> import evonav
+        >>> simulator = evonav.Simulator(evonav.load_houses()[0])
+        >>> task = evonav.TaskInfo("mine", num_stages=1, max_rounds=50, map_frame=simulator.map_frame, seed=0)
+        >>> task.map_frame.cell_m
+        0.1
+    """
 
     task_id: str
     num_stages: int
@@ -26,6 +34,12 @@ class Goal:
     """The goal input `g_k` (paper, Sec. A.3) without its start pose, which would reveal the previous target.
 
     Instructions follow the grammar of `evonav.tasks.language`.
+
+    Example:
+        >>> import evonav
+        >>> goal = evonav.load_tasks("bundled")[1].public(stage=1)
+        >>> goal.category, goal.reference_image.shape
+        ('Vase', (300, 300, 3))
     """
 
     stage: int

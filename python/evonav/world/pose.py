@@ -9,7 +9,14 @@ _DECIMALS_DEG = 4
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """An agent's position and view: left-handed frame, y up, metres and radians."""
+    """An agent's position and view: left-handed frame, y up, metres and radians.
+
+    Example:
+        >>> import evonav
+        >>> pose = evonav.Pose.of_degrees(1.0, 0.9, 2.0, yaw_deg=90.0, horizon_deg=30.0)
+        >>> pose.position_m, pose.yaw_deg
+        ((1.0, 0.9, 2.0), 90.0)
+    """
 
     x_m: float
     y_m: float

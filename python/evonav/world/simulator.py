@@ -13,7 +13,13 @@ from evonav.world.pose import Pose
 
 
 class Action(Enum):
-    """Discrete actions, as the paper spells them (Sec. 3.1)."""
+    """Discrete actions, as the paper spells them (Sec. 3.1).
+
+    Example:
+        >>> import evonav
+        >>> [action.value for action in evonav.Action]
+        ['MOVE_FORWARD', 'TURN_LEFT', 'TURN_RIGHT', 'STOP']
+    """
 
     MOVE_FORWARD = "MOVE_FORWARD"
     TURN_LEFT = "TURN_LEFT"

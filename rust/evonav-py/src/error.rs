@@ -3,7 +3,21 @@
 use evonav_core::Error;
 use pyo3::{create_exception, exceptions::PyException, prelude::*};
 
-create_exception!(evonav._core, EvonavError, PyException, "Root of everything evonav raises.");
+create_exception!(
+    evonav._core,
+    EvonavError,
+    PyException,
+    "The root of all errors that evonav raises; each says what is wrong and what to do.
+
+Example:
+    >>> import evonav
+    >>> try:
+    ...     evonav.load_tasks('nowhere')
+    ... except evonav.EvonavError as error:
+    ...     print(error)
+    nowhere: no such folder of tasks; `bundled` names those of evonav
+"
+);
 create_exception!(evonav._core, HouseError, EvonavError, "A house file is malformed.");
 create_exception!(evonav._core, TaskError, EvonavError, "A task is malformed or cannot be made.");
 create_exception!(evonav._core, SimulationError, EvonavError, "The simulator cannot do this.");

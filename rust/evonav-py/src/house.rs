@@ -21,7 +21,7 @@ type ObjectFootprints = (String, String, Vec<(Vec<Vec2>, f64, f64)>);
 ///     >>> import evonav
 ///     >>> house = evonav.load_houses("bundled")[1]
 ///     >>> [room.room_type for room in house.rooms]
-///     ['Bedroom', 'LivingRoom']
+///     ['Kitchen', 'LivingRoom']
 ///     >>> picture = house.plot()
 #[pyclass(frozen, eq, module = "evonav._core")]
 #[derive(PartialEq)]

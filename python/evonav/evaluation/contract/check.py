@@ -32,7 +32,7 @@ LARGE_MEMORY_MB = 2000.0
 ADVICE = "function without arguments that returns the agent, and name that"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class AgentReport:
     """The result of all checks of an agent."""
 
@@ -51,7 +51,8 @@ class AgentReport:
             return f"{self.agent}: cannot be checked"
         return f"{self.agent}: {'keeps the contract' if self.is_ok else 'breaks the contract'}"
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        """Return the conclusion and every check, a line each."""
         width = max(len(check.name) for check in self.checks)
         lines = [f"{check.verdict:4}  {check.name:{width}}  {check.finding}" for check in self.checks]
         return "\n".join([self.conclusion, *lines])
@@ -73,6 +74,12 @@ def check_agent(
         backend: The parts of the evaluation, such as its decision model.
         seed: Seed of the agent.
         timeout_s: Time limit of an answer.
+
+    Example:
+        >>> import evonav
+        >>> report = evonav.check_agent("stay-still")
+        >>> report.is_ok
+        True
     """
     name, factory = _named(agent)
     examination = _Examination(name, factory, backend or Backend(), seed, timeout_s)

@@ -1,0 +1,34 @@
+from .agent import (
+    Agent,
+    AgentAction,
+    Belief,
+    EntryBelief,
+    ExplainingAgent,
+    FrontierBelief,
+    InspectableAgent,
+    Move,
+    NavigateTo,
+    RoundDiagnostics,
+    SensorConfig,
+    Stop,
+    ViewSchedule,
+)
+from .registry import agent_descriptions, agent_factory
+
+__all__ = [
+    "Agent",
+    "AgentAction",
+    "Belief",
+    "EntryBelief",
+    "ExplainingAgent",
+    "FrontierBelief",
+    "InspectableAgent",
+    "Move",
+    "NavigateTo",
+    "RoundDiagnostics",
+    "SensorConfig",
+    "Stop",
+    "ViewSchedule",
+    "agent_descriptions",
+    "agent_factory",
+]
