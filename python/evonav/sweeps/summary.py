@@ -69,6 +69,15 @@ def sweep_rows(out: Path) -> list[SweepRow]:
     return rows
 
 
+def sweep_title(out: Path) -> str:
+    """Return the name that the sweep's file gives it, else that of its folder.
+
+    Raises:
+        StoreError: There is no sweep, or it cannot be read.
+    """
+    return str(read_claim(out)["settings"]["name"] or out.resolve().name)
+
+
 def sweep_json(out: Path, rows: list[SweepRow]) -> dict[str, Any]:
     """Return the content of the sweep's `summary.json`."""
     return {

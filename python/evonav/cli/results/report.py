@@ -86,15 +86,15 @@ def _report_sweep(
     from evonav.evaluation.records.store import FILE_NAME
     from evonav.sweeps.page import write_sweep_page
     from evonav.sweeps.run import RUNS_NAME
-    from evonav.sweeps.tables import sweep_tables
+    from evonav.sweeps.summary import sweep_title
 
-    tables = sweep_tables(write_sweep_summary(sweep))
+    rows = write_sweep_summary(sweep)
     reports = []
     for cell in sorted(path.parent for path in (sweep / RUNS_NAME).glob(f"*/{FILE_NAME}")):
         to = None if out is None else out / RUNS_NAME / cell.name
         reports.append((cell.name, _report(cell, to, num_replays, tasks, exchanges, has_maps)))
         typer.echo(f"cell: {reports[-1][1]}")
-    return write_sweep_page(out or sweep, sweep.resolve().name, tables, reports)
+    return write_sweep_page(out or sweep, sweep_title(sweep), rows, reports)
 
 
 def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> None:

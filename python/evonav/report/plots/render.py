@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HINT = "Plots need: pip install 'evonav[viz]'"
+EVEN_WIDTH_IN = 5.6
+"""Smallest width of plots that share the rows of a page: about that at which a page shows them."""
 _PX_PER_POINT = 96 / 72
 _SKIPPED = frozenset(("metadata", "style", "clipPath"))
 _DROPPED = frozenset(("font-family", "clip-path"))
@@ -55,7 +57,7 @@ def plot_elements(plots: Sequence[Plot], *, are_even: bool = False) -> list[Mark
 
 def _even_sizes(plots: Sequence[Plot]) -> list[tuple[float, float]]:
     sizes = [size_in(plot) for plot in plots]
-    width_in = max((width for width, _ in sizes), default=0.0)
+    width_in = max([EVEN_WIDTH_IN, *(width for width, _ in sizes)])
     heights_in: dict[bool, float] = {}
     for plot, (_, height) in zip(plots, sizes, strict=True):
         heights_in[isinstance(plot, GapPlot)] = max(height, heights_in.get(isinstance(plot, GapPlot), 0.0))
