@@ -30,9 +30,9 @@ def write_sweep_page(out_dir: Path, name: str, rows: Sequence[SweepRow], reports
         StoreError: It cannot be written.
     """
     axes = swept_axes([row for row in rows if row.cell])
-    words = {row.cell: cell_words(row, axes) for row in rows if row.cell}
+    titles = {row.cell: cell_words(row, axes) for row in rows if row.cell}
     cells = [
-        (words.get(cell, cell), cell, quote(os.path.relpath(path, out_dir).replace(os.sep, "/")))
+        (titles.get(cell, cell), cell, quote(os.path.relpath(path, out_dir).replace(os.sep, "/")))
         for cell, path in reports
     ]
     plots = plot_elements(sweep_plots(rows), are_even=True)
