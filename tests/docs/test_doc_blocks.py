@@ -1,5 +1,6 @@
 """Every block of code in the documentation: Python is run, commands are run where they can be and parsed where not."""
 
+import ast
 import gzip
 import json
 import math
@@ -220,6 +221,22 @@ def test_python_of_a_page_runs(page: Path, place: Path, monkeypatch: pytest.Monk
     assert set(states) <= {"success", "failure"}
 
 
+def test_cells_of_the_notebook_run_and_show_something(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads((ROOT / "docs/notebooks/first_steps.ipynb").read_text(encoding="utf-8"))
+    assert all(cell.get("outputs", []) == [] for cell in notebook["cells"]), "outputs are stripped"
+    namespace: dict[str, Any] = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            *statements, last = ast.parse("".join(cell["source"])).body
+            exec(compile(ast.Module(statements, []), "cell", "exec"), namespace)
+            if isinstance(last, ast.Expr):
+                assert eval(compile(ast.Expression(last.value), "cell", "eval"), namespace) is not None
+            else:
+                exec(compile(ast.Module([last], []), "cell", "exec"), namespace)
+    assert set(namespace["run"].stages["state"]) <= {"success", "failure"}
+
+
 def test_no_script_of_a_page_guards_against_being_imported_by_workers() -> None:
     """Workers do not import the script: tests/evaluation/test_nothing_lost.py runs one without a guard."""
     guarded = [str(page) for page in pages() for text in python_texts(page) if "__main__" in text]
@@ -282,11 +299,15 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
         assert (ROOT / target).exists(), f"{page}: {words}"
 
 
-def test_every_page_is_in_the_navigation_once() -> None:
+def test_every_page_is_in_the_menu_once_or_linked_from_a_page_of_the_menu() -> None:
     _, _, navigation = (ROOT / "mkdocs.yml").read_text().partition("\nnav:\n")
-    found = Counter(re.findall(r": (\S+[.]md)$", navigation, re.MULTILINE))
-    assert found.pop("index.md") == 1, "the home page, made of README.md"
-    assert found == {str(page): 1 for page in pages() if page != Path("README.md")}
+    listed = Counter(re.findall(r": (\S+[.]md)$", navigation, re.MULTILINE))
+    assert set(listed.values()) == {1}
+    assert 15 <= len(listed) <= 28, "a reader takes the menu in at a glance"
+    menu = {Path("README.md") if name == "index.md" else Path(name) for name in listed}
+    linked = {target for page in menu for _, target in links(page)}
+    assert menu <= set(pages())
+    assert set(pages()) - menu - linked == set()
 
 
 def test_api_pages_name_modules_that_exist() -> None:
