@@ -92,7 +92,7 @@ def cause_share_table(run: Run, stratum: str) -> Table:
     rows = [("n", *(str(total) for total in totals.values()))]
     for cause in (None, *causes):
         shares = [part[cause] / totals[agent] if totals[agent] else None for agent, part in counts.items()]
-        rows.append(("success" if cause is None else CAUSE_NAMES[cause], *(percent(share, None) for share in shares)))
+        rows.append(("success" if cause is None else CAUSE_NAMES[cause], *(percent(share) for share in shares)))
     title = f"Why stages failed: {STRATA[stratum]}"
     return Table(title, ("% of stages", *run.agents), tuple(rows), ("One cause a stage, the first that fits.",))
 

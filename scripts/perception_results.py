@@ -23,7 +23,7 @@ from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
-from evonav.report.tables.numbers import NONE, percent
+from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
 
@@ -95,7 +95,7 @@ def rate_table(runs: Mapping[str, Run], measure: str) -> Table:
     rows = []
     for agent in _agents(runs):
         found = [_rate(_summary(run, agent), measure) for run in runs.values()]
-        rows.append((agent, *(NONE if rate is None else percent(*rate) for rate in found)))
+        rows.append((agent, *(NONE if one is None else rate(*one) for one in found)))
     return Table(
         f"{measure.upper()} by perception", ("Agent", *map(name_of, runs)), tuple(rows), (_words(runs, measure),)
     )

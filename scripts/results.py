@@ -24,7 +24,7 @@ from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
-from evonav.report.tables.numbers import NONE, percent
+from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import Table
 from evonav.statistics import wilson
@@ -191,7 +191,7 @@ def sensitivity_table(sweep: dict[float, Run], agents: Sequence[str]) -> Table:
         cells = []
         for run in sweep.values():
             summary = next((s for s in run.summaries if s.agent == agent), None)
-            cells.append(NONE if summary is None else percent(summary.sr, summary.sr_ci95))
+            cells.append(NONE if summary is None else rate(summary.sr, summary.sr_ci95))
         if any(cell != NONE for cell in cells):
             rows.append((agent, *cells))
     columns = ("Agent", *(f"{100 * rate:g}% wrong" for rate in sweep))
@@ -205,10 +205,10 @@ def _plot(sweep: dict[float, Run], agents: Sequence[str]) -> CurvePlot:
     lines = []
     for agent in agents:
         points = []
-        for rate, run in sweep.items():
+        for wrong, run in sweep.items():
             summary = next((s for s in run.summaries if s.agent == agent and s.sr is not None), None)
             if summary is not None and summary.sr is not None:
-                points.append((100 * rate, 100 * summary.sr, summary.sr_ci95))
+                points.append((100 * wrong, 100 * summary.sr, summary.sr_ci95))
         if points:
             ends = tuple(None if ci is None else (100 * ci[0], 100 * ci[1]) for _, _, ci in points)
             lines.append(Line(agent, tuple((x, y) for x, y, _ in points), ends))
@@ -217,7 +217,7 @@ def _plot(sweep: dict[float, Run], agents: Sequence[str]) -> CurvePlot:
 
 def _rate(counts: tuple[int, int]) -> str:
     successes, n = counts
-    return NONE if n == 0 else f"{percent(successes / n, wilson(successes, n))}, n = {n}"
+    return NONE if n == 0 else f"{rate(successes / n, wilson(successes, n))}, n = {n}"
 
 
 def _source(task_id: str) -> str:

@@ -80,11 +80,11 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     assert cells(main)["ftu"]["SR % paper"].startswith("67.4 [62.4, 72.")
     assert (cells(main)["fu"]["SPL % paper"], cells(main)["fu"]["n ours"]) == ("48.8", "12")
     # fu fails in every second stage, where the target has moved; ftu in none.
-    assert cells(relocation)["fu"]["moved, ours"] == "0.0, n = 6"
+    assert cells(relocation)["fu"]["moved, ours"] == "0.0 [–], n = 6"
     assert cells(relocation)["fu"]["moved, paper"].startswith("54.1 [")
     assert cells(relocation)["ftu"]["gap, paper"] == "+2.5"
     assert cells(relocation)["ftu"]["not moved, ours"] == "–"
-    assert cells(first)["fu"]["ours"] == "100.0, n = 6"
+    assert cells(first)["fu"]["ours"] == "100.0 [–], n = 6"
     assert cells(first)["ftu"]["paper, decoded"].startswith("67.8 [")
     assert cells(order)["SR"] == {"Measure": "SR", "paper": "ftu > fu", "ours": "ftu > fu"}
     assert cells(order)["SR, stage 1"]["ours"] == "fu > ftu"
