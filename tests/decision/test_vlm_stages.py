@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from short_tasks import short_tasks
 
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
@@ -19,7 +20,6 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
 from vlm_stub import KEY, Stub, check_request, images_in, serving
 
 AGENTS = ["fu", "ftu"]
@@ -30,12 +30,13 @@ def answers(request: dict[str, Any]) -> MockReply:
 
 
 class Run:
-    """Runs one bundled task against a server, or against what was kept of it."""
+    """Runs the first stages of a bundled task against a server, or against what was kept of it."""
 
     def __init__(self, folder: Path, *, max_rounds: int = 8) -> None:
         self.folder = folder
         self.max_rounds = max_rounds
         self.max_actions = 500
+        self.num_stages = 1
 
     def __call__(
         self,
@@ -58,14 +59,12 @@ class Run:
             "cache": str(self.folder / "exchanges.sqlite"),
             "mode": "auto" if url else "replay",
         }
-        backend = Backend(decision=Component("evonav.decision.backends:vlm", {"model": "gpt-4o", **options}, host))
-        config = RunConfig(
-            backend=backend, protocol=ProtocolConfig(max_rounds=self.max_rounds, max_actions=self.max_actions)
-        )
+        protocol = ProtocolConfig(max_rounds=self.max_rounds, max_actions=self.max_actions)
+        decision = Component("evonav.decision.backends:vlm", {"model": "gpt-4o", **options}, host)
         with bundled_tasks() as directory:
-            evaluate(
-                agents or AGENTS, task_files(directory, 1), self.folder / name, config=config, num_workers=num_workers
-            )
+            tasks, reader = short_tasks(directory, self.num_stages)
+            config = RunConfig(backend=Backend(tasks=reader, decision=decision), protocol=protocol)
+            evaluate(agents or AGENTS, tasks, self.folder / name, config=config, num_workers=num_workers)
         with RunStore(self.folder / name) as store:
             return list(store.record_texts())
 
@@ -90,7 +89,7 @@ def words_of(request: dict[str, Any]) -> list[str]:
 
 
 def test_whole_stages_ask_what_the_api_takes_with_images_that_can_be_seen(run: Run, tmp_path: Path) -> None:
-    run.max_rounds = 12
+    run.max_rounds, run.num_stages = 12, 2
     with serving(answers) as stub:
         first = run("first", stub.url)
     assert not [record.error for record in records(first) if record.error]
@@ -252,7 +251,7 @@ def changing() -> Callable[[dict[str, Any]], MockReply]:
 
 
 def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(run: Run) -> None:
-    run.max_rounds = 3
+    run.max_rounds, run.num_stages = 3, 2
     with serving(changing()) as stub:
         first = run("first", stub.url, num_workers=2)
     assert sum(counters(text)["invalid_answers"] for text in first) > 0
@@ -263,7 +262,7 @@ def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(
 
 
 def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_path: Path) -> None:
-    run.max_rounds = 4
+    run.max_rounds, run.num_stages = 4, 2
     with serving(changing()) as stub:
         first = run("first", stub.url, agents=["fu"])
     with RunStore(tmp_path / "first") as store:
@@ -277,7 +276,7 @@ def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_pa
 @pytest.mark.parametrize("agent", ["3d-mem", "msgnav", "unigoal", "unigoal-paper"])
 def test_every_agent_asks_what_the_api_takes_and_goes_on_after_bad_answers(run: Run, agent: str) -> None:
     """With rules that follow every grammar nothing is invalid; with a bad model all is counted, and replayed."""
-    run.max_rounds, run.max_actions = 2, 40
+    run.max_rounds, run.max_actions, run.num_stages = 2, 40, 2
     with serving(answers) as stub:
         good = run("good", stub.url, agents=[agent])
     assert [record.error for record in records(good) if record.error] == []

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from short_tasks import short_tasks
 from test_engine import CONFIG, TOY, records, texts
 from toy_house import write_tasks
 
@@ -29,6 +30,7 @@ from evonav.evaluation.hosting.process import (
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
@@ -152,17 +154,27 @@ def test_records_are_the_same_in_either_process(run_dir, tasks, tmp_path):
             assert list(own.record_texts(agent)) == list(shared.record_texts(agent)), agent
 
 
-@pytest.mark.parametrize("agent", BUILT_IN)
-def test_built_in_agents_do_the_same_in_either_process(tmp_path, agent):
-    protocol = ProtocolConfig(max_rounds=4, max_actions=8)
+@pytest.fixture(scope="module")
+def built_in_runs(tmp_path_factory):
+    """Two stages of all built-in agents: in processes of their own, and in this one."""
+    own, shared = tmp_path_factory.mktemp("own"), tmp_path_factory.mktemp("shared")
     with bundled_tasks() as directory:
-        tasks = task_files(directory, 1)
-        for name, is_in_process in (("own", False), ("shared", True)):
-            config = RunConfig(protocol=protocol, hosting=AgentHosting(is_in_process=is_in_process))
-            evaluate([agent], tasks, tmp_path / name, config=config, num_workers=1)
+        tasks, reader = short_tasks(directory, 2)
+        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4, max_actions=8))
+        evaluate(list(BUILT_IN), tasks, own, config=config, num_workers=1)
+        evaluate(list(BUILT_IN), tasks, shared, config=config, num_workers=0)
+    return own, shared
+
+
+@pytest.mark.parametrize("agent", BUILT_IN)
+def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
+    with RunStore(built_in_runs[0]) as own, RunStore(built_in_runs[1]) as shared:
+        found = list(own.record_texts(agent))
+        assert len(found) == 2
+        assert found == list(shared.record_texts(agent))
+        assert list(own.maps()) == list(shared.maps())
     if agent != "stay-still":  # which stops at once
-        assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in texts(tmp_path / "own"))
-    assert texts(tmp_path / "own") == texts(tmp_path / "shared")
+        assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in found)
 
 
 def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):
@@ -221,6 +233,7 @@ def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_wo
 ENDED = """
 import sys
 from pathlib import Path
+from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
 from evonav.component import Component

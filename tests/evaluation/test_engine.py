@@ -9,6 +9,7 @@ import time
 from itertools import pairwise
 
 import pytest
+from short_tasks import short_tasks
 from toy_house import write_tasks
 
 from evonav.component import Component
@@ -47,12 +48,11 @@ def records(run_dir, agent):
 
 def test_records_are_the_same_for_any_number_of_workers(tasks, tmp_path):
     agents = ["random-walk", "nearest-frontier", "toy_agents:Idle"]
-    for workers in (0, 1, 2):
+    for workers in (0, 2):
         evaluate(agents, tasks, tmp_path / str(workers), config=CONFIG, num_workers=workers)
-    shuffled = [*reversed(agents)]
-    evaluate(shuffled, tasks, tmp_path / "shuffled", config=CONFIG, num_workers=2)
+    evaluate(agents[::-1], tasks, tmp_path / "1, in another order", config=CONFIG, num_workers=1)
     assert len(texts(tmp_path / "0")) == 3 * 6 + 6
-    for other in ("1", "2", "shuffled"):
+    for other in ("1, in another order", "2"):
         assert texts(tmp_path / other) == texts(tmp_path / "0")
         assert (tmp_path / other / "summary.json").read_bytes() == (tmp_path / "0" / "summary.json").read_bytes()
 
@@ -71,9 +71,9 @@ def test_the_floor_plan_of_a_stage_is_made_once_for_all_agents(tasks, tmp_path, 
 
 def test_real_records_are_the_same_for_one_and_two_workers(tmp_path):
     """The same on the embedded simulator with bundled houses: threads, caches and order leave no trace."""
-    config = RunConfig(protocol=ProtocolConfig(max_rounds=6))
     with bundled_tasks() as directory:
-        tasks = task_files(directory, 2)
+        tasks, reader = short_tasks(directory, 2, limit=2)
+        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=6))
         for workers in (1, 2):
             evaluate(["ftu", "stage-reset"], tasks, tmp_path / str(workers), config=config, num_workers=workers)
     assert texts(tmp_path / "1") == texts(tmp_path / "2")

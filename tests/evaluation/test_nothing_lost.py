@@ -55,7 +55,7 @@ def faults(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("how", "journal", "step"),
-    [("kill", "WAL", 3), ("kill", "DELETE", 12), ("full", "WAL", 8), ("full", "DELETE", 20), ("broken", "WAL", 9)],
+    [("kill", "WAL", 9), ("kill", "DELETE", 20), ("full", "WAL", 12), ("full", "DELETE", 30), ("broken", "WAL", 13)],
 )
 def test_nothing_is_lost_at_any_call_that_changes_the_folder(faults, tmp_path, how, journal, step):
     """Killed at it, or refused by a disk that is full from then on, or once by one that is broken.

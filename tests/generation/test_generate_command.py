@@ -51,16 +51,16 @@ def large_clean_folder(large_house_file, tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_killed_a_dozen_times_it_ends_as_if_it_was_not(large_house_file, large_clean_folder, tmp_path):
+def test_killed_six_times_it_ends_as_if_it_was_not(large_house_file, large_clean_folder, tmp_path):
     # A run that ends before it can be killed is compared, and the kills go on in a new folder.
     draws, num_kills = random.Random(0), 0
-    for attempt in range(12):
+    for attempt in range(6):
         out, ended = tmp_path / str(attempt), False
         while not ended:
             process = subprocess.Popen(
                 command(large_house_file, out, "--workers", 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
-            if num_kills < 12:
+            if num_kills < 6:
                 wait_for_lines(process, out, num_lines(out) + draws.choice([1, 1, 2, 3, 5]))
                 time.sleep(draws.uniform(0.0, 0.03))
                 process.send_signal(signal.SIGKILL)
@@ -69,14 +69,14 @@ def test_killed_a_dozen_times_it_ends_as_if_it_was_not(large_house_file, large_c
             for root in out.glob("*/task.json"):
                 load_task(root.parent)  # whole, or not there
         assert_same(out, large_clean_folder)
-        if num_kills >= 12:
+        if num_kills >= 6:
             return
     pytest.fail(f"only {num_kills} runs could be killed before they ended")
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find the workers")
-def test_workers_killed_a_dozen_times_cost_nothing(large_house_file, large_clean_folder, tmp_path):
+def test_workers_killed_six_times_cost_nothing(large_house_file, large_clean_folder, tmp_path):
     draws, num_kills = random.Random(1), 0
     for attempt in range(4):
         out = tmp_path / str(attempt)
@@ -84,12 +84,12 @@ def test_workers_killed_a_dozen_times_cost_nothing(large_house_file, large_clean
         while process.poll() is None:
             wait_for_lines(process, out, num_lines(out) + 3)
             workers = workers_of(process.pid)
-            if workers and num_kills < 10:
+            if workers and num_kills < 6:
                 os.kill(draws.choice(workers), signal.SIGKILL)
                 num_kills += 1
         assert process.returncode == 0
         assert_same(out, large_clean_folder)
-        if num_kills >= 10:
+        if num_kills >= 6:
             return
     pytest.fail(f"only {num_kills} workers were found to be killed")
 

@@ -1,4 +1,4 @@
-"""Ten thousand actions through the real client: nothing raised but what AI2-THOR documents, and nothing left behind."""
+"""Three thousand actions through the real client raise only what AI2-THOR documents, and leave nothing behind."""
 
 import random
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 from evonav.thor.actions import registry
 
-NUM_ACTIONS = 10_000
+NUM_ACTIONS = 3_000
 # The house would soon be empty, or everything out of sight.
 LEFT_OUT = {"CreateHouse", "Reset", "Initialize", "ChangeResolution", "SetObjectFilter"}
 MOVES = ["MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"]
@@ -49,7 +49,7 @@ def _resources(pid: int) -> tuple[int, int, float]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts files in /proc")
-def test_ten_thousand_actions(start_controller: Any, house: dict[str, Any]) -> None:
+def test_three_thousand_actions(start_controller: Any, house: dict[str, Any]) -> None:
     rng = random.Random(0)
     controller = start_controller(
         scene=house, width=64, height=48, renderDepthImage=True, renderInstanceSegmentation=True
@@ -60,13 +60,13 @@ def test_ten_thousand_actions(start_controller: Any, house: dict[str, Any]) -> N
     done = {"success": 0, "failure": 0, "ValueError": 0}
     before: tuple[int, int, float] | None = None
     for step in range(NUM_ACTIONS):
-        if step % 500 == 0:
+        if step % 250 == 0:
             controller.reset(scene=house)
             controller.step("TeleportFull", **start)
-            if step % 2000 == 0:
+            if step % 500 == 0:
                 controller.step("ChangeResolution", x=rng.choice([32, 64]), y=48)
         # The state of a warm engine; in the first thousand actions it imports and fills its caches.
-        if step == NUM_ACTIONS // 5:
+        if step == 1_000:
             before = _resources(pid)
         request = _action(rng, house, ids)
         try:
@@ -81,7 +81,7 @@ def test_ten_thousand_actions(start_controller: Any, house: dict[str, Any]) -> N
     num_files, num_threads, resident_mib = _resources(pid)
     assert (num_files, num_threads) == before[:2]
     assert resident_mib < before[2] + 50.0
-    assert min(done.values()) > 500, done
+    assert min(done.values()) > 150, done
     log = (Path.home() / ".ai2thor/log/unity.log").read_text()
     assert "Traceback" not in log
     controller.stop()

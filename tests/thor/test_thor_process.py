@@ -99,7 +99,7 @@ def test_stop_ends_the_engine(clients: Any) -> None:
     assert client.process.returncode == 0
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_killed_client_leaves_no_engine(clients: Any, seed: int) -> None:
     """From before the engine opened its pipes to amid its answers."""
     client = clients()
@@ -127,7 +127,7 @@ def _assert_fails_soon(client: Client, within_s: float = WITHIN_S) -> None:
     assert "stopped" in words
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
 @pytest.mark.parametrize("victim", ["process", "worker"])
 def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signals, victim: str) -> None:
     client = clients()
@@ -138,7 +138,7 @@ def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signa
     _assert_fails_soon(client)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("size_px", [300, 1500])
 def test_an_engine_killed_at_any_moment_ends_the_client_soon(clients: Any, seed: int, size_px: int) -> None:
     """The larger images do not fit into the pipe, so that most of the time a message is under way."""
