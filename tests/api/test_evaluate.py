@@ -82,7 +82,7 @@ def test_a_run_shows_tables_and_pages(run: evonav.Run, tmp_path: Path) -> None:
 
 def test_two_agents_are_compared_by_class_name(run: evonav.Run) -> None:
     found = run.compare("RandomWalk", "stay-still")
-    assert found.title == "evonav.agents.random_walk:RandomWalk less stay-still, n = 4"
+    assert found.title == "evonav.agents.random_walk:RandomWalk minus stay-still, n = 4"
     spl = dict(zip(found.columns, found.rows[1], strict=True))
     less = float(spl["evonav.agents.random_walk:RandomWalk"]) - float(spl["stay-still"])
     assert float(spl["difference [95% CI]"].split(" ")[0]) == pytest.approx(less, abs=0.1)

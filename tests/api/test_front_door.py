@@ -12,7 +12,17 @@ import evonav
 
 NAMES = {
     "do": ("evaluate", "generate_tasks", "check_agent", "load_run", "load_tasks", "load_houses"),
-    "write an agent": ("Agent", "SensorConfig", "TaskInfo", "Goal", "Observation", "Move", "NavigateTo", "Stop"),
+    "write an agent": (
+        "Agent",
+        "Explanation",
+        "SensorConfig",
+        "TaskInfo",
+        "Goal",
+        "Observation",
+        "Move",
+        "NavigateTo",
+        "Stop",
+    ),
     "remember": ("OccupancyMap", "ObjectMap"),
     "simulate": ("House", "Simulator", "Pose", "Action"),
     "rest": ("Run", "EvonavError", "__version__"),
@@ -22,7 +32,7 @@ SIGNATURES = Path(__file__).with_name("signatures.txt")
 
 
 def test_the_names_are_those_of_the_front_door() -> None:
-    assert len(ALL) == 23
+    assert len(ALL) == 24
     assert sorted(evonav.__all__) == sorted(dir(evonav)) == ALL
 
 

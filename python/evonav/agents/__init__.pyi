@@ -13,6 +13,7 @@ from .agent import (
     Stop,
     ViewSchedule,
 )
+from .explanation import Explanation
 from .registry import agent_descriptions, agent_factory
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Belief",
     "EntryBelief",
     "ExplainingAgent",
+    "Explanation",
     "FrontierBelief",
     "InspectableAgent",
     "Move",

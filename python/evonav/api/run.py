@@ -92,7 +92,7 @@ class Run:
         return headline(self._recorded.summaries)
 
     def compare(self, a: str, b: str) -> Table:
-        """Return the differences of agent `a` less agent `b` on the stages that both finished.
+        """Return the differences of agent `a` minus agent `b` on the stages that both finished.
 
         Args:
             a: Name of an agent, or of its class.
