@@ -1,5 +1,6 @@
 """A run in Python: `evonav.evaluate` and `evonav.load_run` return one."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import cached_property
@@ -7,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from evonav.component import optional_module
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.replay.run_pages import write_pages
+from evonav.replay.run_pages import telling_task, unwritten_highlights, write_pages
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import agents_of
 from evonav.report.compare.wording import comparison_table
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
-from evonav.report.pages.highlights import best_highlight
 from evonav.report.pages.run_page import write_report
 from evonav.report.run import Run as RecordedRun
 from evonav.report.run import load_run as read_run
@@ -107,12 +107,18 @@ class Run:
         (found,) = compare(agents_of(self._recorded, names), baseline=names[1])
         return comparison_table(found)
 
-    def report(self, out: str | Path | None = None) -> Path:
+    def report(self, out: str | Path | None = None, replays: int = 2) -> Path:
         """Write the report, `report.html` and its tables, and return the path of the page.
 
         Args:
             out: Folder to write. Default: the run's own.
+            replays: Number of episodes to replay for it, those that show most; a warning says if that fails.
         """
+        try:
+            if missing := unwritten_highlights(self._recorded, replays):
+                write_pages(self._recorded, missing)
+        except EvonavError as error:  # a report needs only the records
+            warnings.warn(f"no replays: {error}", stacklevel=2)
         return write_report(self.path, None if out is None else Path(out))
 
     def view(self, agent: str | None = None, task: str | None = None) -> Path:
@@ -130,7 +136,7 @@ class Run:
         run = self._recorded
         if task is not None and task not in run.num_stages:
             raise InvalidArgumentError(_no_such("task", task, tuple(run.num_stages)))
-        task = task or best_highlight(run, sorted(agents, key=lambda name: name not in ("fu", "stage-reset")))[0]
+        task = task or telling_task(run, agents)
         pages, index = write_pages(run, [(name, task) for name in agents])
         return index.parent / pages[0].href if len(pages) == 1 else index
 

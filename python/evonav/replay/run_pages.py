@@ -8,7 +8,8 @@ from evonav.evaluation.records.store import RunStore
 from evonav.replay.pages import write_episode, write_index
 from evonav.replay.replay import RunReplay
 from evonav.report.maps.stage_map import VIEW_DIR
-from evonav.report.pages.replays import ListedPage
+from evonav.report.pages.highlights import best_highlight, highlights_first
+from evonav.report.pages.replays import ListedPage, listed_pages
 from evonav.report.run import Run
 from evonav.tasks.bundled import bundled_tasks
 
@@ -17,7 +18,7 @@ def write_pages(
     run: Run,
     episodes: Sequence[tuple[str, str]],
     *,
-    stage: int | None = None,
+    stages: Sequence[int] = (),
     tasks: Path | None = None,
     exchanges: Path | None = None,
     out: Path | None = None,
@@ -28,7 +29,7 @@ def write_pages(
     Args:
         run: A run.
         episodes: Agent and task id of each.
-        stage: The only stage to show.
+        stages: The stages to show, each on a page of its own; default: all, on one page.
         tasks: Folder of the run's tasks; default: where the run found them.
         exchanges: File of a model's answers; default: the run's.
         out: Folder to write; default: `view` in the run's folder.
@@ -44,16 +45,39 @@ def write_pages(
     out_dir = out or run.run_dir / VIEW_DIR
     pages = []
     for agent, task_id in episodes:
-        stages = list(replay.episode(agent, task_id, _teller(tell, agent, task_id), last_stage=stage))
-        pages += write_episode(
-            stages,
-            out_dir,
-            budget=replay.budget(agent),
-            success_radius_m=run.success_radius_m,
-            only=stage,
-            records_sha256=run.episodes_sha256[agent, task_id],
-        )
+        last = max(stages, default=None)
+        replayed = list(replay.episode(agent, task_id, _teller(tell, agent, task_id), last_stage=last))
+        for only in stages or (None,):
+            pages += write_episode(
+                replayed,
+                out_dir,
+                budget=replay.budget(agent),
+                success_radius_m=run.success_radius_m,
+                only=only,
+                records_sha256=run.episodes_sha256[agent, task_id],
+            )
     return pages, write_index(pages, out_dir, run.run_dir.resolve().name)
+
+
+def telling_task(run: Run, agents: Sequence[str]) -> str:
+    """Return the task that shows best what these agents do: one in which memory misleads the first, not the last."""
+    return best_highlight(run, sorted(agents, key=lambda name: name not in ("fu", "stage-reset")))[0]
+
+
+def unwritten_highlights(run: Run, num: int | None) -> list[tuple[str, str]]:
+    """Return the highlights (agent and task id) that have no page of the run's present records.
+
+    Args:
+        run: A run.
+        num: Number of highlights to look at, the best first; `None` for all episodes.
+    """
+    written = {
+        (page.agent, page.task_id): page.records_sha256
+        for page in listed_pages(run.run_dir / VIEW_DIR)
+        if page.is_current
+    }
+    wanted = highlights_first(run)[:num]
+    return [episode for episode in wanted if written.get(episode) != run.episodes_sha256[episode]]
 
 
 def _teller(tell: Callable[[str], None], agent: str, task_id: str) -> Callable[[int, int], None]:

@@ -141,17 +141,9 @@ def _count(replays: str) -> int | None:
 def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | None) -> None:
     """Replay the highlights that have no page of the current records."""
     from evonav.errors import EvonavError
-    from evonav.report.maps.stage_map import VIEW_DIR
-    from evonav.report.pages.highlights import highlights_first
-    from evonav.report.pages.replays import listed_pages
+    from evonav.replay.run_pages import unwritten_highlights
 
-    there = {
-        (page.agent, page.task_id): page.records_sha256
-        for page in listed_pages(run.run_dir / VIEW_DIR)
-        if page.is_current
-    }
-    wanted = highlights_first(run)[:num]
-    missing = [episode for episode in wanted if there.get(episode) != run.episodes_sha256[episode]]
+    missing = unwritten_highlights(run, num)
     if not missing:
         return
     try:

@@ -16,7 +16,6 @@ from evonav.cli.options.shared import (
     listed,
     numbers_of,
 )
-from evonav.cli.results.view import task_path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,6 +118,7 @@ def _replayed(
     """Replay an episode; return the replay, its agent, its stages (all, and the chosen ones) and the success radius."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
+    from evonav.replay.run_pages import task_path
     from evonav.report.pages.highlights import highlights_first
     from evonav.report.run import load_run
 

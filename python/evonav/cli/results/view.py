@@ -18,7 +18,7 @@ from evonav.cli.options.shared import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from evonav.report.pages.replays import ListedPage
     from evonav.report.run import Run
@@ -72,14 +72,12 @@ def make_pages(
         exchanges: File of a model's answers.
         out: Folder to write.
     """
-    from evonav.report.pages.highlights import best_highlight
+    from evonav.replay.run_pages import telling_task
     from evonav.report.run import load_run
 
     found = load_run(run)
     agents = agents or found.agents
-    # The best highlight is a task in which memory misleads the first agents, and not the last one.
-    ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
-    task_id = task if task is not None else best_highlight(found, ranked)[0]
+    task_id = task if task is not None else telling_task(found, agents)
     episodes = [(name, task_id) for name in agents]
     return replay_pages(found, episodes, stages=stages, tasks=tasks, exchanges=exchanges, out=out)
 
@@ -94,53 +92,7 @@ def replay_pages(
     out: Path | None = None,
 ) -> "tuple[list[ListedPage], Path]":
     """Replay these episodes (agent, task) of a run, and write their pages and the index; see `make_pages`."""
-    from evonav.replay.pages import write_episode, write_index
-    from evonav.replay.replay import RunReplay
-    from evonav.report.maps.stage_map import VIEW_DIR
+    from evonav.replay.run_pages import write_pages
 
-    replay = RunReplay(found.run_dir, task_path(found.run_dir, tasks), exchanges)
-    out_dir = out or found.run_dir / VIEW_DIR
-    pages = []
     with status("Replaying") as tell:
-        for name, task_id in episodes:
-            last = max(stages, default=None)
-            replayed = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=last))
-            for only in stages or (None,):
-                pages += write_episode(
-                    replayed,
-                    out_dir,
-                    budget=replay.budget(name),
-                    success_radius_m=found.success_radius_m,
-                    only=only,
-                    records_sha256=found.episodes_sha256[name, task_id],
-                )
-    return pages, write_index(pages, out_dir, found.run_dir.resolve().name)
-
-
-def _teller(tell: "Callable[[str], None]", agent: str, task_id: str) -> "Callable[[int, int], None]":
-    return lambda stage, round_: tell(f"{agent} in {task_id}, stage {stage}, round {round_ + 1}")
-
-
-def task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
-    """Return a function that finds a task: in `tasks`, the run's folder, where the run found it, or among the bundled.
-
-    Raises:
-        TaskError: There are none.
-    """
-    from evonav.errors import TaskError
-    from evonav.evaluation.records.store import RunStore
-    from evonav.tasks.bundled import bundled_tasks
-
-    with RunStore(run) as store:
-        noted = store.meta("tasks_dir")
-    with bundled_tasks() as bundled:
-        places = [tasks] if tasks is not None else [run / "tasks", *([Path(noted)] if noted else []), bundled]
-
-    def find(task_id: str) -> Path:
-        found = next((place / task_id for place in places if (place / task_id / "task.json").is_file()), None)
-        if found is None:
-            looked = ", ".join(str(place) for place in places)
-            raise TaskError(f"no task {task_id!r} in {looked}; name the folder of the run's tasks with --tasks")
-        return found
-
-    return find
+        return write_pages(found, episodes, stages=stages, tasks=tasks, exchanges=exchanges, out=out, tell=tell)

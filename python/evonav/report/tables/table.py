@@ -6,6 +6,7 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 
 import io
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -84,9 +85,12 @@ class Table:
     def __repr__(self) -> str:
         """Return the table as text, as wide as the terminal."""
         table, text = self.rich(), io.StringIO()
-        width = get_terminal_size((120, 24)).columns
-        least = Measurement.get(console := Console(file=text, width=width), console.options, table).minimum
-        Console(file=text, width=max(least, width)).print(table)
+        for column, *cells in zip(table.columns, self.columns, *self.rows, strict=True):
+            column.min_width = max(len(word) for cell in cells for word in cell.split() or ("",))  # no word is broken
+        console = Console(file=text, width=sys.maxsize, height=100)  # without a height, COLUMNS overrides the width
+        least = Measurement.get(console, console.options, table).minimum
+        console.width = max(least, get_terminal_size((120, 24)).columns)
+        console.print(table)
         return "\n".join(line.rstrip() for line in text.getvalue().splitlines())
 
     def _repr_html_(self) -> str:
