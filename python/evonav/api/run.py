@@ -10,7 +10,7 @@ from typing import Any
 from evonav.component import optional_module
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.replay.run_pages import telling_task, unwritten_highlights, write_pages
+from evonav.replay.run_pages import highlight_task, unwritten_highlights, write_pages
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import agents_of
 from evonav.report.compare.wording import comparison_table
@@ -136,7 +136,7 @@ class Run:
         run = self._recorded
         if task is not None and task not in run.num_stages:
             raise InvalidArgumentError(_no_such("task", task, tuple(run.num_stages)))
-        task = task or telling_task(run, agents)
+        task = task or highlight_task(run, agents)
         pages, index = write_pages(run, [(name, task) for name in agents])
         return index.parent / pages[0].href if len(pages) == 1 else index
 

@@ -59,7 +59,7 @@ def write_pages(
     return pages, write_index(pages, out_dir, run.run_dir.resolve().name)
 
 
-def telling_task(run: Run, agents: Sequence[str]) -> str:
+def highlight_task(run: Run, agents: Sequence[str]) -> str:
     """Return the task that shows best what these agents do: one in which memory misleads the first, not the last."""
     return best_highlight(run, sorted(agents, key=lambda name: name not in ("fu", "stage-reset")))[0]
 

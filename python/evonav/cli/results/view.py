@@ -72,12 +72,12 @@ def make_pages(
         exchanges: File of a model's answers.
         out: Folder to write.
     """
-    from evonav.replay.run_pages import telling_task
+    from evonav.replay.run_pages import highlight_task
     from evonav.report.run import load_run
 
     found = load_run(run)
     agents = agents or found.agents
-    task_id = task if task is not None else telling_task(found, agents)
+    task_id = task if task is not None else highlight_task(found, agents)
     episodes = [(name, task_id) for name in agents]
     return replay_pages(found, episodes, stages=stages, tasks=tasks, exchanges=exchanges, out=out)
 

@@ -88,7 +88,7 @@ class Table:
         for column, *cells in zip(table.columns, self.columns, *self.rows, strict=True):
             column.min_width = max(len(word) for cell in cells for word in cell.split() or ("",))  # no word is broken
         console = Console(file=text, width=sys.maxsize, height=100)  # without a height, COLUMNS overrides the width
-        least = Measurement.get(console, console.options, table).minimum
+        least = Measurement.get(console, console.options, table).minimum + 2 * len(self.columns)  # with gaps
         console.width = max(least, get_terminal_size((120, 24)).columns)
         console.print(table)
         return "\n".join(line.rstrip() for line in text.getvalue().splitlines())
