@@ -1,5 +1,6 @@
 """Houses and tasks are lists, read when they are used."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,20 @@ def test_houses_come_from_files_too(tmp_path: Path) -> None:
     (tmp_path / "bad.jsonl").write_text("{}\n")
     with pytest.raises(HouseError, match=r"bad\.jsonl:1"):
         evonav.load_houses(tmp_path / "bad.jsonl")[0]
+
+
+def test_houses_that_lack_something_are_completed(tmp_path: Path) -> None:
+    document = json.loads(evonav.load_houses("bundled:86")[0].to_json())
+    document["objects"][0]["assetId"] = "0123456789abcdef"
+    del document["metadata"]["agent"]
+    (tmp_path / "house.json").write_text(json.dumps(document))
+    (tmp_path / "sizes.json").write_text('{"0123456789abcdef": {"category": "DiningTable", "size_m": [1, 0.7, 1.5]}}')
+    source, sizes = tmp_path / "house.json", tmp_path / "sizes.json"
+    (house,) = evonav.load_houses(source, assets=sizes, start="auto")
+    assert house.start is not None
+    assert house.objects[0].category == "DiningTable"
+    (task,) = evonav.generate_tasks(source, limit=1, workers=0, assets=sizes, start="auto")
+    assert "0123456789abcdef" in json.loads(task.house_json(1))["metadata"]["evonav_assets"]
 
 
 def test_tasks_are_a_list_and_each_is_one_to_evaluate_on(tmp_path: Path) -> None:

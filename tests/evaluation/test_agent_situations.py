@@ -3,14 +3,12 @@
 import re
 from pathlib import Path
 
-import pytest
+import doubting_agent
 
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.evaluation.contract.situations import check_situations, place_of
 from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks
-
-TUTORIAL = Path(__file__).parents[2] / "docs" / "tutorial-agent.md"
 
 
 def situations(agent):
@@ -18,29 +16,17 @@ def situations(agent):
         return {found.name: found for found in check_situations(Backend(), directory, "mine", agent, 0)}
 
 
-@pytest.fixture(scope="module")
-def tutorial():
-    blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(), re.DOTALL)
-    return "\n".join(block for block in blocks if block.startswith("# my_agent.py"))
-
-
-def test_an_agent_that_handles_every_situation_passes(tutorial):
-    names = {}
-    exec(tutorial, names)
-    found = situations(names["Doubter"])
+def test_an_agent_that_handles_every_situation_passes():
+    found = situations(doubting_agent.Doubter)
     assert {check.verdict for check in found.values()} == {"pass"}, found
 
 
-def test_a_fault_in_the_branch_of_a_remembered_entry_is_found(tutorial, tmp_path):
-    """The line that the tutorial once had: no stage of an easy task reaches it."""
-    faulty = tutorial.replace("self.objects.remove(entry.id)", "self.objects.remove(entry.entry_id)")
-    assert faulty != tutorial
-    line = next(number for number, text in enumerate(faulty.splitlines(), 1) if "entry.entry_id" in text)
-    names = {}
-    exec(compile(faulty, tmp_path / "my_agent.py", "exec"), names)
-    found = situations(names["Doubter"])
+def test_a_fault_in_the_branch_of_a_remembered_entry_is_found():
+    found = situations(doubting_agent.Faulty)
     assert {"target gone", "failed search"} <= {name for name, check in found.items() if check.verdict == "fail"}
-    assert found["target gone"].finding.startswith(f"my_agent.py:{line}: AttributeError: ")
+    lines = Path(doubting_agent.__file__).read_text().splitlines()
+    line = next(number for number, text in enumerate(lines, 1) if "entry_id" in text)
+    assert found["target gone"].finding.startswith(f"doubting_agent.py:{line}: AttributeError: ")
     assert "has no attribute 'entry_id'" in found["target gone"].finding
 
 

@@ -1,13 +1,18 @@
 import pytest
 
+from evonav.agents.agent import SensorConfig
 from evonav.agents.hosting import wire
+from evonav.component import Component
 from evonav.decision.metered import Metered
 from evonav.decision.question import Reply
 from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.ledger import Usage
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.hosting.agent import RemoteAgent
+from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
+from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import evaluate
 from evonav.tasks.bundled import bundled_tasks
@@ -75,6 +80,29 @@ def test_costs_that_are_no_numbers_are_refused(wrong):
     assert wire.COSTS.read(b'{"num_questions": 3, "cost_usd": 0.5}') == {"num_questions": 3, "cost_usd": 0.5}
     with pytest.raises(InvalidArgumentError, match=wrong.partition(":")[0].strip('"')):
         wire.COSTS.read(f'{{"num_questions": 3, {wrong}}}'.encode())
+
+
+class Silent:
+    """The process of an agent whose model cannot tell its costs."""
+
+    cpu_s = 0.0
+
+    def process(self, name):
+        return self
+
+    def describe(self, label):
+        pass
+
+    def ask(self, operation, *arguments):
+        if operation == "costs":
+            raise AgentFailedError(ErrorKind.AGENT, "ZeroDivisionError: division by zero")
+        return {"sensors": wire.SENSORS.write(SensorConfig())}
+
+
+def test_costs_that_cannot_be_told_are_left_out():
+    agent = RemoteAgent(Silent(), "mine", Component("evonav.decision.backends:text_match"), 0)
+    assert agent.sensors == SensorConfig()
+    assert agent.costs() == {}
 
 
 def test_a_stopwatch_books_by_component_and_leaves_the_rest_to_the_evaluator():

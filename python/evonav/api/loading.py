@@ -5,7 +5,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import cache
-from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
@@ -23,6 +22,7 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task, write_task
 from evonav.tasks.listing import TaskFile, task_file, task_files
 from evonav.tasks.manifest import Task
+from evonav.world.house_options import HouseOptions, StartRule
 
 BUNDLED = "bundled"
 """Names the houses and tasks that come with evonav."""
@@ -77,13 +77,20 @@ HouseSource = str | Path | House | Sequence[House]
 TaskSource = str | Path | Task | TaskFile | Sequence[Any]
 
 
-def load_houses(source: str | Path | Iterable[str | Path] = BUNDLED, limit: int | None = None) -> HouseList:
+def load_houses(
+    source: str | Path | Iterable[str | Path] = BUNDLED,
+    limit: int | None = None,
+    assets: str | Path | None = None,
+    start: StartRule = "file",
+) -> HouseList:
     """Return houses as a list, each parsed when it is first used.
 
     Args:
         source: `"bundled"`, a file of houses (JSON, JSONL, either with `.gz`), a folder of such files, a fetched split
             (`"procthor-10k:val"`), or a list of these.
         limit: Number of houses to take, from the first. Default: all.
+        assets: File of sizes for assets that the catalogue lacks (docs/houses.md); they become part of the houses.
+        start: `"auto"` gives a house without a start a free place to start from.
 
     Returns:
         The houses; indexing, slicing and `len` work. A malformed house raises `HouseError` when it is used.
@@ -98,21 +105,14 @@ def load_houses(source: str | Path | Iterable[str | Path] = BUNDLED, limit: int 
         'bundled:1'
     """
     sources = [source] if isinstance(source, str | Path) else list(source)
-    texts = (text for one in sources for text in _texts(one))
+    options = HouseOptions.of(None if assets is None else Path(assets), start)
+    texts = (text for one in sources for text in _house_texts(one, options))
     return LazyList(tuple(islice(texts, limit)), lambda text: House(text.text, name=text.name))
 
 
-def _texts(source: str | Path) -> Iterator[HouseText]:
-    if source != BUNDLED:
-        yield from _house_texts(source)
-        return
-    for number, (_, text) in enumerate(_house_texts(_bundled_houses()), start=1):
-        yield HouseText(f"{BUNDLED}:{number}", text)
-
-
-def _house_texts(source: str | Path) -> HouseTexts:
+def _house_texts(source: str | Path, options: HouseOptions | None = None) -> HouseTexts:
     try:
-        return HouseTexts(source)
+        return HouseTexts(source, options)
     except HouseError as error:
         if Path(source).exists() or ":" in str(source):
             raise
@@ -148,6 +148,8 @@ def generate_tasks(
     limit: int | None = None,
     workers: int | None = None,
     allow_unknown_assets: bool = False,
+    assets: str | Path | None = None,
+    start: StartRule = "file",
 ) -> TaskList:
     """Generate a task from every house that gives one; call it again with the same `out` to resume.
 
@@ -158,6 +160,8 @@ def generate_tasks(
         limit: Number of tasks, from the first houses that give one. Default: all.
         workers: Number of worker processes; 0 runs in this process. Default: one per core.
         allow_unknown_assets: Give assets that are missing from the catalogue the usual size of their category.
+        assets: File of sizes for assets that the catalogue lacks (docs/houses.md); they become part of the tasks.
+        start: `"auto"` gives a house without a start a free place to start from.
 
     Returns:
         The tasks, in the order of their houses.
@@ -174,7 +178,8 @@ def generate_tasks(
         5
     """
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
-    texts = _house_texts(_house_path(houses, folder))
+    completion = HouseOptions.of(None if assets is None else Path(assets), start)
+    texts = _house_texts(_house_path(houses, folder), completion)
     dataset, split = inherited_names(texts)
     options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
     with progress_bar("tasks") as show:
@@ -192,7 +197,7 @@ def generate_tasks(
 def _house_path(houses: HouseSource, folder: Path) -> str | Path:
     """Return the path of houses; houses in memory are written beside their tasks."""
     if isinstance(houses, str | Path):
-        return _bundled_houses() if houses == BUNDLED else houses
+        return houses
     listed = [houses] if isinstance(houses, House) else list(houses)
     wrong = next((house for house in listed if not isinstance(house, House)), None)
     if wrong is not None or not listed:
@@ -255,8 +260,3 @@ def _lent() -> ExitStack:
 @cache
 def _bundled_tasks() -> Path:
     return _lent().enter_context(bundled_tasks())
-
-
-@cache
-def _bundled_houses() -> Path:
-    return _lent().enter_context(as_file(files("evonav") / "data" / "houses.jsonl.gz"))

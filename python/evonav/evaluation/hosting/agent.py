@@ -159,12 +159,12 @@ class RemoteAgent(HostedAgent):
         return None if text is None else wire.ENTRIES.read(text)
 
     def costs(self) -> Mapping[str, float]:
-        """Return what its decision model has cost since it was made; empty if its process is gone."""
+        """Return what its decision model has cost since it was made; empty if that cannot be read."""
         if self._process is None:
             return {}
         try:
             costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
-        except InvalidArgumentError:  # they decide nothing
+        except (InvalidArgumentError, AgentFailedError):  # they decide nothing
             return {}
         return {str(name): amount for name, amount in costs.items()}
 
