@@ -148,7 +148,7 @@ def _bytes(folder):
 def test_a_folder_is_resumed_and_comes_out_the_same(tmp_path):
     houses = tmp_path / "houses.jsonl"
     houses.write_text("\n".join(house.to_json() for house in bundled_houses(3)) + "\n", encoding="utf-8")
-    options = dataclasses.replace(PAIRS, per_house=2)
+    options = PAIRS.model_copy(update={"per_house": 2})
     made = generate_controlled(houses, tmp_path / "whole", options=options)
     assert made.num_new == 6
     assert len(made.record.task_ids) + len(made.record.rejections) == 6

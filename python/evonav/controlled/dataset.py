@@ -28,7 +28,7 @@ from evonav.tasks.dataset import (
 from evonav.tasks.files import read_house
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import Task, TaskHeader
-from evonav.tasks.records import parse_record, read_file
+from evonav.tasks.records import Record, parse_record, read_file
 
 WORK = "evonav.controlled.dataset:make_worker"
 
@@ -77,7 +77,7 @@ def generate_controlled(
         "evonav": __version__,
         "houses": {one.name: one.sha256 for one in sources},
         "limit": limit,
-        "options": options.as_json(),
+        "options": options.model_dump(mode="json"),
     }
     out = out.resolve()
     with writing(out), closing(Journal(out, run)) as journal:
@@ -86,7 +86,7 @@ def generate_controlled(
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
         on_progress(num_before, num_all)
         if num_before < num_all:
-            settings = json.dumps({"out": str(out), "options": options.as_json()})
+            settings = WorkerSettings(out=str(out), options=options).model_dump_json()
             with open_pool(
                 WORK,
                 settings,
@@ -110,17 +110,25 @@ def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) ->
     return Job(index, f"{head}\n{house.text}")
 
 
+class WorkerSettings(Record):
+    """The settings of a worker."""
+
+    out: str
+    """Folder of the analysis."""
+    options: ControlledOptions
+
+
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
 
     Args:
-        settings: `{"out": ..., "options": ...}`.
+        settings: `WorkerSettings` as JSON.
 
     Returns:
         See `worker_of`; a seed heads a house, beside the name.
     """
-    values = json.loads(settings)
-    options, out = ControlledOptions.from_json(values["options"]), Path(values["out"])
+    given = WorkerSettings.model_validate_json(settings)
+    options, out = given.options, Path(given.out)
 
     def arms(house: House, seed: int) -> dict[Path, Task]:
         return {tasks_of(out, arm): task for arm, task in generate_arms(house, options, seed=seed).items()}

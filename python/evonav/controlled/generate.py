@@ -10,11 +10,8 @@ of whether a transition evolves are nested: what evolves at 0.25 does so at 0.5,
 """
 
 import dataclasses
-import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 from evonav.controlled.layout import Arm, Kind
 from evonav.errors import InvalidArgumentError
@@ -24,6 +21,7 @@ from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Control, Task
 from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.records import Record
 
 NUM_ATTEMPTS = 8
 """Draws of goals and changes before a house is given up."""
@@ -32,8 +30,7 @@ _ANEW: tuple[RejectReason, ...] = ("no_valid_goal", "not_evolved")
 """Reasons of an arm that another draw may do without."""
 
 
-@dataclass(frozen=True, slots=True)
-class ControlledOptions:
+class ControlledOptions(Record):
     """Options that decide the tasks of a house."""
 
     kind: Kind = "pairs"
@@ -42,11 +39,11 @@ class ControlledOptions:
     """Tasks a house: the seeds that follow `seed`."""
     rates: tuple[float, ...] = RATES
     """Probabilities of the arms of `rates`."""
-    parameters: GenerationParameters = field(default_factory=GenerationParameters)
+    parameters: GenerationParameters = GenerationParameters()
     allow_unknown_assets: bool = False
 
-    def __post_init__(self) -> None:
-        """Check the values that no record checks.
+    def model_post_init(self, _context: object) -> None:
+        """Check the domains of the values.
 
         Raises:
             InvalidArgumentError: A value is outside its domain.
@@ -63,16 +60,6 @@ class ControlledOptions:
         if self.kind == "pairs":
             return (Arm(name="fixed", evolve_probability=0.0), Arm(name="evolved", evolve_probability=1.0))
         return tuple(Arm(name=f"p{rate:.2f}", evolve_probability=rate) for rate in self.rates)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the options as JSON, to be read by `from_json`."""
-        return {**dataclasses.asdict(self), "parameters": self.parameters.model_dump(mode="json")}
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> "ControlledOptions":
-        """Read what `as_json` returned."""
-        parameters = GenerationParameters.model_validate_json(json.dumps(values["parameters"]))
-        return cls(**{**values, "parameters": parameters, "rates": tuple(values["rates"])})
 
 
 def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dict[str, Task]:

@@ -1,8 +1,7 @@
 """`evonav controlled`: generate, evaluate and report controlled analyses (docs/controlled.md)."""
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -77,18 +76,19 @@ def generate(
     source = houses or old_houses
     if source is None:
         raise typer.BadParameter("name houses: --houses FILE, or --houses bundled")
+    chosen: dict[str, Any] = {}
+    if rates is not None:
+        try:
+            chosen = {"kind": "rates", "rates": tuple(float(rate) for rate in rates.split(","))}
+        except ValueError:
+            raise typer.BadParameter(f"--rates {rates}: numbers, comma-separated") from None
     options = ControlledOptions(
         seed=seed,
         per_house=per_house,
         parameters=read_parameters(config, evolve_probability=None, num_stages=None),
         allow_unknown_assets=allow_unknown_assets,
+        **chosen,
     )
-    if rates is not None:
-        try:
-            probabilities = tuple(float(rate) for rate in rates.split(","))
-        except ValueError:
-            raise typer.BadParameter(f"--rates {rates}: numbers, comma-separated") from None
-        options = replace(options, kind="rates", rates=probabilities)
     with interruptible(out), status("Generating tasks") as show:
         made = generate_controlled(
             source,
