@@ -59,6 +59,18 @@ def test_agents_are_completed_also_after_a_comma():
     assert "shortest-path" in completion.agents("")
 
 
+def test_agents_of_a_run_are_completed(tmp_path):
+    (tmp_path / "summary.json").write_text('{"agents": {"fu": {}, "./mine.py:Mine": {}}}')
+
+    class Context:
+        params = {"run": tmp_path}  # noqa: RUF012
+
+    assert completion.run_agents(Context, "") == ["fu", "./mine.py:Mine"]
+    assert completion.run_agents(Context, "fu,") == ["fu,./mine.py:Mine"]
+    Context.params = {"run": tmp_path / "nowhere"}
+    assert completion.run_agents(Context, "") == []
+
+
 def test_runs_and_subsets_are_completed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in ("out/one", "out/other", "tasks"):

@@ -224,7 +224,8 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
 
 def _counts(state: "GenerationProgress") -> str:
     failed = f", {state.num_failed} failed" if state.num_failed else ""
-    return f"{state.num_tasks} tasks ({state.tasks_per_s:.1f}/s), {state.num_rejected} houses rejected{failed}"
+    rejected = f"{counted_as(state.num_rejected, 'house')} rejected"
+    return f"{counted_as(state.num_tasks, 'task')} ({state.tasks_per_s:.1f}/s), {rejected}{failed}"
 
 
 @contextmanager

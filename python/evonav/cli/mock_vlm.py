@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.display import counted_as
+
 
 def mock_vlm(
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 takes any free one.")] = 8000,
@@ -48,4 +50,4 @@ def mock_vlm(
             while True:
                 time.sleep(3600.0)
         except KeyboardInterrupt:
-            typer.echo(f"{server.num_requests} requests served")
+            typer.echo(f"{counted_as(server.num_requests, 'request')} served")

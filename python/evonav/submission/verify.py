@@ -88,7 +88,7 @@ def verify(
             records = {part.agent: _records(file, part) for part in header.records}
     except SubmissionError as error:
         return Verdict((Check("file", False, str(error)),), None, False)
-    checks.append(Check("file", True, f"{len(header.records)} agents, {sum(map(len, records.values()))} records"))
+    checks.append(Check("file", True, f"records: {sum(map(len, records.values()))}, agents: {', '.join(records)}"))
     known = {task.task_id: task for task in tasks}
     required = list(known)[:limit]
     checks.append(_check("protocol", _protocol_findings(header), "the benchmark's"))

@@ -15,6 +15,20 @@ def agents(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in names]
 
 
+def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
+    """Names of the agents of the run that the command line names before; after a comma, further ones."""
+    import json
+
+    try:
+        summary = json.loads((Path(ctx.params["run"]) / "summary.json").read_text(encoding="utf-8"))
+        known = list(summary["agents"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    before, comma, last = incomplete.rpartition(",")
+    names = [name for name in known if name.startswith(last) and name not in before.split(",")]
+    return [f"{before}{comma}{name}" for name in names]
+
+
 def runs(incomplete: str) -> list[str]:
     """Folders of runs, and folders on the way to some."""
     return _folders(incomplete, ("records.sqlite",))

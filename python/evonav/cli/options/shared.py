@@ -35,7 +35,7 @@ RunAgents = Annotated[
         "--agent",
         metavar="NAME",
         help=f"Agent of the run. {_SEVERAL} Default: all.",
-        autocompletion=completion.agents,
+        autocompletion=completion.run_agents,
     ),
 ]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.", autocompletion=completion.runs)]

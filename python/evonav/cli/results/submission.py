@@ -43,7 +43,7 @@ def pack(
     header = pack(run, target, agents=names, about=about)
     typer.echo(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
-        f" {len(header.tasks)} tasks; {target.stat().st_size / 1e6:.1f} MB)\nnext: evonav verify {target}"
+        f" {counted_as(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)\nnext: evonav verify {target}"
     )
 
 

@@ -66,8 +66,11 @@ def print_statistics(found: "TaskStatistics") -> None:
     """Print statistics in tables and lines of 80 columns."""
     from rich.console import Console
 
+    from evonav.cli.display import counted_as
+
     console = Console(highlight=False)
-    what = f"{found.num_tasks} tasks, {found.num_stages} stages, {found.num_houses} houses"
+    counts = ((found.num_tasks, "task"), (found.num_stages, "stage"), (found.num_houses, "house"))
+    what = ", ".join(counted_as(number, noun) for number, noun in counts)
     console.print(f"{what}; seeds {', '.join(map(str, found.seeds))}; {', '.join(found.generators)}")
     if found.weighting is not None:
         weighting = found.weighting

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import progress_bar
+from evonav.cli.display import counted_as, progress_bar
 from evonav.cli.options.decisions import DryRun
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
@@ -48,14 +48,14 @@ def write(
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"
         num_left = estimate.num_questions - estimate.num_cached
         counts = f"{estimate.num_cached} answered by the cache; {num_left} to ask"
-        typer.echo(f"{estimate.num_questions} questions, {counts}:")
+        typer.echo(f"{counted_as(estimate.num_questions, 'question')}, {counts}:")
         typer.echo(f"at most {estimate.usage.input_tokens} tokens in, {estimate.usage.output_tokens} out{cost}")
         return
     with progress_bar("tasks") as show:
         writing = write_texts(folder, client, limit=limit, on_task=lambda state: show(state.num_done, state.num_tasks))
     _tell(writing)
     cost = "" if account.cost_usd is None else f", ${account.cost_usd:.4f}"
-    counts = f"{account.num_asked} questions asked, {account.num_replayed} answered from exchanges"
+    counts = f"{counted_as(account.num_asked, 'question')} asked, {account.num_replayed} answered from exchanges"
     typer.echo(f"{counts}; {account.usage.input_tokens} tokens in, {account.usage.output_tokens} out{cost}")
     if writing.stopped is not None:
         typer.echo(f"stopped: {writing.stopped}; run again to resume", err=True)
@@ -64,8 +64,8 @@ def write(
 
 def _tell(writing: "Writing") -> None:
     typer.echo(
-        f"{writing.num_written} stages written, {writing.num_written_before} were before, "
-        f"{writing.failures.total()} keep the describer's texts ({writing.num_done} of {writing.num_tasks} tasks)"
+        f"{counted_as(writing.num_written, 'stage')} written, {writing.num_written_before} written before, "
+        f"{writing.failures.total()} keep the texts that they had ({writing.num_done} of {writing.num_tasks} tasks)"
     )
     for kind, count in sorted(writing.failures.items()):
         typer.echo(f"  {kind}: {count}")
