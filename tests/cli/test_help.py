@@ -5,13 +5,14 @@ import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.cli.examples import EXAMPLES
+from evonav.cli.examples import DOCS, EXAMPLES, PAGES
 from evonav.cli.options import completion
 
 GROUP = typer.main.get_command(app)
@@ -166,3 +167,13 @@ def test_options_that_mean_the_same_are_declared_once():
                 texts.setdefault(param.opts[0], {}).setdefault((param.help, str(param.default)), []).append(name)
     differing = {option: found for option, found in texts.items() if len(found) > 1}
     assert differing == {}, differing
+
+
+def test_the_named_pages_of_the_documentation_are_there():
+    """An installed package has no pages, so their address is told; it is the project's."""
+    root = Path(__file__).parents[2]
+    assert {page for page in PAGES.values() if not (root / "docs" / page).is_file()} == set()
+    assert set(PAGES) <= set(COMMANDS)
+    source = re.search(r'^Source = "(.*)"', (root / "pyproject.toml").read_text(), re.MULTILINE)
+    assert source
+    assert f"{source[1]}/blob/main/docs" == DOCS
