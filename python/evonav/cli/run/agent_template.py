@@ -1,4 +1,4 @@
-"""An agent that maps the house, remembers objects, and looks again before it stops.
+"""An agent that maps the house, remembers objects, and stops where it saw one again in this stage.
 
     evonav check-agent ./my_agent.py:MyAgent
     evonav evaluate --agent ./my_agent.py:MyAgent --agent fu --out out/mine
@@ -26,7 +26,8 @@ class MyAgent(evonav.Agent):
     def begin_stage(self, goal: evonav.Goal) -> None:
         """Start the search for a new goal in the same house: keep the memory, but objects may have been moved."""
         self.goal = goal  # goal.instruction is the whole sentence, goal.category the kind of object
-        self.target: Point | None = None
+        self.target: int | None = None  # id of the remembered object that the agent goes to
+        self.objects.begin_stage(goal.stage)
 
     def act(self, observation: evonav.Observation) -> evonav.NavigateTo | evonav.Stop:
         """Update the memory, then decide where to go next, or to stop."""
@@ -34,15 +35,16 @@ class MyAgent(evonav.Agent):
         for view in observation.views:
             self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
             self.objects.update(view)
-        if self.target is not None:
-            if not observation.has_arrived and observation.is_action_success:
-                return evonav.NavigateTo(self.target)
-            if any(self.goal.category in view.detections.labels for view in observation.views):
-                return evonav.Stop()
-            self.forget(self.target)  # it is not here any more
-        self.target = self.nearest_remembered(here)
-        if self.target is not None:
-            return evonav.NavigateTo(self.target)
+        if self.target is not None and (observation.has_arrived or not observation.is_action_success):
+            entry = self.objects.entry(self.target)
+            if entry is not None:
+                if entry.last_seen_stage == self.goal.stage:
+                    return evonav.Stop()
+                self.objects.remove(entry.id)  # not seen on the way: somebody has moved it
+            self.target = None
+        place = self.place_to_go(here)
+        if place is not None:
+            return evonav.NavigateTo(place)
         frontiers = [frontier.position_m for frontier in self.map.update_frontiers(here)]
         if not frontiers:
             return evonav.Stop("nothing left to explore")
@@ -52,14 +54,9 @@ class MyAgent(evonav.Agent):
         """Return what the agent believes, which `evonav view` draws."""
         return evonav.Explanation(map=self.map, objects=self.objects)
 
-    def nearest_remembered(self, here: Point) -> Point | None:
-        """Return the place of the nearest remembered object of the goal's category, if there is one."""
-        known = [entry for entry in self.objects.entries if entry.label == self.goal.category]
-        places = [(entry.centre_m[0], entry.centre_m[2]) for entry in known]
-        return min(places, key=lambda point: math.dist(point, here), default=None)
-
-    def forget(self, place: Point) -> None:
-        """Remove the remembered objects of a place where the goal was not found."""
-        for entry in list(self.objects.entries):
-            if entry.label == self.goal.category and (entry.centre_m[0], entry.centre_m[2]) == place:
-                self.objects.remove(entry.id)
+    def place_to_go(self, here: Point) -> Point | None:
+        """Return the place of the target; without one, choose the nearest remembered object of the goal's category."""
+        places = {e.id: (e.centre_m[0], e.centre_m[2]) for e in self.objects.entries if e.label == self.goal.category}
+        if self.target not in places:
+            self.target = min(places, key=lambda entry_id: math.dist(places[entry_id], here), default=None)
+        return None if self.target is None else places[self.target]
