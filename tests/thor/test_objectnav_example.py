@@ -67,5 +67,5 @@ def test_the_shortest_path_can_be_followed_as_returned(houses, tmp_path) -> None
 
 
 def test_runs_repeat(houses, tmp_path) -> None:
-    options = ("--agent", "random", "--episodes", "2", "--seed", "3")
+    options = ("--agent", "random", "--episodes", "1", "--seed", "3")
     assert run(houses, tmp_path, *options) == run(houses, tmp_path, *options)
