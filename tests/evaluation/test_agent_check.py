@@ -120,3 +120,5 @@ def test_the_command_prints_a_table_and_fails_with_the_agent():
     bad = CliRunner().invoke(app, ["check-agent", "contract_breakers:Wordless"])
     assert bad.exit_code == 1
     assert "breaks the contract" in bad.stdout
+    missing = CliRunner().invoke(app, ["check-agent", "./missing.py:X"])
+    assert (missing.exit_code, "./missing.py:X: cannot be checked" in missing.stdout) == (1, True)

@@ -144,7 +144,7 @@ def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> N
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=title)
+    table = Table(title=Text(title))
     for column in ("check", "", "what was found"):
         table.add_column(column, no_wrap=column != "what was found")
     for name, result, style, finding in checks:
