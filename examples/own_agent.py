@@ -3,20 +3,17 @@
     evonav check-agent ./examples/own_agent.py:OwnAgent
     evonav evaluate --agent ./examples/own_agent.py:OwnAgent --agent fu --out out/mine
 
-An agent is any class with these three methods, and `explain` for pictures; there is nothing to inherit from. This one
-looks at no instruction but the category, and believes what it remembers: it stops where a thing has been.
+An agent has these three methods, and `explain` for pictures. This one uses nothing of the instruction but the category,
+and believes what it remembers: it stops where it last saw the object.
 """
 
 import math
 
-from evonav import Explanation, Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, SensorConfig, Stop, TaskInfo
+from evonav import Agent, Explanation, Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, Stop, TaskInfo
 
 
-class OwnAgent:
+class OwnAgent(Agent):
     """Goes to the nearest object of the asked-for category that it knows of, and explores until it knows one."""
-
-    def __init__(self) -> None:
-        self.sensors = SensorConfig()
 
     def begin_task(self, task: TaskInfo) -> None:
         """A new house: forget everything."""
@@ -31,7 +28,7 @@ class OwnAgent:
         """One decision round."""
         here = (observation.pose.x_m, observation.pose.z_m)
         for view in observation.views:
-            self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+            self.map.update(view)
             self.objects.update(view)
         if self.target_m is not None:
             is_there = observation.has_arrived or not observation.is_action_success

@@ -22,7 +22,7 @@ class Explained(Agent):
 
     def act(self, observation):
         for view in observation.views:
-            self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+            self.map.update(view)
             self.objects.update(view)
         self.map.update_frontiers((observation.pose.x_m, observation.pose.z_m))
         self.beliefs.append(inspectable(self).belief())

@@ -8,14 +8,12 @@ without when there is no valid answer. With `--decision vlm` the model is any Op
 import math
 from dataclasses import dataclass
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop
+from evonav import Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, SensorConfig, Stop, TaskInfo
+from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
 from evonav.decision.text.matcher import Matcher
-from evonav.memory import ObjectMap, OccupancyMap
-from evonav.sensors.observation import Observation
-from evonav.tasks.public import Goal, TaskInfo
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ class AskingAgent:
         """One decision round."""
         here = (observation.pose.x_m, observation.pose.z_m)
         for view in observation.views:
-            self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+            self.map.update(view)
             self.objects.update(view)
         if self.target is None:
             self.target = self._chosen(here)

@@ -33,7 +33,7 @@ class MyAgent(evonav.Agent):
         """Update the memory, then decide where to go next, or to stop."""
         here = (observation.pose.x_m, observation.pose.z_m)
         for view in observation.views:
-            self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+            self.map.update(view)
             self.objects.update(view)
         if self.target is not None and (observation.has_arrived or not observation.is_action_success):
             entry = self.objects.entry(self.target)
