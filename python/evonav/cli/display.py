@@ -103,9 +103,9 @@ def print_table(summaries: "list[AgentSummary]") -> None:
     """Print the rates of agents, and how many stages are missing."""
     from rich.table import Table
 
-    table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target was moved")
+    table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target moved")
     table.add_column("agent", overflow="fold", min_width=12)  # may be a long path
-    for heading in ("n", "SR", "", "SPL", "", "moved", "not moved"):
+    for heading in ("n", "SR", "95%", "SPL", "95%", "moved", "not moved"):
         table.add_column(heading, justify="right", no_wrap=True)
     for summary in summaries:
         splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
@@ -130,7 +130,7 @@ def _percent(value: float | None) -> str:
 
 
 def _percent_interval(interval: tuple[float, float] | None) -> str:
-    return "" if interval is None else f"{100 * interval[0]:.0f}-{100 * interval[1]:.0f}"
+    return "-" if interval is None else f"{100 * interval[0]:.0f}-{100 * interval[1]:.0f}"
 
 
 def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> None:
