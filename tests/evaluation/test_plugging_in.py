@@ -47,7 +47,7 @@ def test_the_example_is_short_and_keeps_the_contract():
     assert len(code_lines(EXAMPLES / "own_agent.py")) <= 30
     done = evonav("check-agent", OWN)
     assert done.returncode == 0, done.stdout
-    assert "│ fail" not in done.stdout
+    assert "│ fail │" not in done.stdout
 
 
 def test_the_example_is_better_than_chance(tmp_path):
