@@ -53,6 +53,11 @@ def test_examples_are_shown_below_the_help():
     assert shown.index("Examples:") > shown.index("--schema")
 
 
+def test_the_terminal_decides_where_lines_of_a_help_end():
+    shown = CliRunner().invoke(app, ["verify", "--help"], env={"COLUMNS": "300"}).stdout
+    assert re.search(r"The scores are computed again\. .* only the first tasks are required and replayed\.", shown)
+
+
 def test_agents_are_completed_also_after_a_comma():
     assert completion.agents("ft") == ["ftu"]
     assert completion.agents("fu,stag") == ["fu,stage-reset"]

@@ -121,6 +121,11 @@ PAGES = {
 """Pages of the documentation by command."""
 
 
+def _one_line_a_paragraph(text: str) -> str:
+    """Return a docstring without the line breaks that its file needs, so that the terminal decides where lines end."""
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+
+
 def add_examples(app: "typer.Typer", before: str = "") -> None:
     """Show examples and the address of a page below the help of every command of an app."""
     for command in app.registered_commands:
@@ -129,6 +134,7 @@ def add_examples(app: "typer.Typer", before: str = "") -> None:
         lines = ["Examples:", *(f"  {example}" for example in examples)] if examples else []
         lines += [f"Documentation: {DOCS}/{page}"] if page else []
         # A blank line keeps lines apart; a bracket would be taken for a style.
+        command.help = _one_line_a_paragraph(command.callback.__doc__ or "") if command.callback else None
         command.epilog = "\n\n".join(line.replace("[", r"\[") for line in lines) or None
     for group in app.registered_groups:
         if group.typer_instance is not None:

@@ -64,7 +64,7 @@ class Group(_Shown, TyperGroup):
         expand = getattr(getattr(command, "callback", None), "expand", None)
         if command is not None and expand is not None:
             app = new_app()
-            app.command(name, epilog=command.epilog, cls=Command)(expand())
+            app.command(name, help=command.help, epilog=command.epilog, cls=Command)(expand())
             command = typer.main.get_command(app)
         return name, command, rest
 
