@@ -35,7 +35,8 @@ def older_run(tmp_path: Path) -> Path:
 
 def test_commands_show_an_older_run(older_run: Path) -> None:
     assert re.search(r"success \(paper\), % +50.0 \[–\] +0.0", _evonav("report", older_run, "--text"))
-    assert re.search(r"fu minus random-walk +50.0 +0.0 +\+50.0", _evonav("compare", older_run, "fu", "random-walk"))
+    compared = " ".join(_evonav("compare", older_run, "fu", "random-walk").split())
+    assert "SR: fu minus random-walk: +50.0" in compared
     assert "50.0" in _evonav("breakdown", older_run)
     assert "50.0" in _evonav("paper", older_run)
     _evonav("export", older_run, "--csv", older_run / "stages.csv")
