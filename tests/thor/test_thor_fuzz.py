@@ -75,7 +75,7 @@ def _arguments(name: str) -> st.SearchStrategy[JsonObject]:
 _NAMES = [name for name in registry.action_names() if name not in {"ChangeResolution"}]
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
 def test_any_arguments_are_answered(house: JsonObject, data: st.DataObject) -> None:
     engine, emitter = _fresh(house)
@@ -143,7 +143,7 @@ def _changed(data: st.DataObject, house: JsonObject) -> JsonObject:
     return document
 
 
-@settings(max_examples=90, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
 def test_any_house_is_loaded_completely_or_refused(house: JsonObject, data: st.DataObject) -> None:
     engine, emitter = _fresh(house)
