@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +176,17 @@ def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
         assert list(own.maps()) == list(shared.maps())
     if agent != "stay-still":  # which stops at once
         assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in found)
+
+
+def test_an_agent_lost_between_stages_begins_anew(tasks, tmp_path, monkeypatch):
+    """Its process ends after stage 1: stage 2 is not run by an agent that never received the task."""
+    monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
+    config = RunConfig(backend=replace(TOY, decision=Component("unruly_agents:Fatal")), protocol=SHORT)
+    evaluate(["toy_agents:Explorer"], tasks[:1], tmp_path / "run", config=config, num_workers=1)
+    found = records(tmp_path / "run", "toy_agents:Explorer")
+    assert (tmp_path / "alive").exists()
+    assert EndState.ERRORED not in {record.state for record in found}
+    assert [record.memory_lost_at for record in found] == [None, 2, 2]
 
 
 def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):

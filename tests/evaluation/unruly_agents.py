@@ -275,3 +275,17 @@ class Announcing(Explorer):
         path.with_suffix(".part").write_text(f"{os.getpid()} {child}")
         path.with_suffix(".part").rename(path)
         time.sleep(600)
+
+
+class Fatal:
+    """A decision model that ends its process when it is asked what stage 1 cost."""
+
+    def __init__(self, seed):
+        self.num_asked = 0
+
+    @property
+    def client(self):
+        self.num_asked += 1
+        if self.num_asked == 1 and not os.path.exists(os.environ["TOY_ALIVE"]):  # noqa: PTH110
+            open(os.environ["TOY_ALIVE"], "w").close()  # noqa: PTH123
+            os._exit(3)

@@ -80,15 +80,15 @@ class Episode:
             costs = stopwatch.costs(self._new_costs(run.failure))
             wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
             yield StageOutcome(record, wall_s, cpu_s, run.traceback, costs)
-            if run.failure is None:
-                pose = self._end_pose(stage)
-            elif run.failure.is_agents:
-                failed = (*failed, stage)
-                pose = self._end_pose(stage)
-                is_lost = run.failure in LOSSES
-                self._state = EpisodeState() if is_lost else self._state
-            else:
+            if run.failure is not None and not run.failure.is_agents:
                 failure = record
+                continue
+            if run.failure is not None:
+                failed = (*failed, stage)
+            pose = self._end_pose(stage)
+            is_lost = run.failure in LOSSES or self._context.agent.is_lost
+            if is_lost:
+                self._state = EpisodeState()
 
     def _end_pose(self, stage: int) -> Pose:
         """Return the pose at which a stage ends; a guided stage ends at its walk's end even if the agent failed."""

@@ -28,6 +28,11 @@ class HostedAgent(ABC):
         """CPU time that processes of its own have used."""
         return 0.0
 
+    @property
+    def is_lost(self) -> bool:
+        """True if the agent has lost its memory with its process; the next one must begin with the task."""
+        return False
+
     @abstractmethod
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
@@ -121,6 +126,11 @@ class RemoteAgent(HostedAgent):
     def cpu_s(self) -> float:
         """CPU time that its processes have used."""
         return self._cpu_s
+
+    @property
+    def is_lost(self) -> bool:
+        """True if the agent has lost its memory with its process; the next one must begin with the task."""
+        return self._process is None
 
     @property
     def sensors(self) -> SensorConfig:
