@@ -201,7 +201,7 @@ def test_the_command_says_what_it_made_and_what_is_missing(tmp_path):
         "0",
     ]
     made = runner.invoke(app, command, catch_exceptions=False)
-    assert "1 tasks in each arm (fixed, evolved)" in made.output
+    assert "1 task in each arm (fixed, evolved)" in made.output
     with pytest.raises(StoreError, match="evonav controlled evaluate"):
         runner.invoke(app, ["controlled", "report", str(out)], catch_exceptions=False)
     with pytest.raises(TaskError, match="evonav controlled generate"):

@@ -117,6 +117,7 @@ class RemoteAgent(HostedAgent):
         self._seed = seed
         self._process: AgentProcess | None = None
         self._sensors: SensorConfig | None = None
+        self._is_lost = False
         self._last_parts: Mapping[str, bytes] = {}
         """Parts of the answer to the last `act`."""
         self._label = name
@@ -130,7 +131,7 @@ class RemoteAgent(HostedAgent):
     @property
     def is_lost(self) -> bool:
         """True if the agent has lost its memory with its process; the next one must begin with the task."""
-        return self._process is None
+        return self._is_lost
 
     @property
     def sensors(self) -> SensorConfig:
@@ -144,6 +145,7 @@ class RemoteAgent(HostedAgent):
         """Start in a new house."""
         self._label = f"{self._name} {task.task_id}"
         self._describe(self._label)
+        self._is_lost = False
         self._sense(self._ask("begin_task", task))
 
     def begin_stage(self, goal: Goal) -> None:
@@ -199,7 +201,8 @@ class RemoteAgent(HostedAgent):
         try:
             return process.ask(operation, *arguments)
         except AgentFailedError as error:
-            if error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT) or operation == "make":
+            self._is_lost = error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT)
+            if self._is_lost or operation == "make":
                 self._process = self._sensors = None
             raise
         finally:
