@@ -5,10 +5,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import BaseContext
 from pathlib import Path
 from types import ModuleType
 
@@ -54,11 +53,10 @@ class WorkerProcess:
 
     def __init__(self, work: str, settings: str) -> None:
         """Start the process."""
-        context = _context(work)
+        context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
         with one_thread_each(), _without_main():
-            arguments = (far_end, work, settings, dict(os.environ))
-            self._process = context.Process(target=_serve, args=arguments, daemon=True)  # type: ignore[attr-defined]
+            self._process = context.Process(target=_serve, args=(far_end, work, settings), daemon=True)
             self._process.start()
         far_end.close()
 
@@ -80,24 +78,8 @@ class WorkerProcess:
         end_process(self._process, self.connection)
 
 
-def _context(work: str) -> BaseContext:
-    """Return how processes start: on Linux as forks of one server that has imported the work, elsewhere anew.
-
-    A fork takes 20 ms of CPU, a start from nothing half a second. Elsewhere, forks are unsafe or missing.
-    """
-    if sys.platform != "linux":
-        return multiprocessing.get_context("spawn")
-    context = multiprocessing.get_context("forkserver")
-    module = work.partition(":")[0]
-    if module.startswith("evonav."):  # an import that fails would end the server
-        context.set_forkserver_preload([module])  # without effect on a server that runs
-    return context
-
-
-def _serve(connection: Connection, name: str, settings: str, environment: Mapping[str, str]) -> None:
+def _serve(connection: Connection, name: str, settings: str) -> None:
     """Run the jobs that arrive, until the parent closes the connection."""
-    os.environ.clear()  # the server's may be older
-    os.environ.update(environment)
     with suppress(OSError):
         Path("/proc/self/comm").write_text(PROCESS_NAME)
     end_with_parent()
