@@ -103,6 +103,16 @@ def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = No
     return factory(**options)
 
 
+def needed_arguments(factory: Callable[..., Agent]) -> list[str]:
+    """Return the arguments without which an agent cannot be made, other than `decision`."""
+    try:
+        parameters = inspect.signature(factory).parameters.values()
+    except (TypeError, ValueError):  # builtins and some extension types tell nothing
+        return []
+    named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    return [p.name for p in named if p.default is p.empty and p.name != "decision"]
+
+
 def agent_descriptions() -> dict[str, str]:
     """Return the names and descriptions of built-in agents and of those of installed packages."""
     installed = {entry.name: f"plug-in: {entry.value}" for entry in entry_points(group=ENTRY_POINT_GROUP)}

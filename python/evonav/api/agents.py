@@ -1,11 +1,10 @@
 """Find the names of agents that are given as names, classes or functions."""
 
-import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from evonav.agents.registry import import_name, new_agent, register
+from evonav.agents.registry import import_name, needed_arguments, new_agent, register
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.components import check_agent_name
 
@@ -70,17 +69,7 @@ def _check(agent: Any) -> None:  # noqa: ANN401 - whatever was given
         )
     elif not callable(agent):
         raise InvalidArgumentError(f"{agent!r} is no agent: give a name, a class, or a function that makes one")
-    try:
-        signature = inspect.signature(agent)
-    except (TypeError, ValueError):
-        return
-    needed = [
-        parameter.name
-        for parameter in signature.parameters.values()
-        if parameter.default is inspect.Parameter.empty
-        and parameter.kind not in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-        and parameter.name != "decision"
-    ]
+    needed = needed_arguments(agent)
     if needed:
         name = getattr(agent, "__name__", "the agent")
         raise InvalidArgumentError(

@@ -197,6 +197,8 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
     from rich import progress as bars
     from rich.console import Console
 
+    from evonav.api.progress import bar_columns
+
     console = Console(stderr=True)
     if not console.is_terminal:
         printed_s = time.monotonic()
@@ -210,14 +212,7 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
 
         yield tell
         return
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.TaskProgressColumn(),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    with bars.Progress(*columns, console=console) as bar:
+    with bars.Progress(*bar_columns(), console=console) as bar:
         houses = bar.add_task("starting", total=1.0)
         yield lambda state: bar.update(houses, completed=state.share, description=_counts(state))
 

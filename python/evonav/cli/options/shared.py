@@ -100,11 +100,12 @@ StartOfHouses = Annotated[
         help="Where the agent starts in a house without a start: nowhere (file), or at a free place (auto).",
     ),
 ]
+TASKS_HELP = "Folder of tasks, or bundled. Default: the bundled tasks."
 Tasks = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Folder of tasks, or bundled. Default: the bundled tasks.",
+        help=TASKS_HELP,
         autocompletion=completion.task_folders,
     ),
 ]
@@ -112,7 +113,7 @@ TaskFolder = Annotated[
     Path | None,
     typer.Argument(
         metavar="FOLDER",
-        help="Folder of tasks, or bundled. Default: the bundled tasks.",
+        help=TASKS_HELP,
         autocompletion=completion.task_folders,
     ),
 ]

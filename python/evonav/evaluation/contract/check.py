@@ -4,7 +4,6 @@ The agent first runs in a process of its own, where it can do no harm, and then 
 its calls.
 """
 
-import inspect
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
@@ -15,7 +14,7 @@ from typing import Any
 
 from evonav.agents.agent import Agent
 from evonav.agents.hosting.error_text import describe
-from evonav.agents.registry import agent_factory, new_agent
+from evonav.agents.registry import agent_factory, needed_arguments, new_agent
 from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.contract.situations import check_situations
@@ -132,7 +131,7 @@ class _Examination:
             yield Check("own process", "warn", finding)
         try:
             factory = self._factory or agent_factory(self._name)
-            if needed := _needed_arguments(factory):
+            if needed := ", ".join(f"`{name}`" for name in needed_arguments(factory)):
                 yield Check("made", "fail", f"it needs the arguments {needed}: give them defaults, or make a {ADVICE}")
                 return
             probe = self._probe(factory)
@@ -227,16 +226,6 @@ def _named(agent: str | Callable[..., Agent] | Agent) -> tuple[str, Callable[...
     if module == "__main__":
         module = getattr(sys.modules["__main__"], "__file__", None) or module
     return f"{module}:{name}", factory
-
-
-def _needed_arguments(factory: Callable[..., Agent]) -> str:
-    """Return the arguments without which an agent cannot be made, other than `decision`."""
-    try:
-        parameters = inspect.signature(factory).parameters.values()
-    except (TypeError, ValueError):  # builtins and some extension types tell nothing
-        return ""
-    named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-    return ", ".join(f"`{p.name}`" for p in named if p.default is p.empty and p.name != "decision")
 
 
 def _is_importable(name: str, factory: Callable[..., Agent]) -> bool:

@@ -6,7 +6,7 @@ use crate::Error;
 
 /// Encode an RGB image as PNG, without metadata.
 ///
-/// Of the filters that the fast compression allows, `Up` gives the smallest files of rendered views.
+/// The filter `Up` makes the smallest files of rendered views among the fast filters.
 ///
 /// # Arguments
 /// * `rgb` - row-major, three bytes a pixel.
