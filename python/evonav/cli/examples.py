@@ -56,6 +56,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav tasks generate --houses bundled --limit 20 --out tasks",
         "evonav tasks generate --houses procthor-10k:test --subset test-90 --workers 8 --out tasks",
     ),
+    "tasks card": (
+        "evonav tasks card bundled --out out/cards",
+        "evonav tasks card tasks --out tasks --repo my-lab/evonav-val --license cc-by-4.0",
+    ),
     "check-agent": ("evonav check-agent ./my_agent.py:MyAgent", "evonav check-agent ftu"),
     "new-agent": ("evonav new-agent my_agent.py",),
     "pack": ("evonav pack out/run --title 'Our agent' --authors 'A. Author'",),
