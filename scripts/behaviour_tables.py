@@ -73,7 +73,12 @@ def end_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
     for one in behaviour.values():
         total.update(one.ends)
     rows = tuple((reason, *(str(one.ends[reason]) for one in behaviour.values())) for reason, _ in total.most_common())
-    return Table("How stages ended", ("The agent stopped for", *behaviour), rows, ("Budget: it did not stop.",))
+    return Table(
+        "How stages ended",
+        ("The agent stopped for", *behaviour),
+        rows,
+        ("Budget: the agent used all its rounds without calling stop.",),
+    )
 
 
 def cause_share_table(run: Run, stratum: str) -> Table:
@@ -94,7 +99,9 @@ def cause_share_table(run: Run, stratum: str) -> Table:
         shares = [part[cause] / totals[agent] if totals[agent] else None for agent, part in counts.items()]
         rows.append(("success" if cause is None else CAUSE_NAMES[cause], *(percent(share) for share in shares)))
     title = f"Why stages failed: {STRATA[stratum]}"
-    return Table(title, ("% of stages", *run.agents), tuple(rows), ("One cause a stage, the first that fits.",))
+    return Table(
+        title, ("% of stages", *run.agents), tuple(rows), ("Each stage counts once, under the first cause that fits.",)
+    )
 
 
 def stratum_of(record: StageRecord) -> str:

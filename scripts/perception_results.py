@@ -1,19 +1,18 @@
-"""Agents under perceptions from perfect to poor: runs them, and writes the marked parts of docs/results.md about it.
+"""Agents under perceptions from perfect to poor: runs them, and writes the tables of docs/results-perception.md.
 
     python scripts/perception_results.py --out out/perception --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val
 
 evaluates the agents on a subset of the tasks under every perception and writes curves, and what the paper says of
-perception beside what is found here. Run again, it goes on where it ended; `--write-only` runs nothing. A folder of
-results holds one version of the code.
+perception beside what is found here. Run it again to resume; `--write-only` runs nothing. A folder of results holds one
+version of the code.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from results import PAGE, pooled_tasks, run_agents, spread, with_part
+from results import ROOT, pooled_tasks, run_agents, spread, write_parts
 
 from evonav.evaluation.metrics.navigation import AgentSummary, house_of
 from evonav.evaluation.records.schema import EndState, StageRecord
@@ -36,7 +35,7 @@ PERCEPTIONS = (
     "predicted:mini",
 )
 """The curves are of the first ones; what a learned detector gives stands beside them in the tables."""
-IMAGES = PAGE.parent / "images"
+IMAGES = ROOT / "docs" / "images"
 
 Keep = Callable[[StageRecord], bool]
 CLAIMS: tuple[tuple[str, str, str, Keep], ...] = (
@@ -59,11 +58,7 @@ def main() -> None:
         for word in words:
             run_agents(asked.out / folder_of(word), asked.agents.split(","), subset, _backend(word), asked)
     runs = {word: load_run(asked.out / folder_of(word)) for word in words if (asked.out / folder_of(word)).exists()}
-    page = PAGE.read_text(encoding="utf-8")
-    for name, text in parts(runs).items():
-        page = with_part(page, name, text)
-    PAGE.write_text(page, encoding="utf-8")
-    sys.stdout.write(f"{PAGE}\n")
+    write_parts(parts(runs))
 
 
 def folder_of(word: str) -> str:
@@ -108,7 +103,12 @@ def claim_table(runs: Mapping[str, Run]) -> Table:
         paper = tuple(_paper_difference(PAPER[half][a], PAPER[half][b], title) for half in ("gt", "prediction"))
         rows.append((title, *paper, *(_points(_between(run, a, run, b, keep)) for run in runs.values())))
     columns = ("SR, points", "paper, GT", "paper, Prediction", *map(name_of, runs))
-    return Table("What the paper concludes from", columns, tuple(rows), ("Of the same stages; bootstrap over houses.",))
+    return Table(
+        "What the paper concludes from",
+        columns,
+        tuple(rows),
+        ("Differences on the same stages; bootstrap over houses.",),
+    )
 
 
 def cost_table(runs: Mapping[str, Run]) -> Table:
@@ -129,7 +129,10 @@ def cost_table(runs: Mapping[str, Run]) -> Table:
         f"relocation, {name_of(first)}",
         *(f"{name_of(word)} minus {name_of(first)}" for word, _ in others),
     )
-    note = "Points of SR. Relocation: moved targets minus those that stayed, other stages. The rest: the same stages."
+    note = (
+        "Percentage points of SR. Relocation: relocated targets minus targets that were not relocated; these are "
+        "different stages. The other columns compare the same stages."
+    )
     return Table("What evolution costs, and what perception costs", columns, tuple(rows), (note,))
 
 

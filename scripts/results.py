@@ -1,17 +1,17 @@
-"""Agents against each other and beside the paper: runs them, and writes the marked parts of docs/results.md.
+"""Agents against each other and beside the paper: runs them, and writes the marked parts of the pages of results.
 
     python scripts/results.py --out out/results --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/attr:40
 
 evaluates all six agents on all tasks of the folders (the first 40 of the last), then those of a subset with decisions
-that go wrong at stated rates, and writes tables and a plot. Run again, it goes on where it ended; `--write-only` runs
-nothing. A folder of results holds one version of the code: give another version another folder.
+that go wrong at stated rates, and writes tables and a plot. Run it again to resume; `--write-only` runs nothing. A
+folder of results holds one version of the code: give another version another folder.
 """
 
 import argparse
 import re
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from behaviour_tables import STRATA, behaviour_of, cause_share_table, counter_table, end_table, success_by_group
@@ -31,7 +31,7 @@ from evonav.statistics import wilson
 from evonav.tasks.listing import TaskFile, task_files
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "results.md"
+PAGES = ROOT / "docs" / "results.md", ROOT / "docs" / "results-perception.md"
 PLOT = ROOT / "docs" / "images" / "decision-errors.svg"
 RATES = (0.0, 0.05, 0.1, 0.2, 0.4)
 """Shares of decisions that are another valid answer than the model's own."""
@@ -48,14 +48,11 @@ def main() -> None:
         run_agents(asked.out / "main", agents, tasks, Backend(), asked)
         for rate in RATES:
             run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
-    page = PAGE.read_text(encoding="utf-8")
     found = parts(asked.out, agents)
     if asked.large is not None:
         found |= large_parts(asked.large)
-    for name, text in found.items():
-        page = with_part(page, name, text)
-    PAGE.write_text(page, encoding="utf-8")
-    sys.stdout.write(f"{PAGE}\n{PLOT}\n")
+    write_parts(found)
+    sys.stdout.write(f"{PLOT}\n")
 
 
 def pooled_tasks(folders: Sequence[str]) -> list[TaskFile]:
@@ -124,16 +121,27 @@ def large_parts(run_dir: Path) -> dict[str, str]:
     }
 
 
+def write_parts(parts: Mapping[str, str]) -> None:
+    """Replace marked parts of the pages of results."""
+    for name, text in parts.items():
+        page = next((page for page in PAGES if _mark(name) in page.read_text(encoding="utf-8")), PAGES[0])
+        page.write_text(with_part(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+
+
 def with_part(page: str, name: str, text: str) -> str:
-    """A page with one of its marked parts replaced.
+    """Return a page with one of its marked parts replaced.
 
     Raises:
         SystemExit: The page has no such part.
     """
-    marked = re.compile(rf"(<!-- results: {re.escape(name)} -->\n).*?(<!-- end of results -->)", re.DOTALL)
+    marked = re.compile(rf"({re.escape(_mark(name))}\n).*?(<!-- end of results -->)", re.DOTALL)
     if not marked.search(page):
-        raise SystemExit(f"{PAGE}: no part `{name}`")
+        raise SystemExit(f"the pages of results have no part `{name}`")
     return marked.sub(lambda found: f"{found[1]}{text}{found[2]}", page, count=1)
+
+
+def _mark(name: str) -> str:
+    return f"<!-- results: {name} -->"
 
 
 def setting_table(run: Run) -> Table:

@@ -224,10 +224,10 @@ def test_the_script_replaces_marked_parts_alone(script) -> None:
         script.with_part(page, "z", "")
 
 
-def test_the_page_has_every_part_that_the_script_writes(script, write_run: WriteRun, monkeypatch) -> None:
+def test_the_pages_have_every_part_that_the_scripts_write(script, write_run: WriteRun, monkeypatch) -> None:
     run_dir = write_run("main")
     monkeypatch.setattr(script, "PLOT", run_dir.parent / "plot.svg")
-    page = script.PAGE.read_text(encoding="utf-8")
+    page = "".join(page.read_text(encoding="utf-8") for page in script.PAGES)
     parts = script.parts(run_dir.parent, ["fu", "ftu"])
     marked = re.findall(r"<!-- results: (\S+) -->", page)
     monkeypatch.setattr(perception_results, "IMAGES", run_dir.parent)

@@ -157,9 +157,9 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
 def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
     rows = tuple((s.agent, _theirs(paper.get(s.agent), "stage_1"), _ours(s, "stage_1")) for s in summaries)
     note = (
-        "SR %. The paper does not print it: its overall counts less those of its strata (n = "
-        f"{NUM_STAGES['stage_1']}). fu and stage-reset are the same program at stage 1, and ftu adds a look on "
-        "arrival: how far these three lie apart is the paper's noise."
+        "SR %. The paper does not print these rates; they are its overall counts minus the counts of moved and not "
+        f"moved targets (n = {NUM_STAGES['stage_1']}). At stage 1 fu and stage-reset are the same program, and ftu "
+        "only adds a look on arrival, so the paper's differences between these three are mostly noise."
     )
     return Table("Stage 1", ("Agent", "paper, decoded", "ours"), rows, (note,))
 
