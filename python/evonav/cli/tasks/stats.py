@@ -75,8 +75,9 @@ def print_statistics(found: "TaskStatistics") -> None:
     if found.weighting is not None:
         weighting = found.weighting
         console.print(
-            f"reweighted to {weighting.mix} by {weighting.by}: worth {weighting.effective_num_tasks:.0f} tasks, "
-            f"covers {100 * weighting.covered_share:.0f}% of the mix, leaves out {weighting.num_left_out} tasks"
+            f"reweighted to {weighting.mix} by {weighting.by}: equals {weighting.effective_num_tasks:.0f} equally "
+            f"weighted tasks, covers {100 * weighting.covered_share:.0f}% of the mix, leaves out "
+            f"{weighting.num_left_out} tasks"
         )
     console.print(_metrics(found))
     for test in found.tests:
@@ -157,8 +158,8 @@ def _verdict(metric: "Metric") -> str:
     for name, estimate in (("here", metric.raw), ("reweighted", metric.reweighted)):
         if estimate is not None:
             verdict = "inside" if low <= estimate.value <= high else "OUTSIDE"
-            parts.append(f"{name} {_scaled(metric, estimate.value)}% {verdict}")
-    return f"{metric.label}, to lie in {100 * low:.0f}-{100 * high:.0f}%: {', '.join(parts)}"
+            parts.append(f"{name} {_scaled(metric, estimate.value)}% is {verdict}")
+    return f"{metric.label}: accepted range {100 * low:.0f}-{100 * high:.0f}%, {', '.join(parts)}"
 
 
 def _quantities(found: "TaskStatistics") -> "Table":

@@ -49,15 +49,15 @@ METRICS = (
     MetricInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
     MetricInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.1458),
     MetricInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True),
-    MetricInfo("room_relocated", "of a changed room's objects", _OBJECTS),
+    MetricInfo("room_relocated", "relocated in changed room", _OBJECTS),
     MetricInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
     MetricInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
     MetricInfo("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
     MetricInfo("unmoved", "found no other place", _OBJECTS),
     MetricInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
     MetricInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
-    MetricInfo("num_stages", "stages a task", _TASKS, "stages", paper=4.010, expected=4.0),
-    MetricInfo("goals_refused", "goals refused a stage", _TASKS, "goals"),
+    MetricInfo("num_stages", "stages per task", _TASKS, "stages", paper=4.010, expected=4.0),
+    MetricInfo("goals_refused", "goals rejected per stage", _TASKS, "goals"),
 )
 
 RATIOS = tuple(info for info in METRICS if info.unit != "median share")
@@ -66,24 +66,24 @@ MEDIANS = tuple(info for info in METRICS if info.unit == "median share")
 """Metrics that are medians of a quantity."""
 
 DISTRIBUTIONS = {
-    "num_evolutions": "Evolutions a task",
+    "num_evolutions": "Evolutions per task",
     "modes": "Modes of evolutions",
-    "modes_drawn": "Modes drawn, moved or not",
-    "relocated_ratio": "Objects relocated by the end, of a house's",
+    "modes_drawn": "Modes drawn, applied or not",
+    "relocated_ratio": "Share of objects relocated by the end",
     "outcomes": "Outcomes of transitions",
-    "failures": "Triggered, but nothing moved: why",
-    "num_stages": "Stages a task",
-    "num_rooms": "Rooms a house",
+    "failures": "Reasons why a triggered change failed",
+    "num_stages": "Stages per task",
+    "num_rooms": "Rooms per house",
     "goal_rooms": "Rooms of goals",
     "goal_scores": "Target scores of goals",
-    "goal_rejections": "Goals refused: why",
-    "house_rejections": "Houses without a task: why",
+    "goal_rejections": "Reasons for rejected goals",
+    "house_rejections": "Reasons for houses without a task",
     "goal_categories": "Categories of goals",
     "house_categories": "Categories of objects",
 }
 
 QUANTITIES = {
-    "relocated_ratio": ("Objects relocated by the end, of a house's", "share"),
+    "relocated_ratio": ("Share of objects relocated by the end", "share"),
     "displacement_m": ("Displacement of relocated objects", "m"),
     "path_m": ("Reference path of a stage", "m"),
     "task_path_m": ("Reference path of a task", "m"),
@@ -92,8 +92,8 @@ QUANTITIES = {
     "basic_words": ("Basic instruction", "words"),
     "appearance_words": ("Appearance instruction", "words"),
     "unified_words": ("Unified instruction", "words"),
-    "num_rooms": ("Rooms a house", "rooms"),
-    "num_objects": ("Objects a house", "objects"),
+    "num_rooms": ("Rooms per house", "rooms"),
+    "num_objects": ("Objects per house", "objects"),
 }
 
 PAPER_EVOLUTIONS = (0.1458, 0.3750, 0.3333, 0.1250, 0.0208)

@@ -76,7 +76,7 @@ def _evolutions(found: TaskStatistics) -> BarPlot | None:
     ]
     notes += [] if test is None else [f"chi-square p = {test.p:.3f}"]
     references = tuple(papers.get(name) for name in one.names)
-    return _plot(one, "Evolutions a task", "number of evolved transitions", references=references, notes=tuple(notes))
+    return _plot(one, "Evolutions per task", "number of evolved transitions", references=references, notes=tuple(notes))
 
 
 def _goals(found: TaskStatistics) -> BarPlot | None:
