@@ -3,6 +3,8 @@
 mod asset;
 mod catalogue;
 pub mod group_definition;
+pub mod material;
+mod material_names;
 mod object_asset;
 pub mod part;
 pub mod placement_rule;
@@ -10,4 +12,5 @@ pub mod shapes;
 
 pub use asset::{Asset, Split};
 pub use catalogue::Catalogue;
+pub use material_names::kind_of_name;
 pub use object_asset::UnknownAssets;

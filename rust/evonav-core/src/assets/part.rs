@@ -1,6 +1,9 @@
 //! Convex primitives, of which every body in the world consists.
 
-use crate::geometry::{Aabb, Mat3, Vec3, add, compose, rotate};
+use crate::{
+    assets::material::Material,
+    geometry::{Aabb, Mat3, Vec3, add, compose, rotate},
+};
 
 /// A convex solid about its own origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +65,8 @@ pub struct Part {
     pub rotation: Mat3,
     /// Surface colour, sRGB.
     pub colour: [u8; 3],
+    /// What the surface is made of.
+    pub material: Material,
 }
 
 impl Part {

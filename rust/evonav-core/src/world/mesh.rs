@@ -5,7 +5,10 @@ use std::ops::Range;
 use crate::{
     assets::part::{Part, Primitive},
     geometry::{Aabb, Vec3, add, rotate, sub},
-    world::scene::{BodyKind, Scene},
+    world::{
+        scene::{BodyKind, Scene},
+        skin::{Skin, Tailor},
+    },
 };
 
 /// Meridians of an ellipsoid; a multiple of 4, so that its box is exact.
@@ -48,6 +51,8 @@ pub struct SceneMesh {
     /// Vertex indices, counted from the part's first vertex, clockwise seen from outside.
     pub(crate) corners: Vec<u32>,
     pub(crate) faces: Vec<Face>,
+    /// The material on each face.
+    pub(crate) skins: Vec<Skin>,
     pub(crate) parts: Vec<PartMesh>,
     num_bodies: usize,
 }
@@ -76,8 +81,11 @@ impl SceneMesh {
         for (index, body) in scene.bodies.iter().enumerate() {
             // Ceilings have one side, as AI2-THOR's: from above one looks into the house.
             let is_shown = |normal: Vec3| body.kind != BodyKind::Ceiling || normal[1] < 0.0;
-            for part in &body.parts {
-                mesh.push(part, index as u32, is_shown);
+            let is_structure =
+                matches!(body.kind, BodyKind::Wall | BodyKind::Floor | BodyKind::Ceiling);
+            for (number, part) in body.parts.iter().enumerate() {
+                let tailor = Tailor::new(part, is_structure, number);
+                mesh.push(part, index as u32, &tailor, is_shown);
             }
         }
         mesh
@@ -91,6 +99,11 @@ impl SceneMesh {
     /// Return the faces, grouped by body in ascending order.
     pub fn faces(&self) -> &[Face] {
         &self.faces
+    }
+
+    /// Return the material on each of the [`faces`](Self::faces).
+    pub fn skins(&self) -> &[Skin] {
+        &self.skins
     }
 
     /// Return the faces cut into triangles, in their order.
@@ -114,13 +127,24 @@ impl SceneMesh {
         &self.corners[first..first + face.num_corners as usize]
     }
 
-    fn push(&mut self, part: &Part, body: u32, is_shown: impl Fn(Vec3) -> bool) {
+    fn push(
+        &mut self,
+        part: &Part,
+        body: u32,
+        tailor: &Tailor<'_>,
+        is_shown: impl Fn(Vec3) -> bool,
+    ) {
         let (first_vertex, first_face) = (self.vertices_m.len(), self.faces.len());
         let vertices_m = vertices_of(&part.primitive);
         let to_world = |v: &Vec3| add(part.centre_m, rotate(&part.rotation, *v));
         self.vertices_m.extend(vertices_m.iter().map(to_world));
+        let mut number = 0;
         each_polygon(&part.primitive, &vertices_m, |polygon| {
             self.push_polygon(polygon, first_vertex, body, part.colour, &is_shown);
+            for face in &self.faces[self.skins.len()..] {
+                self.skins.push(tailor.skin(face.normal, number));
+            }
+            number += 1;
         });
         if self.faces.len() == first_face {
             self.vertices_m.truncate(first_vertex);

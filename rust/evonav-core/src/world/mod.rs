@@ -6,3 +6,4 @@ pub mod layout;
 pub mod mesh;
 pub mod navigation;
 pub mod scene;
+pub mod skin;

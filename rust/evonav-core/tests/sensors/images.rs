@@ -18,6 +18,7 @@ fn red_cuboid(half_m: Vec3, centre_m: Vec3) -> Part {
         centre_m,
         rotation: euler_rotation_deg([0.0; 3]),
         colour: [200, 40, 40],
+        material: Default::default(),
     }
 }
 

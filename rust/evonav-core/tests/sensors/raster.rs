@@ -89,6 +89,7 @@ fn part() -> impl Strategy<Value = Part> {
             centre_m,
             rotation: euler_rotation_deg(angles_deg),
             colour,
+            material: Default::default(),
         },
     )
 }

@@ -26,6 +26,7 @@ fn part() -> impl Strategy<Value = Part> {
             centre_m,
             rotation: euler_rotation_deg(angles_deg),
             colour: [128; 3],
+            material: Default::default(),
         },
     )
 }

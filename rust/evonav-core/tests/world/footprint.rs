@@ -57,7 +57,7 @@ proptest! {
         points in prop::collection::vec([-1.5..1.5, -1.5..1.5], 40),
     ) {
         let rotation = euler_rotation_deg(angles_deg);
-        let part = Part { primitive, centre_m: [0.1, 0.2, -0.1], rotation, colour: [0; 3] };
+        let part = Part { primitive, centre_m: [0.1, 0.2, -0.1], rotation, colour: [0; 3], material: Default::default() };
         let (low_m, high_m) = (band.0, band.0 + band.1);
         let shadow = footprint(&part, low_m, high_m);
         for point in points {

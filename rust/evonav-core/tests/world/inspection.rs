@@ -93,6 +93,7 @@ fn part() -> impl Strategy<Value = Part> {
         centre_m,
         rotation: euler_rotation_deg([x, y, z]),
         colour: [0; 3],
+        material: Default::default(),
     })
 }
 

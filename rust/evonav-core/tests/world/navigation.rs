@@ -21,6 +21,7 @@ fn cuboid(centre_m: Vec3, half_m: Vec3, yaw_rad: f64) -> Part {
         centre_m,
         rotation: yaw_rotation(yaw_rad),
         colour: [0; 3],
+        material: Default::default(),
     }
 }
 

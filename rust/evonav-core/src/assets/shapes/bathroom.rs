@@ -2,9 +2,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::assets::shapes::{
-    colour::{CERAMIC, DARK, FABRICS, STEEL, WOODS, shade},
-    sketch::{ALL, Along, Motion, Sketch, between, ends, inside, piece},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{CERAMIC, DARK, FABRICS, STEEL, WOODS, rgb, shade},
+        sketch::{ALL, Along, Motion, Sketch, between, ends, inside, piece},
+    },
 };
 
 /// Draw a toilet: tank at the back, bowl in front, seat and open lid.
@@ -19,7 +22,14 @@ pub fn toilet(s: &mut Sketch<'_>) {
     s.column(between(x, 0.12, 0.88), [0.5 * rim, rim - 0.03], between(z, 0.2, 1.0), 1.5, 12, white);
     let (seat, water) = ([rim - 0.03, rim], [rim, rim + 0.004]);
     s.column(between(x, 0.1, 0.9), seat, between(z, 0.22, 1.0), 1.0, 12, shade(white, 0.92));
-    s.column(between(x, 0.22, 0.78), water, between(z, 0.34, 0.92), 1.0, 12, [120, 150, 165]);
+    s.column(
+        between(x, 0.22, 0.78),
+        water,
+        between(z, 0.34, 0.92),
+        1.0,
+        12,
+        rgb(120, 150, 165).of(MaterialKind::Glass),
+    );
     let pivot_m = [0.0, rim + 0.004, between(z, 0.28, 0.32)[1]];
     s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
         let lid = between(z, 0.28, 0.32);
@@ -54,7 +64,12 @@ pub fn sink(s: &mut Sketch<'_>) {
             let wood = s.tint(1, s.choose(&WOODS, WOODS[1]));
             s.cuboid(inside(x, 0.03), [0.0, basin], [z[0], z[1] - 0.05], wood);
             for half in [between(x, 0.07, 0.49), between(x, 0.51, 0.93)] {
-                s.cuboid(half, [0.08, basin - 0.05], [z[1] - 0.05, z[1] - 0.03], shade(wood, 1.15));
+                s.cuboid(
+                    half,
+                    [0.08, basin - 0.05],
+                    [z[1] - 0.05, z[1] - 0.03],
+                    shade(wood, 1.15).of(MaterialKind::Panel),
+                );
             }
         }
         s.cuboid(between(x, 0.46, 0.54), [rim, h], between(z, 0.02, 0.1), STEEL);
@@ -104,7 +119,7 @@ pub fn shower_head(s: &mut Sketch<'_>) {
 
 /// Draw a curtain: a rail with folds hanging from it.
 pub fn curtain(s: &mut Sketch<'_>) {
-    let cloth = s.tint(0, [225, 228, 230]);
+    let cloth = s.tint(0, rgb(225, 228, 230).of(MaterialKind::Fabric));
     s.cuboid_at(ALL, [0.97, 1.0], [0.4, 0.6], STEEL);
     for i in 0..6 {
         let is_back = i % 2 == 0;
@@ -118,8 +133,12 @@ pub fn curtain(s: &mut Sketch<'_>) {
 pub fn towel(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let cloth =
-        s.tint(0, s.choose(&[[225, 225, 220], [120, 150, 170], [170, 110, 100]], FABRICS[5]));
+    let cloth = s
+        .tint(
+            0,
+            s.choose(&[rgb(225, 225, 220), rgb(120, 150, 170), rgb(170, 110, 100)], FABRICS[5]),
+        )
+        .of(MaterialKind::Fabric);
     if h > d {
         s.cuboid_at(ALL, ALL, [0.55, 1.0], cloth);
         s.cuboid(inside(x, 0.005), between(y, 0.3, 1.0), between(z, 0.0, 0.45), shade(cloth, 0.9));
@@ -144,7 +163,7 @@ pub fn holder(s: &mut Sketch<'_>) {
 
 /// Draw a stick with a cup or a brush at its foot.
 pub fn brush(s: &mut Sketch<'_>) {
-    let rubber = s.tint(1, [150, 60, 50]);
+    let rubber = s.tint(1, rgb(150, 60, 50));
     s.column_at(ALL, [0.0, 0.25], ALL, 0.5, 12, rubber);
     s.column_at([0.42, 0.58], [0.25, 1.0], [0.42, 0.58], 1.0, 8, s.tint(0, WOODS[0]));
 }
@@ -152,7 +171,7 @@ pub fn brush(s: &mut Sketch<'_>) {
 /// Draw a washing machine: a white box with a round door and a panel.
 pub fn washer(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
-    let white = s.tint(0, [232, 233, 235]);
+    let white = s.tint(0, rgb(232, 233, 235).of(MaterialKind::Ceramic));
     let front = z[1] - 0.04;
     s.cuboid(x, between(y, 0.0, 0.9), [z[0], front], white);
     s.cuboid_at(ALL, [0.9, 1.0], [0.0, 0.25], shade(white, 0.85));
@@ -164,7 +183,7 @@ pub fn washer(s: &mut Sketch<'_>) {
         let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];
         s.round(Along::Z, 1.0, 16, door, STEEL);
         let glass = [between(x, 0.28, 0.72), between(y, 0.27, 0.65), [z[1] - 0.01, z[1]]];
-        s.round(Along::Z, 1.0, 16, glass, DARK);
+        s.round(Along::Z, 1.0, 16, glass, DARK.of(MaterialKind::Glass));
     });
     if s.is_ajar() {
         let drum = [between(x, 0.24, 0.76), between(y, 0.24, 0.68), [front, front + 0.001]];

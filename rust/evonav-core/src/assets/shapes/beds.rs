@@ -1,17 +1,20 @@
 //! Shapes of beds and of objects on them.
 
-use crate::assets::shapes::{
-    colour::{FABRICS, WOODS, liveliest, shade},
-    sketch::{ALL, Sketch, Span, between, ends, inside, piece},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{FABRICS, Paint, WOODS, liveliest, rgb, shade},
+        sketch::{ALL, Sketch, Span, between, ends, inside, piece},
+    },
 };
 
-const LINEN: [[u8; 3]; 6] = [
-    [90, 120, 160],
-    [190, 185, 175],
-    [150, 90, 90],
-    [110, 135, 115],
-    [225, 220, 212],
-    [70, 80, 105],
+const LINEN: [Paint; 6] = [
+    rgb(90, 120, 160),
+    rgb(190, 185, 175),
+    rgb(150, 90, 90),
+    rgb(110, 135, 115),
+    rgb(225, 220, 212),
+    rgb(70, 80, 105),
 ];
 
 /// Draw a bed: frame, mattress, blanket, pillows and headboard; above 1.5 m a bunk or canopy bed on
@@ -50,19 +53,25 @@ pub fn bed(s: &mut Sketch<'_>) {
 }
 
 /// Draw one level of a bunk: slats, mattress, blanket and pillows.
-fn bunk(s: &mut Sketch<'_>, [wood, linen]: [[u8; 3]; 2], top: f64, x: Span) {
+fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
     let z = s.spans()[2];
     let length = inside(z, 0.05);
     let depth = (0.55 * top).min(0.26);
     s.cuboid(x, [(top - depth - 0.08).max(0.02), top - 0.7 * depth], length, wood);
     let blanket = between(length, 0.3, 1.0);
-    s.cuboid(inside(x, 0.02), [top - 0.7 * depth, top - 0.012], length, [235, 232, 225]);
-    s.cuboid(inside(x, 0.008), [top - 0.6 * depth, top], blanket, linen);
+    s.cuboid(
+        inside(x, 0.02),
+        [top - 0.7 * depth, top - 0.012],
+        length,
+        rgb(235, 232, 225).of(MaterialKind::Fabric),
+    );
+    s.cuboid(inside(x, 0.008), [top - 0.6 * depth, top], blanket, linen.of(MaterialKind::Duvet));
     let width = x[1] - x[0];
     let pillows = if width > 1.25 { 2 } else { 1 };
+    let linen_white = rgb(245, 243, 238).of(MaterialKind::Pillow);
     for i in 0..pillows {
         let side = inside(piece(x, i, pillows), 0.08 * width);
-        s.cuboid(side, [top - 0.012, top + 0.07], between(length, 0.03, 0.2), [245, 243, 238]);
+        s.cuboid(side, [top - 0.012, top + 0.07], between(length, 0.03, 0.2), linen_white);
     }
 }
 
@@ -90,7 +99,7 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
 
 /// Draw a pillow that is thick in the middle.
 pub fn pillow(s: &mut Sketch<'_>) {
-    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));
+    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5])).of(MaterialKind::Cushion);
     s.cuboid_at(ALL, [0.2, 0.75], ALL, fabric);
     s.cuboid_at([0.05, 0.95], ALL, [0.05, 0.95], shade(fabric, 1.04));
 }

@@ -1,17 +1,22 @@
 //! Shapes of plants, pictures, doors and windows as assets, ornaments and sports goods.
 
-use crate::assets::shapes::{
-    colour::{DARK, STEEL, WOODS, shade},
-    sketch::{ALL, Along, Sketch, between, ends, inside},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{DARK, STEEL, WOODS, rgb, shade},
+        sketch::{ALL, Along, Sketch, between, ends, inside},
+    },
 };
 
 /// Draw a plant: pot, soil, stem and foliage.
 pub fn plant(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
-    let pots = [[180, 100, 70], [225, 220, 212], [80, 85, 90], [150, 125, 100]];
-    let pot = s.choose(&pots, pots[0]);
-    let leaf = s.choose(&[[70, 120, 60], [55, 100, 55], [95, 135, 70]], [70, 120, 60]);
+    let pots = [rgb(180, 100, 70), rgb(225, 220, 212), rgb(80, 85, 90), rgb(150, 125, 100)];
+    let pot = s.choose(&pots, pots[0]).of(MaterialKind::Ceramic);
+    let leaf = s
+        .choose(&[rgb(70, 120, 60), rgb(55, 100, 55), rgb(95, 135, 70)], rgb(70, 120, 60))
+        .of(MaterialKind::Leaves);
     s.detail("pot", 1);
     let pot_top = (0.32 * h).min(0.5);
     let radius = (0.32 * w.min(d)).min(0.5 * pot_top + 0.05);
@@ -19,8 +24,21 @@ pub fn plant(s: &mut Sketch<'_>) {
     let [pot_x, pot_z] = [x, z].map(around);
     s.column(pot_x, [0.0, pot_top], pot_z, 1.3, 10, pot);
     let [soil_x, soil_z] = [pot_x, pot_z].map(|span| inside(span, 0.1 * radius));
-    s.column(soil_x, [pot_top, pot_top + 0.005], soil_z, 1.0, 10, [60, 45, 35]);
-    s.pole([0.0, 0.0], 0.05 * w.min(d), [pot_top, 0.6 * h], 6, [95, 80, 50]);
+    s.column(
+        soil_x,
+        [pot_top, pot_top + 0.005],
+        soil_z,
+        1.0,
+        10,
+        rgb(60, 45, 35).of(MaterialKind::Soil),
+    );
+    s.pole(
+        [0.0, 0.0],
+        0.05 * w.min(d),
+        [pot_top, 0.6 * h],
+        6,
+        rgb(95, 80, 50).of(MaterialKind::Wood),
+    );
     let crown = 0.75 * h;
     s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
     s.blob(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
@@ -32,22 +50,29 @@ pub fn plant(s: &mut Sketch<'_>) {
 pub fn painting(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let frame = s.tint(0, s.choose(&[WOODS[3], DARK, [210, 205, 195], WOODS[1]], WOODS[3]));
+    let frame = s.tint(0, s.choose(&[WOODS[3], DARK, rgb(210, 205, 195), WOODS[1]], WOODS[3]));
     let skies = [
-        [150, 185, 210],
-        [225, 190, 140],
-        [200, 200, 205],
-        [120, 140, 165],
-        [235, 215, 200],
-        [95, 110, 140],
-        [175, 200, 180],
+        rgb(150, 185, 210),
+        rgb(225, 190, 140),
+        rgb(200, 200, 205),
+        rgb(120, 140, 165),
+        rgb(235, 215, 200),
+        rgb(95, 110, 140),
+        rgb(175, 200, 180),
     ];
-    let grounds = [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120], [110, 80, 110]];
+    let grounds = [
+        rgb(95, 120, 80),
+        rgb(150, 95, 70),
+        rgb(70, 90, 110),
+        rgb(180, 160, 120),
+        rgb(110, 80, 110),
+    ];
     let bar = 0.07 * w.min(h);
     s.cuboid(x, y, between(z, 0.0, 0.7), frame);
     let (inner, canvas) = (inside(x, bar), inside(y, bar));
-    s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), s.choose(&skies, skies[0]));
-    let ground = s.choose(&grounds, grounds[0]);
+    let sky = s.choose(&skies, skies[0]).of(MaterialKind::PaintingTop);
+    s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), sky);
+    let ground = s.choose(&grounds, grounds[0]).of(MaterialKind::PaintingBottom);
     s.cuboid(inner, between(canvas, 0.0, 0.4), between(z, 0.7, 0.85), ground);
     s.rim([x, y, between(z, 0.7, 1.0)], [0, 1], bar, frame);
 }
@@ -56,9 +81,14 @@ pub fn painting(s: &mut Sketch<'_>) {
 pub fn window(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let frame = s.tint(0, [235, 235, 230]);
+    let frame = s.tint(0, rgb(235, 235, 230));
     let bar = 0.07 * w.min(h);
-    s.cuboid(inside(x, bar), inside(y, bar), between(z, 0.4, 0.6), [190, 215, 235]);
+    s.cuboid(
+        inside(x, bar),
+        inside(y, bar),
+        between(z, 0.4, 0.6),
+        rgb(190, 215, 235).of(MaterialKind::Outdoors),
+    );
     s.rim([x, y, z], [0, 1], bar, frame);
 }
 
@@ -66,7 +96,7 @@ pub fn window(s: &mut Sketch<'_>) {
 pub fn doorway(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let frame = s.tint(1, [225, 220, 210]);
+    let frame = s.tint(1, rgb(225, 220, 210));
     let bar = 0.05 * w.min(h);
     for x in ends(x, bar, 0.0) {
         s.cuboid(x, y, z, frame);
@@ -81,8 +111,10 @@ pub fn doorway(s: &mut Sketch<'_>) {
 pub fn statue(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let stone =
-        s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
+    let stone = s.tint(
+        0,
+        s.choose(&[rgb(190, 180, 160), rgb(120, 110, 100), rgb(160, 120, 60)], rgb(190, 180, 160)),
+    );
     if w > h {
         // An animal has a body, a head and legs.
         s.cuboid_at([0.1, 0.8], [0.35, 0.75], [0.15, 0.85], stone);
@@ -101,7 +133,7 @@ pub fn statue(s: &mut Sketch<'_>) {
 pub fn teddy_bear(s: &mut Sketch<'_>) {
     let w = s.size()[0];
     let [x, y, z] = s.spans();
-    let fur = s.tint(0, [150, 105, 65]);
+    let fur = s.tint(0, rgb(150, 105, 65).of(MaterialKind::Fabric));
     s.blob_at([0.22, 0.78], [0.05, 0.62], [0.05, 0.7], fur);
     s.ellipsoid_at([0.27, 0.73], [0.52, 0.95], [0.05, 0.65], shade(fur, 1.1));
     for ear in [[0.22, 0.38], [0.62, 0.78]] {
@@ -116,12 +148,12 @@ pub fn teddy_bear(s: &mut Sketch<'_>) {
 
 /// Draw a ball.
 pub fn ball(s: &mut Sketch<'_>) {
-    s.ellipsoid_at(ALL, ALL, ALL, s.tint(0, [205, 105, 45]));
+    s.ellipsoid_at(ALL, ALL, ALL, s.tint(0, rgb(205, 105, 45)));
 }
 
 /// Draw two boots.
 pub fn boots(s: &mut Sketch<'_>) {
-    let leather = s.tint(0, [75, 55, 40]);
+    let leather = s.tint(0, rgb(75, 55, 40).of(MaterialKind::Leather));
     for foot in [[0.0, 0.45], [0.55, 1.0]] {
         s.cuboid_at(foot, [0.0, 0.22], ALL, leather);
         s.cuboid_at(foot, [0.22, 1.0], [0.0, 0.5], leather);
@@ -137,7 +169,7 @@ pub fn bat(s: &mut Sketch<'_>) {
 pub fn racket(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let frame = s.tint(0, [60, 90, 150]);
+    let frame = s.tint(0, rgb(60, 90, 150));
     let (head, grip) = ([0.42, 1.0], [0.0, 0.45]);
     if h >= w && h >= d {
         s.round(Along::Z, 1.0, 12, [x, between(y, head[0], head[1]), z], frame);
@@ -171,28 +203,36 @@ pub fn dumbbell(s: &mut Sketch<'_>) {
 
 /// Draw a candle: wax and wick.
 pub fn candle(s: &mut Sketch<'_>) {
-    s.column_at(ALL, [0.0, 0.9], ALL, 1.0, 8, s.tint(0, [235, 225, 195]));
+    s.column_at(ALL, [0.0, 0.9], ALL, 1.0, 8, s.tint(0, rgb(235, 225, 195)));
     s.column_at([0.44, 0.56], [0.9, 1.0], [0.44, 0.56], 1.0, 4, DARK);
 }
 
 /// Draw books and other flat things: a block with a lighter core that shows at the edges.
 pub fn slab(s: &mut Sketch<'_>) {
-    let covers = [[150, 55, 50], [50, 80, 130], [60, 110, 80], [190, 150, 70], [95, 65, 110]];
+    let covers =
+        [rgb(150, 55, 50), rgb(50, 80, 130), rgb(60, 110, 80), rgb(190, 150, 70), rgb(95, 65, 110)];
     let category = s.asset().category.as_str();
     let plain = match category {
-        "Newspaper" => [225, 222, 210],
-        "DishSponge" => [225, 195, 70],
-        "SoapBar" => [235, 220, 200],
+        "Newspaper" => rgb(225, 222, 210),
+        "DishSponge" => rgb(225, 195, 70),
+        "SoapBar" => rgb(235, 220, 200),
         "KeyChain" => STEEL,
         "TableTopDecor" => WOODS[1],
         _ => s.choose(&covers, covers[0]),
     };
     let cover = if category == "Book" { s.choose(&covers, plain) } else { s.tint(0, plain) };
     if category != "Book" {
-        return s.block(cover);
+        let kind = if category == "Newspaper" { MaterialKind::Print } else { MaterialKind::Smooth };
+        return s.block(cover.of(kind));
     }
+    let cover = cover.of(MaterialKind::Cover);
     s.cuboid_at(ALL, [0.0, 0.12], ALL, cover);
-    s.cuboid_at([0.02, 0.97], [0.12, 0.88], [0.03, 0.97], [235, 230, 215]);
+    s.cuboid_at(
+        [0.02, 0.97],
+        [0.12, 0.88],
+        [0.03, 0.97],
+        rgb(235, 230, 215).of(MaterialKind::Pages),
+    );
     s.cuboid_at(ALL, [0.88, 1.0], ALL, cover);
     s.cuboid_at([0.0, 0.04], ALL, ALL, shade(cover, 0.9));
 }

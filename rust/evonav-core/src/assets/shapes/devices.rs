@@ -2,16 +2,19 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::assets::shapes::{
-    colour::{DARK, STEEL, lightest, shade},
-    sketch::{ALL, Along, Motion, Sketch, between, inside},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{DARK, Paint, STEEL, lightest, rgb, shade},
+        sketch::{ALL, Along, Motion, Sketch, between, inside},
+    },
 };
 
-const SCREEN: [u8; 3] = [25, 28, 34];
-/// Colour of a screen that is on.
-const LIT_SCREEN: [u8; 3] = [120, 165, 215];
-/// Colour of a lamp's shade that is on.
-const LIT_SHADE: [u8; 3] = [255, 244, 205];
+const SCREEN: Paint = rgb(25, 28, 34).of(MaterialKind::DarkScreen);
+/// Paint of a screen that is on.
+const LIT_SCREEN: Paint = rgb(120, 165, 215).of(MaterialKind::LitScreen);
+/// Paint of a lamp's shade that is on.
+const LIT_SHADE: Paint = rgb(255, 244, 205);
 
 /// Draw a flat screen; on a foot, or bare where the box is too thin for one.
 pub fn television(s: &mut Sketch<'_>) {
@@ -38,11 +41,16 @@ pub fn television(s: &mut Sketch<'_>) {
 pub fn laptop(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
-    let shell = s.tint(0, s.choose(&[STEEL, DARK, [90, 95, 105]], STEEL));
+    let shell = s.tint(0, s.choose(&[STEEL, DARK, rgb(90, 95, 105)], STEEL));
     let base = (0.1 * h).min(0.025);
     let lid = between(z, 0.0, 0.06);
     s.cuboid(x, [0.0, base], z, shell);
-    s.cuboid(inside(x, 0.06 * w), [base, base + 0.004], between(z, 0.15, 0.6), DARK);
+    s.cuboid(
+        inside(x, 0.06 * w),
+        [base, base + 0.004],
+        between(z, 0.15, 0.6),
+        DARK.of(MaterialKind::Keyboard),
+    );
     let is_closed = s.condition().openness.is_some_and(|openness| openness < 0.2);
     s.detail(if is_closed { "closed lid" } else { "open lid" }, 1);
     let pivot_m = [0.0, base + 0.004, lid[1] + 0.004];
@@ -60,7 +68,12 @@ pub fn desktop(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.0, 0.72), [0.25 * h, h], between(z, 0.2, 0.32), DARK);
     s.cuboid(between(x, 0.02, 0.7), [0.29 * h, 0.97 * h], between(z, 0.32, 0.34), SCREEN);
     s.cuboid(between(x, 0.3, 0.42), [0.0, 0.3 * h], between(z, 0.1, 0.2), DARK);
-    s.cuboid(between(x, 0.1, 0.62), [0.0, 0.02], between(z, 0.65, 1.0), shade(DARK, 1.5));
+    s.cuboid(
+        between(x, 0.1, 0.62),
+        [0.0, 0.02],
+        between(z, 0.65, 1.0),
+        shade(DARK, 1.5).of(MaterialKind::Keyboard),
+    );
     s.cuboid(between(x, 0.78, 1.0), [0.0, 0.8 * h], z, shade(DARK, 1.2));
 }
 
@@ -68,10 +81,10 @@ pub fn desktop(s: &mut Sketch<'_>) {
 pub fn lamp(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
-    let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
-    let cloths = [[240, 228, 200], [225, 225, 220], [215, 180, 130]];
+    let metal = s.tint(0, s.choose(&[DARK, STEEL, rgb(150, 115, 70)], DARK));
+    let cloths = [rgb(240, 228, 200), rgb(225, 225, 220), rgb(215, 180, 130)];
     s.detail("lampshade", 1);
-    let cloth = lightest(s.asset(), s.choose(&cloths, cloths[0]));
+    let cloth = lightest(s.asset(), s.choose(&cloths, cloths[0])).of(MaterialKind::Fabric);
     let cloth = if s.condition().is_on == Some(true) { LIT_SHADE } else { cloth };
     let is_floor = s.asset().category == "FloorLamp";
     let (foot, shade_from) = if is_floor { (0.02, 0.82) } else { (0.07, 0.55) };
@@ -86,23 +99,32 @@ pub fn lamp(s: &mut Sketch<'_>) {
 pub fn gadget(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let is_switch = s.asset().category == "LightSwitch";
-    let plain = s.choose(&[DARK, [180, 60, 55], STEEL], DARK);
-    let body = s.tint(0, if is_switch { [235, 233, 225] } else { plain });
+    let plain = s.choose(&[DARK, rgb(180, 60, 55), STEEL], DARK);
+    let body = s.tint(0, if is_switch { rgb(235, 233, 225) } else { plain });
     if h > d {
         s.cuboid_at(ALL, ALL, [0.0, 0.7], body);
-        let face = if is_switch { shade(body, 0.8) } else { [230, 232, 225] };
+        let face = if is_switch {
+            shade(body, 0.8)
+        } else {
+            rgb(230, 232, 225).of(MaterialKind::ClockFace)
+        };
         let inner = if is_switch { [0.38, 0.62] } else { [0.15, 0.85] };
         s.cuboid_at(inner, [0.25, 0.75], [0.7, 1.0], face);
     } else {
         s.cuboid_at(ALL, [0.0, 0.8], ALL, body);
-        s.cuboid_at([0.1, 0.9], [0.8, 1.0], [0.1, 0.9], [60, 70, 85]);
+        s.cuboid_at(
+            [0.1, 0.9],
+            [0.8, 1.0],
+            [0.1, 0.9],
+            rgb(60, 70, 85).of(MaterialKind::DarkScreen),
+        );
     }
 }
 
 /// Draw a vacuum cleaner: a head on the floor, a body and an upright handle.
 pub fn vacuum_cleaner(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
-    let body = s.tint(0, [160, 45, 45]);
+    let body = s.tint(0, rgb(160, 45, 45));
     s.cuboid_at(ALL, [0.0, 0.1], [0.45, 1.0], DARK);
     s.column_at([0.25, 0.75], [0.08, 0.6], [0.1, 0.6], 0.8, 8, body);
     s.cuboid_at([0.44, 0.56], [0.55, 1.0], [0.0, 0.15], STEEL);

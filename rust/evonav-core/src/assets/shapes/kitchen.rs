@@ -2,13 +2,16 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::assets::shapes::{
-    colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{ALL, Along, Motion, Sketch, Span, between, ends, inside, piece},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{DARK, Paint, STEEL, WOODS, rgb, shade},
+        sketch::{ALL, Along, Motion, Sketch, Span, between, ends, inside, piece},
+    },
 };
 
-/// Colour of the inside of open objects.
-const INSIDE: Colour = [48, 46, 44];
+/// Paint of the inside of open objects.
+const INSIDE: Paint = rgb(48, 46, 44);
 
 /// Depth of ProcTHOR's counters and of each wing of its corner counters.
 const COUNTER_DEPTH_M: f64 = 0.61;
@@ -52,14 +55,18 @@ enum Face {
 /// Draw a run of cabinets: plinth, carcass, doors and worktop.
 fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     let h = s.size()[1];
-    let wood =
-        s.tint(0, s.choose(&[[225, 220, 210], WOODS[1], [120, 130, 135], WOODS[2]], WOODS[1]));
-    let stone = s.tint(1, s.choose(&[[95, 95, 98], [200, 195, 188], [70, 66, 64]], [95, 95, 98]));
+    let wood = s
+        .tint(0, s.choose(&[rgb(225, 220, 210), WOODS[1], rgb(120, 130, 135), WOODS[2]], WOODS[1]));
+    let stone = s.tint(
+        1,
+        s.choose(&[rgb(95, 95, 98), rgb(200, 195, 188), rgb(70, 66, 64)], rgb(95, 95, 98)),
+    );
+    let stone = stone.of(MaterialKind::Granite);
     let (plinth, worktop) = (0.1 * h, h - 0.04);
     s.cuboid(inside(x, 0.03), [0.0, plinth], inside(z, 0.03), shade(wood, 0.4));
     s.cuboid(inside(x, 0.015), [plinth, worktop], inside(z, 0.015), wood);
     s.cuboid(x, [worktop, h], z, stone);
-    let door: Colour = shade(wood, 1.1);
+    let door: Paint = shade(wood, 1.1).of(MaterialKind::Panel);
     let y = [plinth + 0.01, worktop - 0.01];
     let run = match face {
         Face::Front(run) => run,
@@ -80,8 +87,10 @@ fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
 pub fn fridge(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
-    let steel = s.tint(0, s.choose(&[[215, 217, 220], [235, 235, 232], [160, 163, 167]], STEEL));
-    let (door, grip) = (shade(steel, 1.06), shade(steel, 0.55));
+    let steel =
+        s.tint(0, s.choose(&[rgb(215, 217, 220), rgb(235, 235, 232), rgb(160, 163, 167)], STEEL));
+    let door = shade(steel, 1.06).of(MaterialKind::Appliance);
+    let grip = shade(steel, 0.55).of(MaterialKind::Metal);
     let (body, inner) = ([z[0], z[1] - 0.11], shade(steel, 0.9));
     let wall = 0.05;
     for side in ends(x, wall, 0.0) {
@@ -94,7 +103,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
     s.cuboid(width, [0.0, lowest], body, inner);
     s.cuboid(width, [h - wall, h], body, inner);
     for level in levels.into_iter().filter(|&y| y > lowest + 0.05 && y < h - 0.15) {
-        s.cuboid(width, [level - 0.01, level], body, [215, 225, 230]);
+        s.cuboid(width, [level - 0.01, level], body, rgb(215, 225, 230));
     }
     let split = 0.68 * h;
     s.detail("door", 2);
@@ -113,12 +122,18 @@ pub fn fridge(s: &mut Sketch<'_>) {
 /// Draw a microwave: body, dark window, panel.
 pub fn microwave(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
-    let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
+    let body =
+        s.tint(0, s.choose(&[rgb(200, 200, 202), rgb(60, 60, 64), rgb(230, 230, 228)], STEEL));
     s.cuboid(x, y, [z[0], z[1] - 0.03], body);
     let front = [z[1] - 0.03, z[1] - 0.015];
     let pivot_m = [x[0], 0.0, z[1] - 0.03];
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
-        s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), front, DARK);
+        s.cuboid(
+            between(x, 0.03, 0.74),
+            between(y, 0.08, 0.92),
+            front,
+            DARK.of(MaterialKind::OvenDoor),
+        );
     });
     s.cuboid(between(x, 0.77, 0.98), between(y, 0.08, 0.92), front, shade(body, 0.7));
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
@@ -132,16 +147,23 @@ pub fn microwave(s: &mut Sketch<'_>) {
 
 /// Draw a coffee machine: back column, head, drip tray and pot.
 pub fn coffee_machine(s: &mut Sketch<'_>) {
-    let body = s.tint(0, s.choose(&[DARK, [150, 40, 40], [180, 182, 185]], DARK));
+    let body = s.tint(0, s.choose(&[DARK, rgb(150, 40, 40), rgb(180, 182, 185)], DARK));
     s.cuboid_at(ALL, ALL, [0.0, 0.45], body);
     s.cuboid_at([0.05, 0.95], [0.72, 1.0], [0.45, 1.0], body);
     s.cuboid_at(ALL, [0.0, 0.08], [0.45, 1.0], shade(body, 1.3));
-    s.column_at([0.28, 0.72], [0.08, 0.5], [0.5, 0.92], 0.8, 8, [70, 50, 40]);
+    s.column_at(
+        [0.28, 0.72],
+        [0.08, 0.5],
+        [0.5, 0.92],
+        0.8,
+        8,
+        rgb(70, 50, 40).of(MaterialKind::Glass),
+    );
 }
 
 /// Draw a toaster: body, two slots and a lever.
 pub fn toaster(s: &mut Sketch<'_>) {
-    let body = s.tint(0, s.choose(&[STEEL, [190, 60, 55], [235, 230, 220], DARK], STEEL));
+    let body = s.tint(0, s.choose(&[STEEL, rgb(190, 60, 55), rgb(235, 230, 220), DARK], STEEL));
     s.cuboid_at(ALL, [0.0, 0.96], [0.0, 0.94], body);
     for slot in [[0.2, 0.4], [0.6, 0.8]] {
         s.cuboid_at(slot, [0.95, 1.0], [0.12, 0.82], DARK);
@@ -153,7 +175,7 @@ pub fn toaster(s: &mut Sketch<'_>) {
 pub fn pan(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
-    let metal = s.tint(0, DARK);
+    let metal = s.tint(0, DARK.of(MaterialKind::Metal));
     let handle = shade(metal, 0.7);
     let (rim, grip) = (between(y, 0.0, 0.7), between(y, 0.55, 1.0));
     s.detail("long handle", 1);
@@ -172,7 +194,7 @@ pub fn pan(s: &mut Sketch<'_>) {
 pub fn pot(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
-    let metal = s.tint(0, s.choose(&[STEEL, [160, 60, 50], DARK], STEEL));
+    let metal = s.tint(0, s.choose(&[STEEL, rgb(160, 60, 50), DARK], STEEL));
     let (long, body) = if d >= w { (z, w / d) } else { (x, d / w) };
     let middle = between(long, 0.5 - 0.5 * body.clamp(0.5, 1.0), 0.5 + 0.5 * body.clamp(0.5, 1.0));
     let ears = [0.55, 0.68];

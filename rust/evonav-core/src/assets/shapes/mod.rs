@@ -115,7 +115,7 @@ fn draw(s: &mut Sketch<'_>) {
     }
     let alike = ALIKE.iter().find(|(word, _)| category.contains(word));
     if !alike.is_some_and(|&(_, category)| draw_category(s, category)) {
-        s.block(s.tint(0, [165, 150, 135]));
+        s.block(s.tint(0, colour::rgb(165, 150, 135)));
     }
 }
 

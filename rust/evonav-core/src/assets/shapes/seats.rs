@@ -1,8 +1,11 @@
 //! Shapes of seats.
 
-use crate::assets::shapes::{
-    colour::{DARK, FABRICS, STEEL, WOODS, shade},
-    sketch::{Sketch, between, ends, inside, piece},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{DARK, FABRICS, STEEL, WOODS, shade},
+        sketch::{Sketch, between, ends, inside, piece},
+    },
 };
 
 /// Return the recorded height of the seat, or `otherwise`.
@@ -19,9 +22,11 @@ pub fn chair(s: &mut Sketch<'_>) {
     let id = s.asset().id.to_ascii_lowercase();
     let seat = seat_height(s, (0.5 * h).min(0.5).max(0.25 * h));
     let wood = s.tint(0, s.choose(&WOODS, WOODS[2]));
-    let cushion = s.tint(1, wood);
+    let is_office = id.contains("office") || id.contains("chair_313");
+    let seat_kind = if is_office { MaterialKind::Fabric } else { MaterialKind::Wood };
+    let cushion = s.tint(1, wood.of(seat_kind));
     let back = [z[0], z[0] + 0.09 * d];
-    if id.contains("office") || id.contains("chair_313") {
+    if is_office {
         let hub = 0.06 * w;
         s.cuboid(x, [0.02, 0.06], between(z, 0.46, 0.54), DARK);
         s.cuboid(between(x, 0.46, 0.54), [0.02, 0.06], z, DARK);
@@ -85,7 +90,7 @@ pub fn sofa(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[0]));
-    let soft = shade(fabric, 1.1);
+    let soft = shade(fabric, 1.1).of(MaterialKind::Cushion);
     let is_sofa = w > 1.45;
     let seat = seat_height(s, (0.46 * h).min(0.48));
     let arm = (if is_sofa { 0.09 * w } else { 0.15 * w }).clamp(0.06, 0.24);
@@ -125,5 +130,5 @@ pub fn ottoman(s: &mut Sketch<'_>) {
     let foot = (0.2 * h).min(0.12);
     s.legs([0.0, foot], (0.12 * w.min(d)).min(0.06), 0.03 * w, s.tint(1, WOODS[3]));
     s.cuboid(inside(x, 0.01), [foot, 0.6 * h], inside(z, 0.01), fabric);
-    s.cuboid(x, [0.6 * h, h], z, shade(fabric, 1.1));
+    s.cuboid(x, [0.6 * h, h], z, shade(fabric, 1.1).of(MaterialKind::Cushion));
 }

@@ -5,8 +5,9 @@ use serde::Serialize;
 use crate::{
     assets::{
         Asset,
+        material::Material,
         part::{Part, Primitive, aabb_of},
-        shapes::colour::{self, Colour},
+        shapes::colour::{self, Paint},
     },
     geometry::{IDENTITY, Mat3, Vec3, add, compose, euler_rotation_deg, rotate, sub},
     house::Condition,
@@ -140,7 +141,7 @@ impl<'a> Sketch<'a> {
     }
 
     /// Return the asset's colour number `index`, or `otherwise` if it has none.
-    pub fn tint(&self, index: usize, otherwise: Colour) -> Colour {
+    pub fn tint(&self, index: usize, otherwise: Paint) -> Paint {
         colour::tint(self.asset, index, otherwise)
     }
 
@@ -157,80 +158,80 @@ impl<'a> Sketch<'a> {
     }
 
     /// Draw a cuboid between fractions of the box's width, height and depth.
-    pub fn cuboid_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn cuboid_at(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let [x, y, z] = self.fractions(x, y, z);
-        self.cuboid(x, y, z, colour);
+        self.cuboid(x, y, z, paint);
     }
 
     /// Draw a [`Sketch::column`] between fractions of the box's width, height and depth.
-    pub fn column_at(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
-        self.round(Along::Y, taper, sides, self.fractions(x, y, z), colour);
+    pub fn column_at(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, paint: Paint) {
+        self.round(Along::Y, taper, sides, self.fractions(x, y, z), paint);
     }
 
     /// Draw an ellipsoid between fractions of the box's width, height and depth.
-    pub fn ellipsoid_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn ellipsoid_at(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let [x, y, z] = self.fractions(x, y, z);
-        self.ellipsoid(x, y, z, colour);
+        self.ellipsoid(x, y, z, paint);
     }
 
     /// Draw a [`Sketch::blob`] between fractions of the box's width, height and depth.
-    pub fn blob_at(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn blob_at(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let [x, y, z] = self.fractions(x, y, z);
-        self.blob(x, y, z, colour);
+        self.blob(x, y, z, paint);
     }
 
     /// Draw a rim: cuboids `thick` wide at both ends of the spans along `axes`, the second pair
     /// between the first.
-    pub fn rim(&mut self, spans: [Span; 3], axes: [usize; 2], thick: f64, colour: Colour) {
+    pub fn rim(&mut self, spans: [Span; 3], axes: [usize; 2], thick: f64, paint: Paint) {
         let mut rest = spans;
         for axis in axes {
             for end in ends(spans[axis], thick, 0.0) {
                 rest[axis] = end;
-                self.cuboid(rest[0], rest[1], rest[2], colour);
+                self.cuboid(rest[0], rest[1], rest[2], paint);
             }
             rest[axis] = inside(spans[axis], thick);
         }
     }
 
-    pub fn cuboid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn cuboid(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let spans = self.clamped([x, y, z]);
         let half_m = spans.map(|[low, high]| 0.5 * (high - low));
-        self.push(Primitive::Cuboid { half_m }, spans, IDENTITY, colour);
+        self.push(Primitive::Cuboid { half_m }, spans, IDENTITY, paint);
     }
 
     /// Draw one cuboid that fills the box.
-    pub fn block(&mut self, colour: Colour) {
+    pub fn block(&mut self, paint: Paint) {
         let [x, y, z] = self.spans();
-        self.cuboid(x, y, z, colour);
+        self.cuboid(x, y, z, paint);
     }
 
-    pub fn ellipsoid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn ellipsoid(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let spans = self.clamped([x, y, z]);
         let half_m = spans.map(|[low, high]| 0.5 * (high - low));
-        self.push(Primitive::Ellipsoid { half_m }, spans, IDENTITY, colour);
+        self.push(Primitive::Ellipsoid { half_m }, spans, IDENTITY, paint);
     }
 
     /// Draw a round part with half the triangles of an ellipsoid: two frusta base to base.
-    pub fn blob(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+    pub fn blob(&mut self, x: Span, y: Span, z: Span, paint: Paint) {
         let middle = 0.45 * y[1] + 0.55 * y[0];
-        self.column(x, [y[0], middle], z, 1.8, 8, colour);
-        self.column(x, [middle, y[1]], z, 0.5, 8, colour);
+        self.column(x, [y[0], middle], z, 1.8, 8, paint);
+        self.column(x, [middle, y[1]], z, 0.5, 8, paint);
     }
 
     /// Draw an upright cylinder (`taper` 1) or cone; see [`Sketch::round`].
-    pub fn column(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
-        self.round(Along::Y, taper, sides, [x, y, z], colour);
+    pub fn column(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, paint: Paint) {
+        self.round(Along::Y, taper, sides, [x, y, z], paint);
     }
 
     /// Draw an upright cylinder of radius `radius` about `[x, z]`.
-    pub fn pole(&mut self, centre: [f64; 2], radius: f64, y: Span, sides: u8, colour: Colour) {
+    pub fn pole(&mut self, centre: [f64; 2], radius: f64, y: Span, sides: u8, paint: Paint) {
         let [x, z] = centre.map(|c| [c - radius, c + radius]);
-        self.column(x, y, z, 1.0, sides, colour);
+        self.column(x, y, z, 1.0, sides, paint);
     }
 
     /// Draw a cylinder (`taper` 1) or cone whose far end along its axis is `taper` times as wide as
     /// its near end; the spans enclose the wider end.
-    pub fn round(&mut self, along: Along, taper: f64, sides: u8, spans: [Span; 3], colour: Colour) {
+    pub fn round(&mut self, along: Along, taper: f64, sides: u8, spans: [Span; 3], paint: Paint) {
         let spans = self.clamped(spans);
         let half = spans.map(|[low, high]| 0.5 * (high - low));
         // The columns of the rotations are the directions of the part's own x, y and z.
@@ -247,15 +248,15 @@ impl<'a> Sketch<'a> {
         let (bottom_m, top_m) =
             if taper <= 1.0 { (across, scaled(taper)) } else { (scaled(1.0 / taper), across) };
         let primitive = Primitive::Frustum { bottom_m, top_m, half_height_m, sides };
-        self.push(primitive, spans, rotation, colour);
+        self.push(primitive, spans, rotation, paint);
     }
 
     /// Draw four square uprights, `thick` wide, at the corners of the box, `inset` from its sides.
-    pub fn legs(&mut self, y: Span, thick: f64, inset: f64, colour: Colour) {
+    pub fn legs(&mut self, y: Span, thick: f64, inset: f64, paint: Paint) {
         let [x, _, z] = self.spans();
         for x in ends(x, thick, inset) {
             for z in ends(z, thick, inset) {
-                self.cuboid(x, y, z, colour);
+                self.cuboid(x, y, z, paint);
             }
         }
     }
@@ -266,14 +267,15 @@ impl<'a> Sketch<'a> {
         std::array::from_fn(|i| spans[i].map(|end| end.clamp(all[i][0], all[i][1])))
     }
 
-    fn push(&mut self, primitive: Primitive, spans: [Span; 3], rotation: Mat3, colour: Colour) {
+    fn push(&mut self, primitive: Primitive, spans: [Span; 3], rotation: Mat3, paint: Paint) {
         if spans.iter().any(|[low, high]| high - low <= 1e-9) {
             return;
         }
         let [x, y, z] = spans.map(|[low, high]| 0.5 * (low + high));
         let centre_m = [x, y - 0.5 * self.size_m[1], z];
-        let colour = colour::lit(colour);
-        self.parts.push(Part { primitive, centre_m, rotation, colour });
+        let colour = colour::lit(paint.colour);
+        let material = Material::named(paint.kind, &self.asset.id);
+        self.parts.push(Part { primitive, centre_m, rotation, colour, material });
     }
 
     /// Record the form.
@@ -297,7 +299,7 @@ impl<'a> Sketch<'a> {
     /// to their places in the asset's state.
     pub fn finish(mut self) -> Vec<Part> {
         if self.parts.is_empty() {
-            self.block([160, 150, 140]);
+            self.block(colour::rgb(160, 150, 140));
         }
         let drawn = aabb_of(&self.parts);
         let (middle, size) = (drawn.centre_m(), drawn.size_m());

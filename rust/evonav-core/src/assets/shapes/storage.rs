@@ -3,9 +3,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::assets::shapes::{
-    colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{Along, Motion, Sketch, Span, between, ends, inside, piece},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{DARK, Paint, STEEL, WOODS, rgb, shade},
+        sketch::{Along, Motion, Sketch, Span, between, ends, inside, piece},
+    },
 };
 
 /// Draw dressers, television stands and nightstands: open where objects were recorded inside, with
@@ -52,7 +55,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
 }
 
 /// Draw fronts with a handle each, on the +z side.
-fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour: Colour) {
+fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour: Paint) {
     let [x, _, z] = s.spans();
     let face = [z[1] - 0.012, z[1] - 0.004];
     s.detail("drawer", columns * rows);
@@ -61,10 +64,15 @@ fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour:
             let x = inside(piece(x, column, columns), 0.01);
             let y = inside(piece(y, row, rows), 0.01);
             let front = |s: &mut Sketch<'_>| {
-                s.cuboid(x, y, face, colour);
+                s.cuboid(x, y, face, colour.of(MaterialKind::Drawer));
                 let grip = between(x, 0.4, 0.6);
                 let (low, high) = (0.5 * (y[0] + y[1]) - 0.008, 0.5 * (y[0] + y[1]) + 0.008);
-                s.cuboid(grip, [low, high], [face[1], z[1]], shade(colour, 0.45));
+                s.cuboid(
+                    grip,
+                    [low, high],
+                    [face[1], z[1]],
+                    shade(colour, 0.45).of(MaterialKind::Metal),
+                );
             };
             if row + 1 < rows {
                 front(s);
@@ -139,7 +147,7 @@ pub fn cart(s: &mut Sketch<'_>) {
 pub fn safe(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let steel = s.tint(0, [90, 95, 100]);
+    let steel = s.tint(0, rgb(90, 95, 100).of(MaterialKind::Metal));
     s.cuboid(x, y, [z[0], z[1] - 0.03], steel);
     s.detail("dial", 1);
     let door = [inside(x, 0.08 * w), inside(y, 0.08 * h)];

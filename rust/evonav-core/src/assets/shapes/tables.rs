@@ -2,7 +2,7 @@
 //! recorded on them.
 
 use crate::assets::shapes::{
-    colour::{Colour, WOODS, shade},
+    colour::{Paint, WOODS, shade},
     sketch::{Motion, Sketch, Span, between, ends, inside},
     storage,
 };
@@ -146,7 +146,7 @@ pub fn desk(s: &mut Sketch<'_>) {
 }
 
 /// Draw three drawers, one above the other.
-fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
+fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Paint) {
     let z = s.spans()[2];
     s.detail("drawer", 3);
     s.cuboid(x, [0.08, top], inside(z, 0.02), colour);

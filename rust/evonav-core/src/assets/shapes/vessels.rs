@@ -2,17 +2,22 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::assets::shapes::{
-    colour::{CERAMIC, DARK, STEEL, shade},
-    sketch::{ALL, Along, Motion, Sketch, between, ends, inside},
+use crate::assets::{
+    material::MaterialKind,
+    shapes::{
+        colour::{CERAMIC, DARK, STEEL, rgb, shade},
+        sketch::{ALL, Along, Motion, Sketch, between, ends, inside},
+    },
 };
 
 /// Draw an open bin: four sides (or a round wall where the box is square) and a dark inside.
 pub fn bin(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let plastic =
-        s.tint(0, s.choose(&[[110, 112, 115], [70, 85, 80], [60, 62, 66], [180, 175, 165]], DARK));
+    let plastic = s.tint(
+        0,
+        s.choose(&[rgb(110, 112, 115), rgb(70, 85, 80), rgb(60, 62, 66), rgb(180, 175, 165)], DARK),
+    );
     let floor = s.levels().first().copied().unwrap_or(0.04 * h).min(0.6 * h);
     if (w - d).abs() < 0.02 {
         s.form("round");
@@ -27,7 +32,7 @@ pub fn bin(s: &mut Sketch<'_>) {
 
 /// Draw a full bag with a knot.
 pub fn bag(s: &mut Sketch<'_>) {
-    let plastic = s.tint(0, [40, 42, 46]);
+    let plastic = s.tint(0, rgb(40, 42, 46));
     s.ellipsoid_at(ALL, [0.0, 0.85], ALL, plastic);
     s.column_at([0.4, 0.6], [0.78, 1.0], [0.4, 0.6], 1.6, 6, shade(plastic, 1.4));
 }
@@ -36,7 +41,7 @@ pub fn bag(s: &mut Sketch<'_>) {
 pub fn open_box(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let card = s.tint(0, [176, 132, 86]);
+    let card = s.tint(0, rgb(176, 132, 86).of(MaterialKind::Paper));
     let wall = (0.03 * w.min(d)).min(0.012);
     s.cuboid(inside(x, wall), [0.0, 0.04 * h], inside(z, wall), shade(card, 0.8));
     let flap = if s.condition().openness.is_some() { (0.5 * d).min(0.4 * h) } else { 0.0 };
@@ -54,13 +59,19 @@ pub fn open_box(s: &mut Sketch<'_>) {
 
 /// Draw a bottle: body, shoulder, neck and cap.
 pub fn bottle(s: &mut Sketch<'_>) {
-    let glasses = [[60, 100, 70], [190, 205, 215], [120, 70, 45], [210, 160, 90], [130, 160, 190]];
-    let glass = s.tint(0, s.choose(&glasses, glasses[0]));
+    let glasses = [
+        rgb(60, 100, 70),
+        rgb(190, 205, 215),
+        rgb(120, 70, 45),
+        rgb(210, 160, 90),
+        rgb(130, 160, 190),
+    ];
+    let glass = s.tint(0, s.choose(&glasses, glasses[0]).of(MaterialKind::Glass));
     let is_pump = matches!(s.asset().category.as_str(), "SoapBottle" | "SprayBottle");
     s.column_at(ALL, [0.0, 0.58], ALL, 1.0, 10, glass);
     s.column_at(ALL, [0.58, 0.74], ALL, 0.4, 10, glass);
     s.column_at([0.32, 0.68], [0.74, 0.9], [0.32, 0.68], 1.0, 8, glass);
-    let cap = if is_pump { [230, 230, 230] } else { shade(glass, 0.5) };
+    let cap = if is_pump { rgb(230, 230, 230) } else { shade(glass, 0.5) };
     s.column_at([0.28, 0.72], [0.9, 1.0], [0.28, 0.72], 1.0, 8, cap);
     if is_pump {
         s.detail("pump", 1);
@@ -71,7 +82,7 @@ pub fn bottle(s: &mut Sketch<'_>) {
 /// Draw a shaker: a body and a perforated cap.
 pub fn shaker(s: &mut Sketch<'_>) {
     let is_salt = s.asset().category == "SaltShaker";
-    let body = if is_salt { [235, 235, 230] } else { [70, 55, 50] };
+    let body = if is_salt { rgb(235, 235, 230) } else { rgb(70, 55, 50) };
     s.column_at(ALL, [0.0, 0.78], ALL, 0.85, 8, s.tint(0, body));
     s.column_at([0.1, 0.9], [0.78, 1.0], [0.1, 0.9], 0.7, 8, STEEL);
 }
@@ -80,7 +91,8 @@ pub fn shaker(s: &mut Sketch<'_>) {
 pub fn mug(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
-    let colours = [CERAMIC, [180, 70, 60], [70, 100, 140], [95, 125, 95], [215, 180, 110]];
+    let colours =
+        [CERAMIC, rgb(180, 70, 60), rgb(70, 100, 140), rgb(95, 125, 95), rgb(215, 180, 110)];
     let glaze = s.tint(0, s.choose(&colours, CERAMIC));
     let long = w.max(d);
     let body = (w.min(d) / long).max(0.6);
@@ -88,7 +100,7 @@ pub fn mug(s: &mut Sketch<'_>) {
         if w >= d { (between(x, 0.0, body), z) } else { (x, between(z, 0.0, body)) };
     s.column(x_body, between(y, 0.0, 0.97), z_body, 1.1, 10, glaze);
     let inner = |span: [f64; 2]| between(span, 0.1, 0.9);
-    s.column(inner(x_body), between(y, 0.97, 1.0), inner(z_body), 1.0, 10, [85, 60, 45]);
+    s.column(inner(x_body), between(y, 0.97, 1.0), inner(z_body), 1.0, 10, rgb(85, 60, 45));
     if body < 0.92 {
         s.detail("handle", 1);
         let (x, z) = if w >= d {
@@ -102,22 +114,28 @@ pub fn mug(s: &mut Sketch<'_>) {
 
 /// Draw a bowl: a wide cone standing on its narrow end.
 pub fn bowl(s: &mut Sketch<'_>) {
-    let glaze = s.tint(0, s.choose(&[CERAMIC, [150, 180, 190], [200, 150, 110]], CERAMIC));
+    let glaze = s.tint(0, s.choose(&[CERAMIC, rgb(150, 180, 190), rgb(200, 150, 110)], CERAMIC));
     s.column_at(ALL, [0.0, 0.96], ALL, 2.0, 12, glaze);
     s.column_at([0.06, 0.94], [0.96, 1.0], [0.06, 0.94], 1.0, 12, shade(glaze, 0.75));
 }
 
 /// Draw a plate: a flat disc with a rim.
 pub fn plate(s: &mut Sketch<'_>) {
-    let glaze = s.tint(0, s.choose(&[CERAMIC, [190, 205, 215], [225, 205, 180]], CERAMIC));
+    let glaze = s.tint(0, s.choose(&[CERAMIC, rgb(190, 205, 215), rgb(225, 205, 180)], CERAMIC));
     s.column_at(ALL, [0.0, 0.9], ALL, 1.5, 12, glaze);
     s.column_at([0.15, 0.85], [0.9, 1.0], [0.15, 0.85], 1.0, 12, shade(glaze, 0.88));
 }
 
 /// Draw a vase: foot, belly and neck.
 pub fn vase(s: &mut Sketch<'_>) {
-    let glazes = [[110, 150, 165], [190, 120, 90], [220, 215, 205], [90, 80, 110], [70, 70, 72]];
-    let glaze = s.tint(0, s.choose(&glazes, glazes[0]));
+    let glazes = [
+        rgb(110, 150, 165),
+        rgb(190, 120, 90),
+        rgb(220, 215, 205),
+        rgb(90, 80, 110),
+        rgb(70, 70, 72),
+    ];
+    let glaze = s.tint(0, s.choose(&glazes, glazes[0]).of(MaterialKind::Ceramic));
     s.column_at(ALL, [0.0, 0.45], ALL, 1.7, 10, glaze);
     s.column_at(ALL, [0.45, 0.82], ALL, 0.45, 10, glaze);
     s.column_at([0.22, 0.78], [0.82, 1.0], [0.22, 0.78], 1.3, 10, shade(glaze, 1.1));
@@ -125,16 +143,29 @@ pub fn vase(s: &mut Sketch<'_>) {
 
 /// Draw a box with a tissue standing out.
 pub fn tissue_box(s: &mut Sketch<'_>) {
-    s.cuboid_at(ALL, [0.0, 0.7], ALL, s.tint(0, [140, 170, 190]));
-    s.column_at([0.35, 0.65], [0.7, 1.0], [0.35, 0.65], 0.3, 6, [245, 245, 245]);
+    s.cuboid_at(ALL, [0.0, 0.7], ALL, s.tint(0, rgb(140, 170, 190)));
+    s.column_at(
+        [0.35, 0.65],
+        [0.7, 1.0],
+        [0.35, 0.65],
+        0.3,
+        6,
+        rgb(245, 245, 245).of(MaterialKind::Paper),
+    );
 }
 
 /// Draw a roll along its longest side, with its core.
 pub fn roll(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let spans = s.spans();
-    let paper =
-        s.tint(0, if s.asset().category == "AluminumFoil" { STEEL } else { [242, 240, 235] });
+    let paper = s.tint(
+        0,
+        if s.asset().category == "AluminumFoil" {
+            STEEL
+        } else {
+            rgb(242, 240, 235).of(MaterialKind::Paper)
+        },
+    );
     let along = if h >= w && h >= d {
         Along::Y
     } else if w >= d {

@@ -72,6 +72,7 @@ impl Solid {
             centre_m: [x, 0.0, z],
             rotation: IDENTITY,
             colour: [0; 3],
+            material: Default::default(),
         })
     }
 

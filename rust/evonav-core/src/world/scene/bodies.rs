@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use crate::{
     assets::{
         Asset, Catalogue, UnknownAssets,
+        material::{Finish, Material},
         part::{Part, aabb_of},
         shapes::{lit, shape_in, shape_of},
     },
@@ -239,26 +240,27 @@ fn placed(
 /// Build the floors, ceilings, walls, doors and windows.
 fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
     let openings = Openings::of(house);
-    let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| {
-        lit(match tint {
+    let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| Finish {
+        colour: lit(match tint {
             Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
             None => catalogue.material_colour(material).unwrap_or(otherwise),
-        })
+        }),
+        material: Material::of_name(material),
     };
     let floor = |room: &Room| {
-        let colour = paint(&room.floor_material, None, FLOOR);
-        let parts = slab_parts(&room.polygon_m, [-SLAB_M, 0.0], colour);
+        let finish = paint(&room.floor_material, None, FLOOR);
+        let parts = slab_parts(&room.polygon_m, [-SLAB_M, 0.0], finish);
         Body::fixed(&room.id, "Floor", BodyKind::Floor, parts)
     };
     let ceiling = |room: &Room| {
         let height_m = room_height_m(house, room);
-        let colour = paint(&house.ceiling.material, house.ceiling.colour, CEILING);
-        let parts = slab_parts(&room.polygon_m, [height_m, height_m + SLAB_M], colour);
+        let finish = paint(&house.ceiling.material, house.ceiling.colour, CEILING);
+        let parts = slab_parts(&room.polygon_m, [height_m, height_m + SLAB_M], finish);
         Body::fixed(&room.id, "Ceiling", BodyKind::Ceiling, parts)
     };
     let wall = |wall: &Wall| {
-        let colour = paint(&wall.material, wall.colour, WALL);
-        Body::fixed(&wall.id, "Wall", BodyKind::Wall, wall_parts(house, wall, &openings, colour))
+        let finish = paint(&wall.material, wall.colour, WALL);
+        Body::fixed(&wall.id, "Wall", BodyKind::Wall, wall_parts(house, wall, &openings, finish))
     };
     let door = |door: &Opening| {
         let has_leaf = !door.asset_id.starts_with("Doorframe");

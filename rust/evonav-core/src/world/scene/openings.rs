@@ -1,7 +1,12 @@
 //! Fillings of the holes in walls: doors with frame and leaf, doorframes, windows.
 
 use crate::{
-    assets::{Asset, part::Part, shapes::lit},
+    assets::{
+        Asset,
+        material::{Finish, Material, MaterialKind},
+        part::Part,
+        shapes::lit,
+    },
     geometry::{Vec2, Vec3, add, compose, rotate, yaw_rotation},
     house::{House, Opening},
     world::scene::structure::WallFrame,
@@ -26,8 +31,12 @@ const SKY: [u8; 3] = [190, 215, 235];
 pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);
-    let wood = lit(colours.first().copied().unwrap_or([150, 105, 70]));
-    let trim = lit(colours.get(1).copied().unwrap_or([225, 220, 210]));
+    let finish = |index: usize, otherwise: [u8; 3], kind: MaterialKind| Finish {
+        colour: lit(colours.get(index).copied().unwrap_or(otherwise)),
+        material: Material::named(kind, &door.asset_id),
+    };
+    let wood = finish(0, [150, 105, 70], MaterialKind::Wood);
+    let trim = finish(1, [225, 220, 210], MaterialKind::Smooth);
     let bar = BAR_M.min(0.1 * (along[1] - along[0]));
     let depth = [-FRAME_HALF_M, FRAME_HALF_M];
     let inner = [along[0] + bar, along[1] - bar];
@@ -60,21 +69,25 @@ fn leaf(
     width: f64,
     up: Vec2,
     angle_rad: f64,
-    colour: [u8; 3],
+    finish: Finish,
 ) -> [Part; 4] {
     let span = |from: f64, to: f64| {
         let ends = [hinge + direction * from, hinge + direction * to];
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
     };
+    let of = |kind| Material { kind, ..finish.material };
     let handle_up = (up[0] + 1.0).min(0.5 * (up[0] + up[1]));
-    let board = frame.cuboid(span(0.0, width), up, [FRAME_HALF_M - LEAF_M, FRAME_HALF_M], colour);
+    let board = frame.cuboid(span(0.0, width), up, [FRAME_HALF_M - LEAF_M, FRAME_HALF_M], finish);
     let handle = frame.cuboid(
         span(width - 0.13, width - 0.05),
         [handle_up - 0.02, handle_up + 0.02],
         [FRAME_HALF_M - LEAF_M - 0.05, FRAME_HALF_M + 0.05],
-        [190, 185, 170],
+        Finish { colour: [190, 185, 170], material: of(MaterialKind::Metal) },
     );
-    let raised = colour.map(|channel| (f64::from(channel) * 0.88).round() as u8);
+    let raised = Finish {
+        colour: finish.colour.map(|channel| (f64::from(channel) * 0.88).round() as u8),
+        material: of(MaterialKind::Panel),
+    };
     let panel = |from: f64, to: f64| {
         let height = up[1] - up[0];
         let level = [up[0] + from * height, up[0] + to * height];
@@ -102,7 +115,9 @@ fn turned_about(part: Part, pivot_m: Vec3, turn: &[[f64; 3]; 3]) -> Part {
 pub(super) fn window_parts(house: &House, window: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, window) else { return Vec::new() };
     let trim = asset.and_then(|asset| asset.colours.first().copied()).unwrap_or([235, 235, 230]);
-    let trim = lit(trim);
+    let of = |kind| Material::named(kind, &window.id);
+    let trim = Finish { colour: lit(trim), material: of(MaterialKind::Smooth) };
+    let pane = Finish { colour: SKY, material: of(MaterialKind::Outdoors) };
     let [width, height] = [along[1] - along[0], up[1] - up[0]];
     let bar = BAR_M.min(0.1 * width.min(height));
     let depth = [-WINDOW_HALF_M, WINDOW_HALF_M];
@@ -112,7 +127,7 @@ pub(super) fn window_parts(house: &House, window: &Opening, asset: Option<&Asset
         frame.cuboid([inner[1], along[1]], up, depth, trim),
         frame.cuboid(inner, [up[0], up[0] + bar], depth, trim),
         frame.cuboid(inner, [up[1] - bar, up[1]], depth, trim),
-        frame.cuboid(inner, [up[0] + bar, up[1] - bar], depth.map(|d| 0.2 * d), SKY),
+        frame.cuboid(inner, [up[0] + bar, up[1] - bar], depth.map(|d| 0.2 * d), pane),
     ];
     let bars = depth.map(|d| 0.6 * d);
     let half = 0.3 * bar;

@@ -6,7 +6,10 @@
 //! and furniture stands 2 cm from them.
 
 use crate::{
-    assets::part::{Part, Primitive},
+    assets::{
+        material::Finish,
+        part::{Part, Primitive},
+    },
     geometry::{IDENTITY, Mat3, Vec2, distance_2d_m, outline::edges, polygon_contains},
     house::{House, Opening, Room, Wall},
 };
@@ -69,7 +72,7 @@ impl WallFrame {
     }
 
     /// Build a cuboid that spans `along`, `up` and `left` in this frame.
-    pub(super) fn cuboid(&self, along: Vec2, up: Vec2, left: Vec2, colour: [u8; 3]) -> Part {
+    pub(super) fn cuboid(&self, along: Vec2, up: Vec2, left: Vec2, finish: Finish) -> Part {
         let spans = [along, up, left];
         let [middle, half_m] = [0.5, -0.5].map(|sign| spans.map(|[a, b]| 0.5 * b + sign * a));
         let [x, z] = self.point_m(middle[0], middle[2]);
@@ -77,7 +80,8 @@ impl WallFrame {
             primitive: Primitive::Cuboid { half_m },
             centre_m: [x, middle[1], z],
             rotation: self.rotation(),
-            colour,
+            colour: finish.colour,
+            material: finish.material,
         }
     }
 }
@@ -123,7 +127,7 @@ pub(super) fn wall_parts(
     house: &House,
     wall: &Wall,
     openings: &Openings<'_>,
-    colour: [u8; 3],
+    finish: Finish,
 ) -> Vec<Part> {
     let Some(frame) = WallFrame::of(wall) else { return Vec::new() };
     if wall.is_empty || wall.height_m <= 0.0 {
@@ -139,7 +143,7 @@ pub(super) fn wall_parts(
         for up in intervals(0.0, wall.height_m, cuts.iter().copied()) {
             let middle = 0.5 * (up[0] + up[1]);
             if !cuts.iter().any(|cut| cut[0] < middle && middle < cut[1]) {
-                parts.push(frame.cuboid([from, to], up, left, colour));
+                parts.push(frame.cuboid([from, to], up, left, finish));
             }
         }
     }
@@ -183,7 +187,7 @@ pub(super) fn room_height_m(house: &House, room: &Room) -> f64 {
 /// Build slabs that cover a polygon between the heights `up`.
 ///
 /// Exact for polygons with edges along x and z; a slanted edge is covered in steps, never less.
-pub(super) fn slab_parts(polygon_m: &[Vec2], up: Vec2, colour: [u8; 3]) -> Vec<Part> {
+pub(super) fn slab_parts(polygon_m: &[Vec2], up: Vec2, finish: Finish) -> Vec<Part> {
     covering_rectangles(polygon_m)
         .into_iter()
         .map(|[x, z]| {
@@ -192,7 +196,8 @@ pub(super) fn slab_parts(polygon_m: &[Vec2], up: Vec2, colour: [u8; 3]) -> Vec<P
                 primitive: Primitive::Cuboid { half_m: spans.map(|[a, b]| 0.5 * (b - a)) },
                 centre_m: spans.map(|[a, b]| 0.5 * (a + b)),
                 rotation: IDENTITY,
-                colour,
+                colour: finish.colour,
+                material: finish.material,
             }
         })
         .collect()
