@@ -1,4 +1,4 @@
-//! What surfaces are made of, as far as it can be seen.
+//! Materials of surfaces, as far as they can be seen.
 
 /// A material: its kind, and which of the kind's textures it has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

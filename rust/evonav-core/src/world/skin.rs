@@ -1,4 +1,4 @@
-//! How materials lie on the faces of a scene: which texture, and where on it each point is.
+//! Lay materials on the faces of a scene: give each face a texture and coordinates on it.
 
 use crate::{
     assets::{
