@@ -27,7 +27,7 @@ pub struct Finish {
     pub material: Material,
 }
 
-/// How a texture lies on a surface.
+/// The way in which a texture lies on a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Layout {
     /// The surface has no texture.
@@ -36,7 +36,8 @@ pub enum Layout {
     Repeated([f64; 2]),
     /// The texture fills each of the two broadest faces of a part once; the others are plain.
     Broad,
-    /// As `Broad`, with the part of the texture between two heights, from 0 (its upper edge) to 1.
+    /// The part of the texture between two heights, from 0 (its upper edge) to 1, fills each of the
+    /// two broadest faces; the others are plain.
     Strip([f64; 2]),
     /// The texture fills every face once.
     Every,

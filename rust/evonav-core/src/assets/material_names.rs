@@ -58,8 +58,8 @@ const PLAIN: [(&str, MaterialKind); 48] = {
     ]
 };
 
-/// Words in names in lower case, and the kind they stand for; the first match counts.
-const WORDS: [(&[&str], MaterialKind); 31] = {
+/// Parts of names in lower case, and the kind they stand for; the first match counts.
+const PARTS_OF_NAMES: [(&[&str], MaterialKind); 31] = {
     use MaterialKind::{
         Bedding, Brick, Carpet, Ceramic, Checkerboard, Concrete, Fabric, Glass, Granite, Hexagons,
         Leather, Leaves, Marble, Metal, Mosaic, Painting, Paper, Parquet, Planks, Plaster, Shards,
@@ -142,6 +142,6 @@ pub fn kind_of_name(name: &str) -> Option<MaterialKind> {
         return Some(kind);
     }
     let lower = name.to_ascii_lowercase();
-    let matches = |words: &[&str]| words.iter().any(|word| lower.contains(word));
-    WORDS.iter().find(|(words, _)| matches(words)).map(|&(_, kind)| kind)
+    let matches = |parts: &[&str]| parts.iter().any(|part| lower.contains(part));
+    PARTS_OF_NAMES.iter().find(|(parts, _)| matches(parts)).map(|&(_, kind)| kind)
 }

@@ -65,7 +65,7 @@ pub struct Part {
     pub rotation: Mat3,
     /// Surface colour, sRGB.
     pub colour: [u8; 3],
-    /// What the surface is made of.
+    /// Material of the surface.
     pub material: Material,
 }
 
