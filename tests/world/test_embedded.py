@@ -4,7 +4,7 @@ import math
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from evonav.house import bundled_houses
 from evonav.world.check import check_simulator
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, Frame, OccupancyGrid, SimulatorConfig
+from evonav.world.simulator import Action, Frame, OccupancyGrid, SimulatorConfig, Style
 
 HOUSES = [house.to_json() for house in bundled_houses(3)]
 SMALL = SimulatorConfig(width_px=64, height_px=48)
@@ -112,6 +112,20 @@ def test_pose_that_is_not_free_moves_to_the_nearest_reachable_position() -> None
     assert simulator.is_free(effective.position_m)
     assert effective.yaw_rad == pytest.approx(1.0, abs=1e-6)
     assert simulator.reset(HOUSES[0], start) == start
+
+
+def test_styles_differ_in_colours_alone() -> None:
+    views = {}
+    for style in get_args(Style):
+        simulator = EmbeddedSimulator(replace(SMALL, style=style))
+        simulator.reset(HOUSES[0])
+        views[style] = simulator.render()
+    for style, view in views.items():
+        np.testing.assert_array_equal(view.depth_m, views["outlined"].depth_m)
+        np.testing.assert_array_equal(view.instances, views["outlined"].instances)
+        assert (view.rgb != views["outlined"].rgb).any() == (style != "outlined")
+    with pytest.raises(InvalidArgumentError, match=r"style.*\"ink\".*outlined, plain, default"):
+        EmbeddedSimulator(SimulatorConfig(style="ink")).reset(HOUSES[0])  # type: ignore[arg-type]
 
 
 def test_errors_are_typed() -> None:

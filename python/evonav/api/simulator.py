@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from evonav.sensors.observation import MapFrame, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, OccupancyGrid, SceneObject, SimulatorConfig
+from evonav.world.simulator import Action, OccupancyGrid, SceneObject, SimulatorConfig, Style
 
 OTHER_NAMES = {"moveahead": "MOVE_FORWARD", "rotateleft": "TURN_LEFT", "rotateright": "TURN_RIGHT", "done": "STOP"}
 """AI2-THOR's names of actions, in small letters."""
@@ -57,6 +58,7 @@ class Simulator:
         pose: Pose | None = None,
         *,
         config: SimulatorConfig | None = None,
+        style: Style | None = None,
         allow_unknown_assets: bool = False,
     ) -> None:
         """Load a house; the agent stands at `pose`, or at the house's own start.
@@ -64,13 +66,17 @@ class Simulator:
         Args:
             house: A house, its JSON, or a file of houses, of which the first is taken.
             pose: Pose of the agent; if it does not fit there, it stands at the nearest place where it does.
-            config: Camera, body and steps; AI2-THOR's by default.
+            config: Camera, body, steps and style; AI2-THOR's camera and body by default.
+            style: Way in which colours are drawn: `outlined`, `plain` or `default`. Default: that of `config`.
             allow_unknown_assets: Give assets that are missing from the catalogue the usual size of their category.
 
         Raises:
             HouseError: The house is malformed or contains an unknown asset.
+            InvalidArgumentError: There is no such style.
             SimulationError: The agent fits nowhere.
         """
+        config = config or SimulatorConfig()
+        config = config if style is None else replace(config, style=style)
         self.embedded = EmbeddedSimulator(config, allow_unknown_assets=allow_unknown_assets)
         self._perception = GroundTruthPerception()
         self.house = _house_of(house)

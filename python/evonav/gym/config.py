@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.world.simulator import Action, SimulatorConfig
+from evonav.world.simulator import Action, SimulatorConfig, Style
 
 ActionMode = Literal["actions", "waypoints"]
 WaypointFrame = Literal["relative", "polar", "start"]
@@ -74,6 +74,8 @@ class NavConfig(BaseModel):
     max_steps: int | None = Field(None, ge=1, le=1_000_000)
     """Number of steps of a stage; by default the protocol's, 500 actions or 50 waypoint rounds."""
     success_radius_m: float = Field(ProtocolConfig().success_radius_m, ge=0.01, le=100.0)
+    style: Style = SimulatorConfig().style
+    """Way in which the colours of `rgb` are drawn: `outlined`, `plain` (the fastest) or `default`."""
     reward: Reward = "progress"
     reference_image_px: int = Field(300, ge=1, le=4096)
     """Side of `reference_image` in pixels; images of another size are resampled."""
@@ -112,6 +114,7 @@ class NavConfig(BaseModel):
             vertical_fov_deg=vertical_fov_deg,
             move_m=self.move_m,
             turn_deg=self.turn_deg,
+            style=self.style,
         )
 
     @property

@@ -66,6 +66,7 @@ class EmbeddedSimulator:
 
         Raises:
             HouseError: The house is malformed or contains an unknown asset.
+            InvalidArgumentError: A number of the configuration is out of range, or there is no such style.
             SimulationError: The agent fits nowhere.
         """
         if isinstance(house, _core.House):
@@ -82,6 +83,7 @@ class EmbeddedSimulator:
             agent_radius_m=self.config.agent_radius_m,
             agent_height_m=self.config.agent_height_m,
             allow_unknown_assets=self.allow_unknown_assets,
+            style=self.config.style,
         )
         return self._enter(core, pose)
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,14 @@ class Intrinsics:
         return self.height_px / 2.0 / float(np.tan(self.vertical_fov_rad / 2.0))
 
 
+Style = Literal["outlined", "plain", "default"]
+"""A way to draw colours.
+
+`outlined`: flat colours with dark corners, and thin lines around silhouettes: clear to people. `plain`: without the
+lines, the cheapest. `default`: lit surfaces with smooth edges, for detectors and models that know photographs.
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class SimulatorConfig:
     """Camera, body and steps: AI2-THOR's defaults, with the paper's 15 degree turns (Sec. C.3)."""
@@ -60,6 +68,8 @@ class SimulatorConfig:
     """Spacing of `reachable_positions`, in metres."""
     occupancy_cell_m: float = 0.1
     """Edge of a cell of the oracle occupancy, in metres."""
+    style: Style = "outlined"
+    """Way in which colours are drawn; depth and instances do not depend on it. AI2-THOR has one of its own."""
 
     @property
     def intrinsics(self) -> Intrinsics:

@@ -7,7 +7,7 @@ use evonav_core::{
     assets::UnknownAssets,
     geometry::{Pose, Vec2},
     house::House,
-    sensors::instance_masks::MaskFilter,
+    sensors::{instance_masks::MaskFilter, raster::Style},
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
         actions::Strides,
@@ -30,6 +30,7 @@ fn world() -> Arc<EmbeddedSimulator> {
         camera_height_m: 1.575,
         agent: AgentBody { radius_m: 0.2, height_m: 1.8 },
         unknown: UnknownAssets::Error,
+        style: Style::default(),
     };
     let house = House::from_json("house", HOUSE).expect("a valid house");
     Arc::new(EmbeddedSimulator::new(house, config).expect("a usable house"))

@@ -11,7 +11,7 @@ use evonav_core::{
         camera::{Camera, View},
         instance_masks::instance_areas,
         png::encode_png,
-        raster::{FrameBuffer, Want, render, visible_px},
+        raster::{FrameBuffer, Style, Want, render, visible_px},
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
@@ -44,9 +44,11 @@ fn bench_raster(c: &mut Criterion) {
     let mesh = SceneMesh::build(&scene);
     for image_px in [[300, 300], [640, 480]] {
         for (name, want) in [
-            ("depth", Want { rgb: false, instances: false }),
-            ("depth_instances", Want { rgb: false, instances: true }),
-            ("depth_instances_rgb", Want { rgb: true, instances: true }),
+            ("depth", Want { rgb: None, instances: false }),
+            ("depth_instances", Want { rgb: None, instances: true }),
+            ("depth_instances_outlined", Want { rgb: Some(Style::Outlined), instances: true }),
+            ("depth_instances_plain", Want { rgb: Some(Style::Plain), instances: true }),
+            ("depth_instances_default", Want { rgb: Some(Style::Default), instances: true }),
         ] {
             let cameras = cameras(&scene, image_px);
             let mut frame = FrameBuffer::default();
@@ -66,14 +68,19 @@ fn bench_raster(c: &mut Criterion) {
         });
     });
     // What an evaluator takes from every view.
-    let want = Want { rgb: false, instances: true };
+    let want = Want { rgb: None, instances: true };
     render(&mesh, &cameras_300[0], want, &mut frame).expect("a camera in the house");
     c.bench_function("ground_truth/instance_areas_300x300", |b| {
         b.iter(|| instance_areas(black_box(&frame.instances), scene.bodies.len()));
     });
     // A reference image of a task.
-    render(&mesh, &cameras_300[0], Want { rgb: true, instances: false }, &mut frame)
-        .expect("a camera in the house");
+    render(
+        &mesh,
+        &cameras_300[0],
+        Want { rgb: Some(Style::default()), instances: false },
+        &mut frame,
+    )
+    .expect("a camera in the house");
     c.bench_function("png/encode_300x300", |b| {
         b.iter(|| encode_png(black_box(&frame.rgb), [300, 300]));
     });

@@ -16,7 +16,7 @@ from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import check_importable
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
-from evonav.world.simulator import Simulator
+from evonav.world.simulator import Simulator, SimulatorConfig
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
 EMBEDDED: Component[Simulator] = Component("evonav.evaluation.run.components:embedded_simulator")
@@ -166,18 +166,18 @@ def load_case(path: Path) -> EpisodeSpec:
     return episode_spec(load_task(path))
 
 
-def embedded_simulator() -> Simulator:
+def embedded_simulator(**camera: Any) -> Simulator:  # noqa: ANN401 - fields of `SimulatorConfig`
     """Make evonav's own simulator, with AI2-THOR's defaults."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator()
+    return EmbeddedSimulator(SimulatorConfig(**camera))
 
 
-def lenient_simulator() -> Simulator:
+def lenient_simulator(**camera: Any) -> Simulator:  # noqa: ANN401 - fields of `SimulatorConfig`
     """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(allow_unknown_assets=True)
+    return EmbeddedSimulator(SimulatorConfig(**camera), allow_unknown_assets=True)
 
 
 def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - fields of `Ai2ThorOptions`

@@ -19,7 +19,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
-from evonav.world.simulator import Simulator
+from evonav.world.simulator import Simulator, Style
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
@@ -43,6 +43,8 @@ class SimulatorSettings(Settings):
 
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
+    style: Style | None = None
+    """Embedded: the way in which colours are drawn: outlined, plain or default. Default: outlined."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None
@@ -68,11 +70,14 @@ class SimulatorSettings(Settings):
         given = self.model_dump(exclude={"kind", "allow_unknown_assets"}, exclude_none=True)
         if self.kind == "ai2thor":
             # AI2-THOR has a catalogue of its own, so that allow_unknown_assets changes nothing.
+            if self.style is not None:
+                raise SettingError(type(self), "style", "is for simulator embedded")
             host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
             return Component(f"{_COMPONENTS}:ai2thor_simulator", given, host_options)
+        style = {key: given.pop(key) for key in ("style",) if key in given}
         if given:
             raise SettingError(type(self), next(iter(given)), "is for simulator ai2thor")
-        return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator")
+        return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator", style)
 
 
 class PerceptionSettings(Settings):

@@ -12,7 +12,7 @@ use crate::{
     geometry::Vec2,
     sensors::{
         instance_masks::{MaskFilter, number_instances},
-        raster::{FrameBuffer, Want},
+        raster::FrameBuffer,
     },
     simulator::{
         actions::{Action, Strides, act, set_down},
@@ -257,7 +257,7 @@ impl Batch {
         let thread = rayon::current_thread_index().unwrap_or(0) % self.frames.len();
         // The content is overwritten, so a thread that panicked has left nothing that matters.
         let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
-        let want = Want { rgb: images.rgb.is_some(), instances: images.labels.is_some() };
+        let want = slot.world.want(images.rgb.is_some(), images.labels.is_some());
         slot.world.render(&slot.world.view(&slot.pose), want, &mut frame)?;
         if let Some(depth_m) = images.depth_m {
             let empty_m = self.config.empty_depth_m;

@@ -10,7 +10,7 @@ use crate::{
     house::{House, HouseDelta},
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Want, render_view},
+        raster::{FrameBuffer, Style, Want, render_view},
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
@@ -42,6 +42,8 @@ pub struct SimulatorConfig {
     pub agent: AgentBody,
     /// Treatment of assets that the catalogue does not contain.
     pub unknown: UnknownAssets,
+    /// Way to draw colours.
+    pub style: Style,
 }
 
 /// A house with its bodies, surfaces and free space.
@@ -156,6 +158,11 @@ impl EmbeddedSimulator {
     /// Return the view of an agent at `pose`.
     pub fn view(&self, pose: &Pose) -> View {
         View { clip_m: self.config.clip_m, ..View::from(self.camera(pose)) }
+    }
+
+    /// Return the images to render besides depth, with colours in the simulator's style.
+    pub fn want(&self, rgb: bool, instances: bool) -> Want {
+        Want { rgb: rgb.then_some(self.config.style), instances }
     }
 
     /// Render the view of any camera, the agent's ([`Self::view`]) or another.

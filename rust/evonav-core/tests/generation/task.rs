@@ -15,7 +15,7 @@ use evonav_core::{
     house::House,
     sensors::{
         camera::Camera,
-        raster::{FrameBuffer, Want, render},
+        raster::{FrameBuffer, Style, Want, render},
     },
     world::{mesh::SceneMesh, scene::Scene},
 };
@@ -294,7 +294,7 @@ fn references_show_the_target_from_its_room_at_the_reference_distance() {
                     horizon_rad: pose.horizon_deg.to_radians(),
                 };
                 let mut frame = FrameBuffer::default();
-                let want = Want { rgb: true, instances: true };
+                let want = Want { rgb: Some(Style::default()), instances: true };
                 render(&SceneMesh::build(&scene), &camera, want, &mut frame).unwrap();
                 let body = scene.bodies.iter().position(|b| b.id == stage.target.id).unwrap() + 1;
                 let count = frame.instances.iter().filter(|&&id| id == body as i32).count();

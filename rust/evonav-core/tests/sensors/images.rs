@@ -5,7 +5,7 @@ use evonav_core::{
     geometry::{Vec3, euler_rotation_deg},
     sensors::{
         camera::{CLIP_M, Camera, View},
-        raster::{FrameBuffer, Want, render, render_view},
+        raster::{FrameBuffer, Style, Want, render, render_view},
     },
     world::{mesh::SceneMesh, scene::BodyKind},
 };
@@ -55,7 +55,8 @@ fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
     let mesh = SceneMesh::build(&scene_of(&[part]));
     let camera = level_camera(16, 16, 1.5, [0.0; 3]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: true, instances: true }, &mut frame).unwrap();
+    render(&mesh, &camera, Want { rgb: Some(Style::default()), instances: true }, &mut frame)
+        .unwrap();
     assert!(frame.instances.iter().all(|&id| id == 0));
 }
 
@@ -68,7 +69,8 @@ fn colours_show_corners_and_sky() {
     let mesh = SceneMesh::build(&scene_of(&[ahead, beside]));
     let camera = level_camera(301, 301, 90.0_f64.to_radians(), [0.5, 0.0, 0.0]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: true, instances: false }, &mut frame).unwrap();
+    render(&mesh, &camera, Want { rgb: Some(Style::default()), instances: false }, &mut frame)
+        .unwrap();
     let at = |col: usize| &frame.rgb[3 * (150 * 301 + col)..][..3];
     assert_eq!(at(20), [204, 222, 236]);
     assert!(at(160)[0] > 3 * at(160)[1]);
@@ -86,7 +88,7 @@ fn surfaces_are_drawn_between_the_clip_planes() {
     for half_height_m in [None, Some(2.0)] {
         let view = View { half_height_m, ..View::from(camera) };
         let mut frame = FrameBuffer::default();
-        let want = Want { rgb: true, instances: true };
+        let want = Want { rgb: Some(Style::default()), instances: true };
         for (z, is_seen) in [
             (near_m - 1e-3, false),
             (near_m + 1e-3, true),
@@ -118,7 +120,7 @@ fn ceilings_are_seen_from_below_only() {
     let middle = |y: f64, horizon_rad: f64| {
         let camera = Camera { horizon_rad, ..level_camera(3, 3, 1.0, [0.0, y, 0.0]) };
         let mut frame = FrameBuffer::default();
-        render(&mesh, &camera, Want { rgb: false, instances: true }, &mut frame).unwrap();
+        render(&mesh, &camera, Want { rgb: None, instances: true }, &mut frame).unwrap();
         frame.instances[4]
     };
     assert_eq!(middle(1.0, -1.5), 2);

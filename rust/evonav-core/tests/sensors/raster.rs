@@ -6,7 +6,7 @@ use evonav_core::{
     geometry::{Vec3, add, euler_rotation_deg, rotate, sub},
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Want, render_view},
+        raster::{FrameBuffer, Style, Want, render_view},
         ray_caster::RayCaster,
         visible_bodies::{visibility_points, visible_bodies},
     },
@@ -153,7 +153,7 @@ proptest! {
         let mesh = SceneMesh::build(&scene_of(&parts));
         let triangles: Vec<Triangle> = mesh.triangles().collect();
         let mut frame = FrameBuffer::default();
-        render_view(&mesh, &view, Want { rgb: false, instances: true }, &mut frame).unwrap();
+        render_view(&mesh, &view, Want { rgb: None, instances: true }, &mut frame).unwrap();
         for index in 0..camera.width_px * camera.height_px {
             let (row, col) = (index / camera.width_px, index % camera.width_px);
             let (origin_m, ray) = look_through(&view, [col as f64 + 0.5, row as f64 + 0.5]);
@@ -205,19 +205,24 @@ proptest! {
     #[test]
     fn wants_do_not_change_images(parts in vec(part(), 0..12), view in view()) {
         let mesh = SceneMesh::build(&scene_of(&parts));
-        let mut frames = [false, true].map(|rgb| {
+        let mut frames = [None, Some(Style::Outlined), Some(Style::Plain), Some(Style::Default)].map(|rgb| {
             let mut frame = FrameBuffer::default();
             render_view(&mesh, &view, Want { rgb, instances: true }, &mut frame).unwrap();
             frame
         });
-        prop_assert_eq!(&frames[0].depth_m, &frames[1].depth_m);
-        prop_assert_eq!(&frames[0].instances, &frames[1].instances);
-        prop_assert_eq!(frames[1].rgb.len(), 3 * frames[1].depth_m.len());
-        // A used buffer gives what a new one gives.
-        let [depth_only, full] = &mut frames;
-        render_view(&mesh, &view, Want { rgb: true, instances: false }, depth_only).unwrap();
-        prop_assert_eq!(&depth_only.rgb, &full.rgb);
-        prop_assert!(depth_only.instances.is_empty());
+        let [used, coloured @ ..] = &mut frames;
+        for (frame, (_, style)) in coloured.iter().zip(Style::NAMES) {
+            prop_assert_eq!(&used.depth_m, &frame.depth_m);
+            prop_assert_eq!(frame.rgb.len(), 3 * frame.depth_m.len());
+            // A used buffer gives what a new one gives.
+            let mut again = used.clone();
+            render_view(&mesh, &view, Want { rgb: Some(style), instances: false }, &mut again).unwrap();
+            prop_assert_eq!(&again.rgb, &frame.rgb);
+            prop_assert!(again.instances.is_empty());
+            render_view(&mesh, &view, Want { rgb: Some(style), instances: true }, &mut again).unwrap();
+            prop_assert_eq!(&used.instances, &frame.instances);
+            prop_assert_eq!(&again.rgb, &frame.rgb);
+        }
     }
 
     /// The hierarchy finds what trying every triangle finds.

@@ -51,7 +51,7 @@ proptest! {
             horizon_rad,
         };
         let (mut frame, mut whole) = (FrameBuffer::default(), FrameBuffer::default());
-        let want = Want { rgb: false, instances: true };
+        let want = Want { rgb: None, instances: true };
         render(&mesh, &camera, want, &mut whole)?;
         for body in 0..=bodies.len() {
             let count = whole.instances.iter().filter(|&&id| id == body as i32 + 1).count();

@@ -8,7 +8,7 @@ use evonav_core::{
     house::{House, HouseDelta},
     sensors::{
         camera::{CLIP_M, View},
-        raster::{FrameBuffer, Want},
+        raster::{FrameBuffer, Style, Want},
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
@@ -81,7 +81,7 @@ impl PyEmbeddedSimulator {
     #[new]
     #[pyo3(signature = (
         house_json, *, name, image_px, vertical_fov_rad, clip_m, camera_height_m,
-        agent_radius_m, agent_height_m, allow_unknown_assets
+        agent_radius_m, agent_height_m, allow_unknown_assets, style
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
     fn new(
@@ -95,11 +95,20 @@ impl PyEmbeddedSimulator {
         agent_radius_m: f64,
         agent_height_m: f64,
         allow_unknown_assets: bool,
+        style: &str,
     ) -> PyResult<Self> {
         let unknown = unknown_assets(allow_unknown_assets);
         let agent = AgentBody { radius_m: agent_radius_m, height_m: agent_height_m };
-        let config =
-            SimulatorConfig { image_px, vertical_fov_rad, clip_m, camera_height_m, agent, unknown };
+        let style = Style::of(style).map_err(error::to_py)?;
+        let config = SimulatorConfig {
+            image_px,
+            vertical_fov_rad,
+            clip_m,
+            camera_height_m,
+            agent,
+            unknown,
+            style,
+        };
         py.detach(|| EmbeddedSimulator::new(House::from_json(name, house_json)?, config))
             .map(Self::from)
             .map_err(error::to_py)
@@ -154,7 +163,7 @@ impl PyEmbeddedSimulator {
         rgb: bool,
         instances: bool,
     ) -> PyResult<Images<'py>> {
-        self.images(py, &self.core.view(&pose.pose()), Want { rgb, instances })
+        self.images(py, &self.core.view(&pose.pose()), self.core.want(rgb, instances))
     }
 
     #[pyo3(signature = (view, *, rgb, instances))]
@@ -165,7 +174,7 @@ impl PyEmbeddedSimulator {
         rgb: bool,
         instances: bool,
     ) -> PyResult<Images<'py>> {
-        self.images(py, &view.view(), Want { rgb, instances })
+        self.images(py, &view.view(), self.core.want(rgb, instances))
     }
 
     /// Return the indices of the bodies that AI2-THOR calls visible.
@@ -269,7 +278,7 @@ impl PyEmbeddedSimulator {
         let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
         let depth = arrays::image_of(py, depth, shape)?;
         let of_colours = || arrays::image_of(py, colours, [height, width, 3]);
-        let colours = want.rgb.then(of_colours).transpose()?;
+        let colours = want.rgb.is_some().then(of_colours).transpose()?;
         let ids = want.instances.then(|| arrays::image_of(py, ids, shape)).transpose()?;
         Ok((depth, colours, ids))
     }

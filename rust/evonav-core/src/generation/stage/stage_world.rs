@@ -13,7 +13,7 @@ use crate::{
     rng::Stream,
     sensors::{
         camera::Camera,
-        raster::{FrameBuffer, Want, render, visible_px},
+        raster::{FrameBuffer, Style, Want, render, visible_px},
     },
     world::{
         layout::{Layout, rounding::round_to},
@@ -186,7 +186,12 @@ impl StageWorld {
             let Some(path_m) = self.navigation.shortest_path(start_m, position) else {
                 return Ok(Err(GoalRejection::Unreachable));
             };
-            render(&self.mesh, &camera, Want { rgb: true, instances: true }, frame)?;
+            render(
+                &self.mesh,
+                &camera,
+                Want { rgb: Some(Style::default()), instances: true },
+                frame,
+            )?;
             let appearance = appearance_of(
                 &self.layout.items[index].asset,
                 self.house.objects[index].condition(),

@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use crate::{
     geometry::{Aabb, Mat3, Vec2, Vec3, rotate, sub},
-    sensors::camera::{Camera, View},
+    sensors::{
+        camera::{Camera, View},
+        raster::canvas::LANES,
+    },
     world::mesh::{Face, SceneMesh, dot},
 };
 
@@ -195,5 +198,69 @@ impl Lens {
             }
         };
         Some(([a, b, at_centre - a * self.centre_px[0] - b * self.centre_px[1]], facing))
+    }
+
+    /// Return the relation between pixels and world points.
+    pub fn rays(&self) -> Rays {
+        let [right, down, forward] = self.axes;
+        let (Optics::Perspective { focal_px: scale }
+        | Optics::Orthographic { pixels_per_m: scale }) = self.optics;
+        let [centre_u, centre_v] = self.centre_px;
+        let is_perspective = matches!(self.optics, Optics::Perspective { .. });
+        let along = |axis: usize| {
+            let (u, v) = (right[axis] / scale, down[axis] / scale);
+            let ahead = if is_perspective { forward[axis] } else { 0.0 };
+            [u, v, ahead - u * centre_u - v * centre_v].map(|term| term as f32)
+        };
+        Rays {
+            eye_m: self.eye_m.map(|x| x as f32),
+            forward: forward.map(|x| x as f32),
+            slopes: [0, 1, 2].map(along),
+            pixel: (1.0 / scale) as f32,
+            horizon_m: (!is_perspective).then_some(self.horizon_m() as f32),
+        }
+    }
+}
+
+/// World points of pixels, from their nearness.
+pub(super) struct Rays {
+    eye_m: [f32; 3],
+    forward: [f32; 3],
+    /// The coefficients, by world axis, of the ray at depth 1 (the ray's place in orthographic
+    /// views): `slopes . [u, v, 1]`.
+    slopes: [[f32; 3]; 3],
+    /// Width of a pixel at depth 1, or at any depth.
+    pixel: f32,
+    /// The result of [`Lens::horizon_m`] for orthographic views.
+    horizon_m: Option<f32>,
+}
+
+impl Rays {
+    /// Return the world points of a block of pixels, and the width of each pixel there, across the
+    /// ray.
+    #[inline(always)]
+    pub fn points(
+        &self,
+        row: usize,
+        block: usize,
+        nearness: &[f32; LANES],
+    ) -> ([[f32; LANES]; 3], [f32; LANES]) {
+        let v = row as f32 + 0.5;
+        let u: [f32; LANES] = std::array::from_fn(|lane| (block * LANES + lane) as f32 + 0.5);
+        let ray = self.slopes.map(|[du, dv, at]| u.map(|u| du * u + (dv * v + at)));
+        if let Some(horizon_m) = self.horizon_m {
+            let points_m = std::array::from_fn(|axis| {
+                std::array::from_fn(|lane| {
+                    let depth_m = horizon_m - nearness[lane];
+                    self.eye_m[axis] + ray[axis][lane] + self.forward[axis] * depth_m
+                })
+            });
+            return (points_m, [self.pixel; LANES]);
+        }
+        let depth_m = nearness.map(|w| 1.0 / w);
+        let points_m = std::array::from_fn(|axis| {
+            std::array::from_fn(|lane| self.eye_m[axis] + ray[axis][lane] * depth_m[lane])
+        });
+        (points_m, depth_m.map(|depth| depth * self.pixel))
     }
 }

@@ -4,7 +4,9 @@ mod canvas;
 mod lens;
 mod render;
 mod shader;
+mod style;
 mod visible_px;
 
 pub use render::{FrameBuffer, Want, render, render_view};
+pub use style::Style;
 pub use visible_px::visible_px;

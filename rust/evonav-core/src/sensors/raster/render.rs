@@ -13,6 +13,7 @@ use crate::{
             canvas::{Canvas, LANES},
             lens::{Lens, Optics, Scratch},
             shader::Shader,
+            style::Style,
         },
     },
     world::mesh::{PartMesh, SceneMesh},
@@ -21,8 +22,8 @@ use crate::{
 /// The images to render besides depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Want {
-    /// Whether to render shaded colours.
-    pub rgb: bool,
+    /// The style of colours to render, if any.
+    pub rgb: Option<Style>,
     /// Whether to render the body of each pixel.
     pub instances: bool,
 }
@@ -83,8 +84,8 @@ pub fn render_view(
     let Camera { width_px, height_px, .. } = view.camera;
     // Nothing beyond the far plane is nearer than an empty pixel.
     out.canvas.clear(width_px, height_px, lens.far_nearness());
-    if want.rgb {
-        out.shader.begin(mesh.faces.len(), [width_px, height_px], lens.optics);
+    if let Some(style) = want.rgb {
+        out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
     lens.collect_visible(mesh, &mut out.scratch.visible);
     for index in 0..out.scratch.visible.len() {
@@ -106,7 +107,7 @@ pub(super) fn draw_part(
     let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
     for index in part.faces.clone() {
         let face = &mesh.faces[index];
-        let Some((plane, facing)) = lens.nearness_plane(face) else { continue };
+        let Some(found) = lens.nearness_plane(face) else { continue };
         let Scratch { local_m, projected_px, clipped_m, polygon_px, .. } = scratch;
         polygon_px.clear();
         let corners = mesh.corners_of(face);
@@ -119,11 +120,11 @@ pub(super) fn draw_part(
         } else {
             polygon_px.extend(corners.iter().map(|&i| projected_px[i as usize]));
         }
-        let tag = if want.rgb { index as u32 } else { face.body } + 1;
-        if want.rgb {
-            shader.light(index, face, facing);
+        let tag = if want.rgb.is_some() { index as u32 } else { face.body } + 1;
+        if let Some(style) = want.rgb {
+            shader.note(style, mesh, index, found);
         }
-        canvas.fill(polygon_px, plane, tag);
+        canvas.fill(polygon_px, found.0, tag);
     }
 }
 
@@ -167,17 +168,17 @@ fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     }
     instances.resize(if want.instances { num_pixels } else { 0 }, 0);
     match want {
-        Want { instances: true, rgb: true } => {
+        Want { instances: true, rgb: Some(_) } => {
             unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
         }
-        Want { instances: true, rgb: false } => {
+        Want { instances: true, rgb: None } => {
             unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
         }
         Want { instances: false, .. } => {}
     }
-    rgb.resize(if want.rgb { 3 * num_pixels } else { 0 }, 0);
-    if want.rgb {
-        shader.shade(canvas, rgb);
+    rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
+    if let Some(style) = want.rgb {
+        shader.shade(style, mesh, lens, canvas, rgb);
     }
 }
 

@@ -57,7 +57,7 @@ pub fn visible_px(
     lens.collect_visible(mesh, &mut frame.scratch.visible);
     for index in 0..frame.scratch.visible.len() {
         let part = &mesh.parts[frame.scratch.visible[index].1 as usize];
-        draw_part(mesh, part, &lens, Want { rgb: false, instances: true }, frame);
+        draw_part(mesh, part, &lens, Want { rgb: None, instances: true }, frame);
     }
     let tag = body as u32 + 1;
     let canvas = &frame.canvas;

@@ -1,26 +1,18 @@
-//! Compute colours after visibility.
+//! Surfaces of one colour each, with dark corners and, if outlined, lines around silhouettes.
 //!
-//! A face has one colour, lit from above and from one side so that the faces of a box differ. In
-//! addition, each pixel is shaded from depth alone: by a lamp at the camera, so that walls fade
-//! with angle; by darkness in concave corners and where objects stand; and by a thin line around
-//! silhouettes.
+//! A face is lit from above and from one side so that the faces of a box differ, and by a lamp at
+//! the camera, so that walls fade with angle.
 
 use crate::{
     geometry::Vec3,
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::Optics,
+        shader::bends::Bends,
     },
     world::mesh::{Face, dot},
 };
 
-/// Width of the corners' darkness, as a share of the image's height.
-const CORNER_REACH: f64 = 0.012;
-/// Darkness of a corner; `LINE_SHADE` is that of a silhouette's line.
-const CORNER_SHADE: f32 = 0.38;
-const LINE_SHADE: f32 = 0.30;
-/// Bend in the middle of a corner of a room.
-const FULL_BEND: f32 = 0.7;
 /// Share of a face's light that comes from the camera.
 const LAMP_SHARE: f32 = 0.36;
 /// Brightness of black surfaces; without it their corners would be invisible.
@@ -44,35 +36,28 @@ impl LitFace {
 
 /// Colours of the faces in view, and working memory for one row.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Shader {
+pub(super) struct Flat {
     /// Lit faces by tag; 0 is the background.
     faces: Vec<LitFace>,
     /// Size of the view for which `shortness` was computed.
     size_px: [usize; 2],
     optics: Option<Optics>,
-    is_orthographic: bool,
-    /// Pixels per metre; in perspective views at depth 1.
-    scale_px: f32,
     /// One over the length of each pixel's ray at depth 1; see [`Self::level_facing`] for
     /// orthographic views.
     shortness: Vec<[f32; LANES]>,
-    /// The current row, continued at both ends.
-    padded: Vec<f32>,
-    light: Vec<f32>,
+    bends: Bends,
 }
 
-impl Shader {
+impl Flat {
     pub fn begin(&mut self, num_faces: usize, size_px: [usize; 2], optics: Optics) {
         self.faces.resize(num_faces + 1, LitFace::SKY);
         if (size_px, Some(optics)) == (self.size_px, self.optics) {
             return;
         }
         (self.size_px, self.optics) = (size_px, Some(optics));
-        (self.is_orthographic, self.scale_px) = match optics {
-            Optics::Perspective { focal_px } => (false, focal_px as f32),
-            Optics::Orthographic { pixels_per_m } => (true, pixels_per_m as f32),
-        };
-        let (scale_px, [width, height]) = (self.scale_px, size_px.map(|side| side as f32));
+        let (Optics::Perspective { focal_px: scale }
+        | Optics::Orthographic { pixels_per_m: scale }) = optics;
+        let (scale_px, [width, height]) = (scale as f32, size_px.map(|side| side as f32));
         let shortness = |row: usize, block: usize| {
             std::array::from_fn(|lane| {
                 let right = ((block * LANES + lane) as f32 + 0.5 - width / 2.0) / scale_px;
@@ -96,65 +81,14 @@ impl Shader {
     }
 
     /// Fill `rgb` from a drawn canvas.
-    pub fn shade(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
+    pub fn shade(&mut self, canvas: &Canvas, optics: Optics, has_lines: bool, rgb: &mut [u8]) {
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            self.darken(canvas, row);
-            if self.is_orthographic {
+            self.bends.darken(canvas, row, optics, has_lines);
+            if let Optics::Orthographic { .. } = optics {
                 self.level_facing(canvas, row);
             }
             self.paint(canvas, row, pixels);
         }
-    }
-
-    /// Set `light` to the light that corners and silhouettes leave in a row.
-    fn darken(&mut self, canvas: &Canvas, row: usize) {
-        let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
-        self.light.clear();
-        self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
-        self.pad(canvas.row(row), canvas.width_px, corner_px);
-        for (reach_px, is_line) in [(corner_px, false), (1, true)] {
-            let scale = self.scale_px / reach_px as f32;
-            let centre = canvas.row(row);
-            let has_both = row >= reach_px && row + reach_px < canvas.height_px;
-            let (above, below) = match has_both {
-                true => (canvas.row(row - reach_px), canvas.row(row + reach_px)),
-                false => (centre, centre),
-            };
-            let left = &self.padded[corner_px - reach_px..];
-            let right = &self.padded[corner_px + reach_px..];
-            let width = canvas.width_px;
-            let neighbours = [left, right, above, below].map(|row| &row[..width]);
-            let (light, centre) = (&mut self.light[..width], &centre[..width]);
-            // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
-            let in_perspective = |nearness: f32| nearness + 1e-6;
-            let orthographic = |_: f32| 1.0;
-            match (is_line, self.is_orthographic) {
-                (true, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, line_shade)
-                }
-                (false, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, corner_shade)
-                }
-                (true, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, line_shade)
-                }
-                (false, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, corner_shade)
-                }
-            }
-        }
-    }
-
-    /// Copy a row and continue it on both sides linearly, as the planes there continue.
-    fn pad(&mut self, row: &[f32], width_px: usize, reach_px: usize) {
-        let row = &row[..width_px];
-        let (first, last) = (row[0], row[width_px - 1]);
-        let (second, one_but_last) = (row[1.min(width_px - 1)], row[width_px.saturating_sub(2)]);
-        self.padded.clear();
-        let ahead = (1..=reach_px).rev().map(|k| first + (first - second) * k as f32);
-        self.padded.extend(ahead);
-        self.padded.extend_from_slice(row);
-        self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
     }
 
     /// Set `shortness` so that nearness times `shortness` is 1 in a row: all rays are along the
@@ -174,7 +108,7 @@ impl Shader {
         let tags = &canvas.tags[blocks.clone()];
         let depths = canvas.nearness[blocks.clone()].iter().zip(&self.shortness[blocks]);
         for ((tags, (nearness, shortness)), lights) in
-            tags.iter().zip(depths).zip(self.light.as_chunks().0)
+            tags.iter().zip(depths).zip(self.bends.light.as_chunks().0)
         {
             let facing = std::array::from_fn(|lane| nearness[lane] * shortness[lane]);
             let rgb = self.colours(tags, &facing, lights);
@@ -213,39 +147,8 @@ impl Shader {
 
 /// Round a number of 0 or more to the low byte of the result, at most 255. The mantissa of a sum
 /// with 2^23 is used, which unlike a conversion needs no treatment of numbers out of range.
-fn to_byte(value: f32) -> u32 {
+pub(super) fn to_byte(value: f32) -> u32 {
     (value.min(255.0) + 8_388_608.0).to_bits()
-}
-
-/// Darken `light` by the `shade` of the bend of each pixel's surroundings.
-///
-/// Nearness is linear on a plane. The bend is the difference of nearness between the surroundings
-/// and a plane, in `unit`s and relative to the neighbours' spacing.
-#[inline(always)]
-fn darken_row(
-    light: &mut [f32],
-    centre: &[f32],
-    [left, right, above, below]: [&[f32]; 4],
-    scale: f32,
-    unit: impl Fn(f32) -> f32,
-    shade: impl Fn(f32) -> f32,
-) {
-    for i in 0..light.len() {
-        let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
-        let bend = (around - centre[i]) / unit(centre[i]) * scale;
-        light[i] *= 1.0 - shade(bend);
-    }
-}
-
-/// Return the darkness in a corner. A large bend is not a corner but a surface far behind an edge.
-fn corner_shade(bend: f32) -> f32 {
-    let is_corner = (1.8 - bend).clamp(0.0, 1.0);
-    CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
-}
-
-/// Return the darkness of a silhouette's line.
-fn line_shade(bend: f32) -> f32 {
-    LINE_SHADE * (bend - 1.0).clamp(0.0, 1.0)
 }
 
 /// Direction of the weaker light.

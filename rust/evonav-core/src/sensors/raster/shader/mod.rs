@@ -1,0 +1,66 @@
+//! Compute colours after visibility, in one of the [`Style`]s.
+
+mod bends;
+mod flat;
+mod lit;
+mod surface;
+
+use crate::{
+    geometry::Vec3,
+    sensors::raster::{
+        canvas::Canvas,
+        lens::Lens,
+        shader::{flat::Flat, lit::Lit},
+        style::Style,
+    },
+    world::mesh::SceneMesh,
+};
+
+/// The faces in view, as each style knows them, and working memory.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Shader {
+    flat: Flat,
+    lit: Lit,
+}
+
+impl Shader {
+    pub fn begin(&mut self, style: Style, mesh: &SceneMesh, lens: &Lens, size_px: [usize; 2]) {
+        match style {
+            Style::Outlined | Style::Plain => {
+                self.flat.begin(mesh.faces.len(), size_px, lens.optics);
+            }
+            Style::Default => self.lit.begin(mesh.faces.len()),
+        }
+    }
+
+    /// Note a face that may be seen, with the results of [`Lens::nearness_plane`].
+    #[inline]
+    pub fn note(
+        &mut self,
+        style: Style,
+        mesh: &SceneMesh,
+        index: usize,
+        (plane, facing): (Vec3, f64),
+    ) {
+        match style {
+            Style::Outlined | Style::Plain => self.flat.light(index, &mesh.faces[index], facing),
+            Style::Default => self.lit.note(index, plane, facing),
+        }
+    }
+
+    /// Fill `rgb` from a drawn canvas whose tags are indices of faces plus 1.
+    pub fn shade(
+        &mut self,
+        style: Style,
+        mesh: &SceneMesh,
+        lens: &Lens,
+        canvas: &Canvas,
+        rgb: &mut [u8],
+    ) {
+        match style {
+            Style::Outlined => self.flat.shade(canvas, lens.optics, true, rgb),
+            Style::Plain => self.flat.shade(canvas, lens.optics, false, rgb),
+            Style::Default => self.lit.shade(mesh, lens, canvas, rgb),
+        }
+    }
+}

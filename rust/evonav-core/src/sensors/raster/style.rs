@@ -1,0 +1,40 @@
+//! The ways in which colours are drawn.
+
+use crate::Error;
+
+/// A way to draw colours. Depth and instances do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Style {
+    /// Flat colours with dark corners, and thin lines around silhouettes: clear to people.
+    #[default]
+    Outlined,
+    /// Colours of [`Self::Outlined`] without the lines, the cheapest.
+    Plain,
+    /// Lit surfaces with smooth edges, for detectors and models that know photographs.
+    Default,
+}
+
+impl Style {
+    /// All styles with their names.
+    pub const NAMES: [(&str, Self); 3] =
+        [("outlined", Self::Outlined), ("plain", Self::Plain), ("default", Self::Default)];
+
+    /// Return the style of a name.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such style.
+    ///
+    /// # Examples
+    /// ```
+    /// # use evonav_core::sensors::raster::Style;
+    /// assert_eq!(Style::of("plain").unwrap(), Style::Plain);
+    /// assert!(Style::of("cartoon").is_err());
+    /// ```
+    pub fn of(name: &str) -> Result<Self, Error> {
+        let found = Self::NAMES.iter().find(|(known, _)| *known == name);
+        let expected = Self::NAMES.map(|(known, _)| known).join(", ");
+        found.map(|&(_, style)| style).ok_or_else(|| {
+            Error::invalid("style", format!("{name:?}"), &format!("one of {expected}"))
+        })
+    }
+}
