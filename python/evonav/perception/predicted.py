@@ -339,7 +339,7 @@ def predicted_perception(
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
         options: See `StackConfig`; of `mini`, which needs neither models nor a device,
-            `evonav.perception.mini.MiniPerception`.
+            `evonav.perception.mini.MiniPerception`, and of `coco` `evonav.perception.coco.CocoPerception`.
 
     Raises:
         InvalidArgumentError: There is no such stack or option.
@@ -348,6 +348,12 @@ def predicted_perception(
         from evonav.perception.mini import MiniPerception
 
         return MiniPerception(**options)
+    if stack == "coco":
+        from evonav.perception.coco import CocoPerception
+
+        if device not in ("auto", "cpu"):
+            raise InvalidArgumentError(f"predicted:coco computes on the processor, not on {device!r}: leave device out")
+        return CocoPerception(models, **options)
     if stack != "auto" and stack not in STACKS:
-        raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}, mini")
+        raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}, mini, coco")
     return StackPerception(stack, StackConfig.from_options(options), models, device)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 GROUND_TRUTH = "evonav.perception.ground_truth:GroundTruthPerception"
 NOISY = "evonav.perception.simulated:noisy_perception"
 PREDICTED = "evonav.perception.predicted:predicted_perception"
-STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")
+STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini", "coco")
 """Stacks of models; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others."""
 _HOST_OPTIONS = ("models", "device")
 """Options that depend on this machine: the folder of the models' weights, and the device."""

