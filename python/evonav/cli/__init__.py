@@ -13,6 +13,7 @@ from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.results.breakdown import breakdown
 from evonav.cli.results.compare import compare
 from evonav.cli.results.export import export
+from evonav.cli.results.leaderboard import leaderboard
 from evonav.cli.results.paper import paper
 from evonav.cli.results.perception import perception
 from evonav.cli.results.report import report, strip
@@ -38,7 +39,7 @@ PANELS = {
     "Results": (report, view, compare, breakdown, failures, export),
     "Data": (houses_app, tasks_app),
     "Study": (paper, controlled_app, perception),
-    "Submit": (pack, verify),
+    "Submit": (pack, verify, leaderboard),
     "Tools": (video, strip, rerun, mock_vlm),
 }
 """Commands and groups of commands under their headings in the help."""

@@ -9,6 +9,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +20,7 @@ from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.provenance import KEY as SESSIONS_KEY
 from evonav.parallel.folders import replacing
 
 SUFFIX = ".evonav.zip"
@@ -29,7 +31,8 @@ MAX_RATIO = 100
 MAX_HEADER_BYTES = 64 << 20
 MAX_LINE_BYTES = 64 << 20
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Time stamp of every member, so that equal runs give equal bytes."""
+"""Time stamp of the members if it is not known when the run began."""
+_Time = tuple[int, int, int, int, int, int]
 
 
 class SubmissionError(StoreError):
@@ -100,11 +103,12 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
     """
     with RunStore(run_dir) as store:
         header, texts = _read_run(store, run_dir, agents)
+        began = _began(store)
     header = header.model_copy(update={"about": about or About()})
     with replacing(out) as beside, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        _write(archive, HEADER_NAME, (header.model_dump_json(indent=2) + "\n").encode())
+        _write(archive, HEADER_NAME, (header.model_dump_json(indent=2) + "\n").encode(), began)
         for part in header.records:
-            _write(archive, part.member, texts[part.agent])
+            _write(archive, part.member, texts[part.agent], began)
     return header
 
 
@@ -131,6 +135,12 @@ class SubmissionFile:
             raise SubmissionError(f"{path}: not a submission ({error})") from error
         self.header = self._read_header()
         self._check_members()
+
+    @property
+    def date(self) -> str | None:
+        """Day on which the run began, such as `2026-11-23`, by the archive's time stamps; `None` if they tell none."""
+        time = self._archive.getinfo(HEADER_NAME).date_time
+        return None if time == _EPOCH else "{:04}-{:02}-{:02}".format(*time)
 
     def __enter__(self) -> "SubmissionFile":
         return self
@@ -240,8 +250,17 @@ def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> t
     return header, texts
 
 
-def _write(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
-    info = zipfile.ZipInfo(name, _EPOCH)
+def _began(store: RunStore) -> _Time:
+    """Return when the run began, in UTC: the time stamp of every member, so that equal runs give equal bytes."""
+    sessions = store.meta(SESSIONS_KEY) or [{}]
+    try:
+        return datetime.fromisoformat(sessions[0]["began"]).astimezone(timezone.utc).timetuple()[:6]
+    except (KeyError, ValueError):
+        return _EPOCH
+
+
+def _write(archive: zipfile.ZipFile, name: str, data: bytes, time: _Time) -> None:
+    info = zipfile.ZipInfo(name, time)
     info.compress_type = zipfile.ZIP_DEFLATED
     info.external_attr = 0o644 << 16
     archive.writestr(info, data)

@@ -85,7 +85,7 @@ def verify(
     try:
         with SubmissionFile(path) as file:
             header = file.header
-            records = {part.agent: _records(file, part) for part in header.records}
+            records = {part.agent: read_records(file, part) for part in header.records}
     except SubmissionError as error:
         return Verdict((Check("file", False, str(error)),), None, False)
     checks.append(Check("file", True, f"records: {sum(map(len, records.values()))}, agents: {', '.join(records)}"))
@@ -165,7 +165,12 @@ def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
             yield f"{where}: {field} is {claimed}, its path gives {value}"
 
 
-def _records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
+def read_records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
+    """Return the records of one agent.
+
+    Raises:
+        SubmissionError: The member is not what the header says, or a line is not a record as evonav writes it.
+    """
     records = []
     for number, text in enumerate(file.texts(part), start=1):
         try:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from evonav.submission.verify import Verdict
 
 EXIT_REJECTED = 1
+SCORES_ONLY_HELP = "Recompute the scores from the recorded paths, without replaying the actions: faster, proves less."
 
 
 def pack(
@@ -56,10 +57,7 @@ def verify(
     subset: Subset = None,
     scores_only: Annotated[
         bool,
-        typer.Option(
-            "--scores-only",
-            help="Recompute the scores from the recorded paths, without replaying the actions: faster, proves less.",
-        ),
+        typer.Option("--scores-only", help=SCORES_ONLY_HELP),
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON instead of a table.")] = False,
 ) -> None:

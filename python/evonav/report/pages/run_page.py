@@ -14,6 +14,7 @@ from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_name, outcome_words, stage_svg
 from evonav.report.pages.highlights import highlights_first
+from evonav.report.pages.rate_bar import rate_bar
 from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, text_of
@@ -25,7 +26,6 @@ from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.tables.run_tables import run_tables, statements
-from evonav.statistics import Interval
 
 MAX_OPEN_STAGES = 400
 """Recorded stages up to which maps stand in the page as they are; beyond, each task is packed until it is looked at."""
@@ -154,7 +154,7 @@ def _template_values(run: Run, found: Sequence[tables.Table], *, has_replays: bo
     used = {outcome.cause for outcome in run.outcomes.values()}
     columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
     css = text_of("report.css") + map_css() + plot_css() + columns
-    js = text_of("report.js")
+    js = text_of("sortable.js") + text_of("report.js")
     return {
         "run": run,
         "name": run.run_dir.resolve().name,
@@ -194,15 +194,4 @@ def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
 
 def _bars(summary: AgentSummary) -> list[Markup]:
     """Draw SR and SPL with their intervals on a scale of 0 to 100%."""
-    return [_bar(summary.sr, summary.sr_ci95), _bar(summary.spl, summary.spl_ci95)]
-
-
-def _bar(value: float | None, interval: Interval | None) -> Markup:
-    if value is None:
-        return Markup("")
-    low, high = interval or (value, value)
-    return Markup(
-        '<svg class="bar" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">'
-        '<rect class="track" width="100" height="10"/><rect class="value" width="{:.2f}" height="10"/>'
-        '<path class="whisker" d="M{:.2f} 5H{:.2f}M{:.2f} 2V8M{:.2f} 2V8"/></svg>'
-    ).format(100 * value, 100 * low, 100 * high, 100 * low, 100 * high)
+    return [rate_bar(summary.sr, summary.sr_ci95), rate_bar(summary.spl, summary.spl_ci95)]

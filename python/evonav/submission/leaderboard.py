@@ -1,0 +1,208 @@
+"""Rank packed runs: each file is verified, and only agents that were evaluated alike share a table."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics.navigation import AgentSummary, summarise
+from evonav.evaluation.records.former_paths import with_current_paths
+from evonav.evaluation.run.components import Backend
+from evonav.perception.shorthand import word_of
+from evonav.submission.pack import SUFFIX, Submission, SubmissionError, SubmissionFile
+from evonav.submission.verify import Verdict, read_records, verify
+from evonav.tasks.listing import TaskFile
+
+_SIMULATOR = f"{Backend.__module__}:embedded_simulator"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSet:
+    """Tasks that an entry of a leaderboard has to contain, all of them."""
+
+    name: str
+    tasks: tuple[TaskFile, ...]
+
+    @property
+    def num_stages(self) -> int:
+        """Number of stages of all tasks."""
+        return sum(task.num_stages for task in self.tasks)
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 over the ids and checksums of the tasks, in order of their ids."""
+        lines = sorted(f"{task.task_id} {task.digest}\n" for task in self.tasks)
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Conditions that two agents must share to be compared."""
+
+    task_set: str
+    """SHA-256 of the task set."""
+    perception: str
+    """Perception, as `--perception` names it."""
+    decision: str
+    """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
+    simulator: str
+    """Simulator, unless it is the usual one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """An agent of a file that was verified."""
+
+    file: str
+    summary: AgentSummary
+    header: Submission
+    date: str | None
+    model: str
+    """The decision model's name, if it has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unranked:
+    """A file, or an agent of it, that has no place in a table."""
+
+    file: str
+    status: str
+    """`incomplete`, `rejected` or `repeated`."""
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Leaderboard:
+    """Packed runs, by the conditions under which they are comparable."""
+
+    tables: dict[Conditions, list[Entry]] = field(default_factory=dict)
+    """Entries under the same conditions, the largest SR first."""
+    task_sets: dict[str, TaskSet] = field(default_factory=dict)
+    """The task sets by their SHA-256."""
+    unranked: list[Unranked] = field(default_factory=list)
+    is_rescored: bool = True
+    """True if the actions of every entry were executed again."""
+
+
+def packed_files(paths: Iterable[Path]) -> list[Path]:
+    """List packed runs: the files named, and those in the folders named and below them.
+
+    Raises:
+        InvalidArgumentError: There is none.
+    """
+    named = list(paths)
+    found = [file for path in named for file in (sorted(path.rglob(f"*{SUFFIX}")) if path.is_dir() else [path])]
+    if not found:
+        where = ", ".join(map(str, named))
+        raise InvalidArgumentError(f"{where}: no packed run (*{SUFFIX}); `evonav pack RUN` writes one")
+    return list(dict.fromkeys(found))
+
+
+def rank(
+    files: Sequence[Path],
+    task_sets: Sequence[TaskSet],
+    *,
+    scores_only: bool = False,
+    num_workers: int = 0,
+    on_progress: Callable[[int, int, str], None] = lambda _done, _all, _name: None,
+) -> Leaderboard:
+    """Verify packed runs, and sort their agents into tables.
+
+    Args:
+        files: Packed runs.
+        task_sets: Sets of tasks. An entry has all tasks of one of them.
+        scores_only: Compute scores from the recorded paths instead of executing the actions again.
+        num_workers: Number of processes; 0 runs in this one.
+        on_progress: Called with the number of files verified, of all, and the name of the next one.
+    """
+    board = Leaderboard(task_sets={one.sha256: one for one in task_sets}, is_rescored=not scores_only)
+    seen: dict[tuple[Conditions, str], str] = {}
+    for number, path in enumerate(files):
+        on_progress(number, len(files), path.name)
+        try:
+            with SubmissionFile(path) as file:
+                header, date = file.header, file.date
+            tasks = _task_set(header, task_sets)
+            known = {packed.task_id for packed in header.tasks}
+            required = [task for task in tasks.tasks if task.task_id in known]
+            verdict = verify(path, required, scores_only=scores_only, num_workers=num_workers)
+            if (reason := _refusal(path, verdict, header, tasks)) is not None:
+                board.unranked.append(reason)
+                continue
+            entries = list(_entries(path, header, date))
+        except SubmissionError as error:
+            board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
+            continue
+        conditions = _conditions(header, tasks)
+        for sha256, entry in entries:
+            if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
+                detail = f"{entry.summary.agent} has the same records as in {first}"
+                board.unranked.append(Unranked(path.name, "repeated", detail))
+                continue
+            board.tables.setdefault(conditions, []).append(entry)
+    for entries_of_table in board.tables.values():
+        entries_of_table.sort(key=lambda entry: (-(entry.summary.sr or 0), -(entry.summary.spl or 0), entry.file))
+    on_progress(len(files), len(files), "")
+    return board
+
+
+def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
+    """Return the set with the most tasks of a file.
+
+    Raises:
+        SubmissionError: No set has any.
+    """
+    packed = {(task.task_id, task.digest) for task in header.tasks}
+    common = [len(packed & {(task.task_id, task.digest) for task in one.tasks}) for one in task_sets]
+    if not any(common):
+        raise SubmissionError("its tasks are not among those to verify with: name their folder with --tasks")
+    fewest = min(len(one.tasks) for one, number in zip(task_sets, common, strict=True) if number == max(common))
+    return next(
+        one for one, number in zip(task_sets, common, strict=True) if number == max(common) and len(one.tasks) == fewest
+    )
+
+
+def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -> Unranked | None:
+    failed = next((check for check in verdict.checks if not check.is_passed), None)
+    if failed is not None:
+        status = "incomplete" if failed.name == "complete" else "rejected"
+        return Unranked(path.name, status, f"{failed.name}: {failed.detail.removeprefix(f'{path}: ')}")
+    if len(header.tasks) < len(tasks.tasks):
+        return Unranked(path.name, "incomplete", f"{len(header.tasks)} of {len(tasks.tasks)} tasks of {tasks.name}")
+    return None
+
+
+def _entries(path: Path, header: Submission, date: str | None) -> Iterable[tuple[str, Entry]]:
+    """Yield each agent of a verified file with the SHA-256 of its records."""
+    num_stages = sum(task.num_stages for task in header.tasks)
+    model = _options(header, "decision").get("model", _options(header, "decision").get("path", ""))
+    with SubmissionFile(path) as file:
+        for part in header.records:
+            summary = summarise(part.agent, read_records(file, part), num_stages)
+            yield part.sha256, Entry(path.name, summary, header, date, str(model))
+
+
+def _conditions(header: Submission, tasks: TaskSet) -> Conditions:
+    parts = _parts(header)
+    kind = str(parts.get("decision", "")).rpartition(":")[2].removesuffix("_match")
+    noise = _options(header, "decision").get("noise")
+    rates = [f"{name}={value}" for name, value in noise.items()] if isinstance(noise, dict) else []
+    simulator = str(parts.get("simulator", ""))
+    return Conditions(
+        task_set=tasks.sha256,
+        perception=word_of(str(parts.get("perception", "")), _options(header, "perception")),
+        decision=",".join([kind, *rates]),
+        simulator="" if simulator == _SIMULATOR else simulator,
+    )
+
+
+def _parts(header: Submission) -> dict[str, Any]:
+    backend = with_current_paths(header.config.get("backend"))
+    return backend if isinstance(backend, dict) else {}
+
+
+def _options(header: Submission, part: str) -> dict[str, Any]:
+    options = _parts(header).get(f"{part}_options")
+    return options if isinstance(options, dict) else {}
