@@ -39,6 +39,8 @@ def masks_of_boxes(view: DetectorView, boxes_px: NDArray[np.float32]) -> NDArray
         box = np.s_[first_row:end_row, first_col:end_col]
         depth_m = view.depth_m[box]
         middle_m = _middle_m(depth_m)
+        if not math.isfinite(middle_m):
+            continue
         reach_m = REACH * max(right - left, bottom - top) / focal_px * middle_m
         mask[box] = above_floor[box] & (np.abs(depth_m - middle_m) < reach_m)
     return masks
