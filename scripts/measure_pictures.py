@@ -18,7 +18,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # more threads take longer on a machine that does other work, too
 
@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from picture_sheets import contact_sheet, paired_sheet
 from picture_statistics import PictureStatistics, resized, statistics_of
-from picture_views import CLASSES_OF_TYPE, SETS, PictureView, fullest_views, houses_of_set, views
+from picture_views import CLASSES_OF_TYPE, LIKE_RECORDED, SETS, PictureView, fullest_views, houses_of_set, views
 from PIL import Image
 from rich.console import Console
 from rich.table import Table
@@ -35,6 +35,7 @@ from evonav.errors import EvonavError
 from evonav.perception.coco import COCO_CLASSES, TYPE_OF_CLASS, weights_path
 from evonav.perception.models.yolov4_tiny import Boxes, YoloV4Tiny, box_ious, load_yolov4_tiny
 from evonav.statistics import wilson
+from evonav.world.simulator import Style
 
 SIDE_PX = 608
 MIN_CONFIDENCE = 0.1
@@ -43,8 +44,6 @@ STRICT = 0.2
 """Confidence below which OpenCV's reader of Darknet drops detections, whatever it is asked for."""
 SURE = 0.25
 """Confidence from which a detection counts as one that the detector fires."""
-RECORDED_HORIZON_DEG = 30.0
-"""Angle by which the camera of the recorded frames looks down."""
 NUM_STATISTICS = 100
 """Views whose statistics are compared with recorded frames."""
 
@@ -90,8 +89,7 @@ def main() -> None:
         recalls = recall_by_type(network, views(measured, asked.views, asked.seed, style=asked.style))
         result["recall"] = {name: recall.as_json() for name, recall in recalls.items()}
         console.print(recall_table(recalls, asked.set))
-    level = (RECORDED_HORIZON_DEG, RECORDED_HORIZON_DEG)
-    ours = [view.rgb for view in views(measured, NUM_STATISTICS, asked.seed, style=asked.style, horizons_deg=level)]
+    ours = [view.rgb for view in views(measured, NUM_STATISTICS, asked.seed, style=asked.style, looks=LIKE_RECORDED)]
     recorded = [frame for folder in asked.recorded for frame in recorded_frames(folder)]
     columns = {"ours": statistics_of(ours)}
     if recorded:
@@ -109,7 +107,7 @@ def main() -> None:
         found = None if network is None or not asked.boxes else [matched(network, view) for view in shown]
         contact_sheet(shown, found).save(asked.out / "sheet.png")
         if recorded:
-            beside = fullest_views(design, asked.sheet, asked.seed, style=asked.style, horizons_deg=level)
+            beside = fullest_views(design, asked.sheet, asked.seed, style=asked.style, looks=LIKE_RECORDED)
             paired_sheet(recorded, [view.rgb for view in beside]).save(asked.out / "beside.png")
     console.print(f"{asked.out}: {', '.join(sorted(path.name for path in asked.out.iterdir()))}")
 
@@ -182,19 +180,26 @@ def recall_table(recalls: dict[str, Recall], which: str) -> Table:
 
 
 def statistics_table(columns: dict[str, PictureStatistics], fires: dict[str, dict[str, float]]) -> Table:
-    """Return the statistics of several sets of pictures side by side."""
+    """Return the statistics of several sets of pictures side by side, and how far the first is from the last."""
     table = Table(title="Statistics of pictures")
     table.add_column("statistic")
-    rows: dict[str, list[str]] = defaultdict(list)
+    rows: dict[str, list[float]] = defaultdict(list)
     for name, one in columns.items():
         table.add_column(f"{name} ({one.num_pictures})", justify="right")
-        for label, value in one.rows():
+        for label, value in (one.rows() | fires_rows(fires.get(name, {}))).items():
             rows[label].append(value)
-        for label, rate in fires.get(name, {}).items():
-            rows[f"detections of {SURE} a frame, {label}"].append(f"{rate:.2f}")
+    if len(columns) > 1:
+        table.add_column("difference", justify="right")
     for label, values in rows.items():
-        table.add_row(label, *values)
+        shown = [f"{value:.1%}" if "share" in label else f"{value:.3g}" for value in values]
+        difference = [f"{values[0] / values[-1] - 1.0:+.0%}"] if len(columns) > 1 and values[-1] else []
+        table.add_row(label, *shown, *difference)
     return table
+
+
+def fires_rows(fires: dict[str, float]) -> dict[str, float]:
+    """Return how often the detector fires, by label."""
+    return {f"detections of {SURE} a frame, {label}": value for label, value in fires.items()}
 
 
 def _arguments() -> argparse.Namespace:
@@ -202,7 +207,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--houses", nargs="+", default=["bundled"], help="house files; default: the bundled ones")
     parser.add_argument("--views", type=int, default=320)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--style", default="default", help="style that the simulator draws in")
+    parser.add_argument("--style", choices=get_args(Style), default="default", help="style that the simulator draws in")
     parser.add_argument("--set", choices=SETS, default="held-out", help="houses to measure on")
     parser.add_argument("--recorded", nargs="*", type=Path, default=[], help="folders of recorded AI2-THOR frames")
     parser.add_argument("--sheet", type=int, default=0, metavar="N", help="views of design houses to draw on a sheet")

@@ -1,6 +1,6 @@
 """Computes statistics of pictures for `measure_pictures.py`: detail, luminance and saturation."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,15 +40,17 @@ class PictureStatistics:
             "saturation_mean_spread": self.saturation,
         }
 
-    def rows(self) -> Iterator[tuple[str, str]]:
-        """Yield labels and values for a table."""
-        yield "neighbours equal within half a grey level", f"{self.equal_neighbours:.1%}"
-        for low, high, share in zip(EDGES, EDGES[1:], self.gradients, strict=False):
-            yield f"differences of {low:g} to {high:g}", f"{share:.1%}"
-        yield "luminance, mean", f"{self.luminance[0]:.0f}"
-        yield "luminance, spread", f"{self.luminance[1]:.0f}"
-        yield "saturation, mean", f"{self.saturation[0]:.2f}"
-        yield "saturation, spread", f"{self.saturation[1]:.2f}"
+    def rows(self) -> dict[str, float]:
+        """Return the values by label."""
+        bins = zip(EDGES, EDGES[1:], self.gradients, strict=False)
+        return {
+            "neighbours equal within half a grey level, share": self.equal_neighbours,
+            **{f"differences of {low:g} to {high:g}, share": share for low, high, share in bins},
+            "luminance, mean": self.luminance[0],
+            "luminance, spread": self.luminance[1],
+            "saturation, mean": self.saturation[0],
+            "saturation, spread": self.saturation[1],
+        }
 
 
 def statistics_of(pictures: Sequence[NDArray[np.uint8]]) -> PictureStatistics:

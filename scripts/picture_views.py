@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -17,14 +17,12 @@ from numpy.typing import NDArray
 from evonav.house.files import HouseTexts
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
-from evonav.world.simulator import Frame, SimulatorConfig
+from evonav.world.simulator import Frame, SimulatorConfig, Style
 
 HouseSet = Literal["design", "held-out"]
 SETS: tuple[HouseSet, ...] = get_args(HouseSet)
 VIEWS_A_HOUSE = 4
 """Fewest views of a house; with few houses there are more."""
-HORIZONS_DEG = (0.0, 30.0)
-"""Least and greatest angle by which the camera looks down."""
 MIN_AREA = 0.01
 """Part of the picture that an object must fill."""
 
@@ -62,6 +60,26 @@ CLASSES_OF_TYPE: dict[str, tuple[str, ...]] = {
     "Vase": ("vase",),
     "WineBottle": ("bottle",),
 }
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Directions that the camera is drawn from."""
+
+    horizons_deg: tuple[float, float] = (0.0, 30.0)
+    """Least and greatest angle by which it looks down."""
+    quarter_turns: bool = False
+    """Whether yaws are multiples of 90 degrees."""
+
+    def draw(self, rng: np.random.Generator) -> tuple[float, float]:
+        """Return a yaw and a horizon in radians."""
+        yaw_deg = 90.0 * int(rng.integers(4)) if self.quarter_turns else float(rng.uniform(0.0, 360.0))
+        return math.radians(yaw_deg), math.radians(float(rng.uniform(*self.horizons_deg)))
+
+
+ANYWHERE = Looks()
+LIKE_RECORDED = Looks((30.0, 30.0), quarter_turns=True)
+"""Directions of the recorded frames."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +131,7 @@ def houses_of_set(paths: Sequence[str], which: HouseSet) -> list[NamedHouse]:
     Raises:
         SystemExit: The files have no house of the set.
     """
-    found = {}
+    found: dict[str, NamedHouse] = {}
     for path in paths:
         for house in HouseTexts(path):
             canonical = json.dumps(json.loads(house.text), sort_keys=True)
@@ -125,27 +143,8 @@ def houses_of_set(paths: Sequence[str], which: HouseSet) -> list[NamedHouse]:
     return chosen
 
 
-def simulator(style: str, image_px: int) -> EmbeddedSimulator:
-    """Return a simulator that draws in a style.
-
-    Raises:
-        SystemExit: It has no such style.
-    """
-    config = SimulatorConfig(width_px=image_px, height_px=image_px)
-    if "style" in {field.name for field in fields(config)}:
-        config = replace(config, style=style)
-    elif style != "default":
-        raise SystemExit(f"--style {style}: this version draws in one style, default")
-    return EmbeddedSimulator(config, allow_unknown_assets=True)
-
-
 def fullest_views(
-    houses: Sequence[NamedHouse],
-    num_views: int,
-    seed: int,
-    *,
-    style: str = "default",
-    horizons_deg: tuple[float, float] = HORIZONS_DEG,
+    houses: Sequence[NamedHouse], num_views: int, seed: int, *, style: Style = "default", looks: Looks = ANYWHERE
 ) -> list[PictureView]:
     """Return one view of each of some houses, with the most objects of several: for looking, not for measuring.
 
@@ -154,12 +153,11 @@ def fullest_views(
         num_views: Number of views; no more than there are houses.
         seed: Seed, as of `views`.
         style: Style that the simulator draws in.
-        horizons_deg: Least and greatest angle by which the camera looks down.
+        looks: Directions that the camera is drawn from.
     """
     some = houses[:num_views]
-    drawn = views(some, 2 * VIEWS_A_HOUSE * len(some), seed, style=style, horizons_deg=horizons_deg)
     best: dict[str, PictureView] = {}
-    for view in drawn:
+    for view in views(some, 2 * VIEWS_A_HOUSE * len(some), seed, style=style, looks=looks):
         if view.house not in best or len(view.truths) > len(best[view.house].truths):
             best[view.house] = view
     return list(best.values())
@@ -170,9 +168,9 @@ def views(
     num_views: int,
     seed: int,
     *,
-    style: str = "default",
+    style: Style = "default",
     image_px: int = 300,
-    horizons_deg: tuple[float, float] = HORIZONS_DEG,
+    looks: Looks = ANYWHERE,
 ) -> Iterator[PictureView]:
     """Yield views from places that the agent can stand at; a house has the same ones whichever others are measured.
 
@@ -181,26 +179,25 @@ def views(
         num_views: Number of views, spread over the houses.
         seed: Seed of position, yaw and horizon.
         style: Style that the simulator draws in.
-        image_px: Side of the square pictures.
-        horizons_deg: Least and greatest angle by which the camera looks down.
+        image_px: Side of the square images.
+        looks: Directions that the camera is drawn from.
     """
     some = houses[: max(1, -(-num_views // VIEWS_A_HOUSE))]
-    world = simulator(style, image_px)
+    config = SimulatorConfig(width_px=image_px, height_px=image_px, style=style)
+    world = EmbeddedSimulator(config, allow_unknown_assets=True)
     for index, house in enumerate(some):
         rng = np.random.default_rng([seed, int(house.digest[:8], 16)])
         home = world.reset(house.text, name=house.name)
         positions_m = world.reachable_positions()
         for _ in range(num_views // len(some) + (index < num_views % len(some))):
-            frame = world.render(_pose(rng, home, positions_m, horizons_deg))
+            frame = world.render(_pose(rng, home, positions_m, looks))
             yield PictureView(house.name, frame, _truths(frame, [body.category for body in world.objects]))
 
 
-def _pose(
-    rng: np.random.Generator, home: Pose, positions_m: NDArray[np.float64], horizons_deg: tuple[float, float]
-) -> Pose:
+def _pose(rng: np.random.Generator, home: Pose, positions_m: NDArray[np.float64], looks: Looks) -> Pose:
     x_m, _, z_m = positions_m[rng.integers(len(positions_m))].tolist()
-    yaw_rad = math.radians(float(rng.uniform(0.0, 360.0)))
-    return replace(home, x_m=x_m, z_m=z_m, yaw_rad=yaw_rad, horizon_rad=math.radians(float(rng.uniform(*horizons_deg))))
+    yaw_rad, horizon_rad = looks.draw(rng)
+    return replace(home, x_m=x_m, z_m=z_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad)
 
 
 def _truths(frame: Frame, types: Sequence[str]) -> tuple[Truth, ...]:
