@@ -66,7 +66,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "check-agent": ("evonav check-agent ./my_agent.py:MyAgent", "evonav check-agent ftu"),
     "new-agent": ("evonav new-agent my_agent.py",),
-    "pack": ("evonav pack out/run --title 'Our agent' --authors 'A. Author'",),
+    "pack": (
+        "evonav pack out/run --title 'Our agent' --authors 'A. Author'",
+        "evonav pack out/run --agent ftu --url https://example.org --dataset my-lab/evonav-test",
+    ),
     "verify": ("evonav verify out/run.evonav.zip", "evonav verify out/run.evonav.zip --tasks tasks --subset test-90"),
     "mock-vlm": ("evonav mock-vlm --port 8000", "evonav mock-vlm --faults refusal=0.1,rate_limit=0.05 --latency 0.5"),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),

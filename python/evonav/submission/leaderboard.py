@@ -4,18 +4,13 @@ import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentSummary, summarise
-from evonav.evaluation.records.former_paths import with_current_paths
-from evonav.evaluation.run.components import Backend
-from evonav.perception.shorthand import word_of
 from evonav.submission.pack import SUFFIX, Submission, SubmissionError, SubmissionFile
+from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import Verdict, read_records, verify
 from evonav.tasks.listing import TaskFile
-
-_SIMULATOR = f"{Backend.__module__}:embedded_simulator"
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,11 +126,12 @@ def rank(
             if (reason := _refusal(path, verdict, header, tasks)) is not None:
                 board.unranked.append(reason)
                 continue
-            entries = list(_entries(path, header, date))
+            setup = packed_setup(header)
+            entries = list(_entries(path, header, date, setup.model))
         except SubmissionError as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
-        conditions = _conditions(header, tasks)
+        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator)
         for sha256, entry in entries:
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
                 detail = f"{entry.summary.agent} has the same records as in {first}"
@@ -174,35 +170,10 @@ def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -
     return None
 
 
-def _entries(path: Path, header: Submission, date: str | None) -> Iterable[tuple[str, Entry]]:
+def _entries(path: Path, header: Submission, date: str | None, model: str) -> Iterable[tuple[str, Entry]]:
     """Yield each agent of a verified file with the SHA-256 of its records."""
     num_stages = sum(task.num_stages for task in header.tasks)
-    model = _options(header, "decision").get("model", _options(header, "decision").get("path", ""))
     with SubmissionFile(path) as file:
         for part in header.records:
             summary = summarise(part.agent, read_records(file, part), num_stages)
-            yield part.sha256, Entry(path.name, summary, header, date, str(model))
-
-
-def _conditions(header: Submission, tasks: TaskSet) -> Conditions:
-    parts = _parts(header)
-    kind = str(parts.get("decision", "")).rpartition(":")[2].removesuffix("_match")
-    noise = _options(header, "decision").get("noise")
-    rates = [f"{name}={value}" for name, value in noise.items()] if isinstance(noise, dict) else []
-    simulator = str(parts.get("simulator", ""))
-    return Conditions(
-        task_set=tasks.sha256,
-        perception=word_of(str(parts.get("perception", "")), _options(header, "perception")),
-        decision=",".join([kind, *rates]),
-        simulator="" if simulator == _SIMULATOR else simulator,
-    )
-
-
-def _parts(header: Submission) -> dict[str, Any]:
-    backend = with_current_paths(header.config.get("backend"))
-    return backend if isinstance(backend, dict) else {}
-
-
-def _options(header: Submission, part: str) -> dict[str, Any]:
-    options = _parts(header).get(f"{part}_options")
-    return options if isinstance(options, dict) else {}
+            yield part.sha256, Entry(path.name, summary, header, date, model)

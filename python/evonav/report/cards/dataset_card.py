@@ -11,7 +11,7 @@ from markupsafe import Markup
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.parallel.folders import sha256_of_file, write_atomically
 from evonav.report.cards.croissant import CROISSANT_NAME, METADATA_NAME, croissant
-from evonav.report.cards.hub_benchmark import CONFIG, EVAL_NAME, eval_yaml
+from evonav.report.cards.hub_benchmark import CONFIG, EVAL_NAME, REPO, eval_yaml
 from evonav.report.cards.task_set import TaskSet, read_task_set
 from evonav.report.cards.yaml_text import Yaml, yaml_text
 from evonav.report.pages.template import page_environment
@@ -27,7 +27,6 @@ MAX_LISTED = 200
 """Largest number of tasks whose checksums the card repeats from `dataset.json`."""
 _SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (1_000_000, "100K<n<1M"))
 _LICENSE = re.compile(r"[a-z0-9][a-z0-9.-]*")
-_REPO = re.compile(r"[\w.-]+/[\w.-]+", re.ASCII)
 _DATE = re.compile(r"\d{4}-\d\d-\d\d")
 
 
@@ -91,7 +90,7 @@ def write_dataset_card(folder: Path, out: Path, statistics: TaskStatistics, opti
 
 def _check(options: CardOptions) -> None:
     for option, value, pattern, example in (
-        ("--repo", options.repo, _REPO, "my-lab/evonav-test"),
+        ("--repo", options.repo, REPO, "my-lab/evonav-test"),
         ("--license", options.license, _LICENSE, "apache-2.0"),
         ("--date", options.date, _DATE, "2026-11-23"),
     ):

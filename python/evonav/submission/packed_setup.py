@@ -1,0 +1,45 @@
+"""Read under which perception, decision model and simulator a packed run was made."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from evonav.evaluation.records.former_paths import with_current_paths
+from evonav.evaluation.run.components import Backend
+from evonav.perception.shorthand import word_of
+from evonav.submission.pack import Submission
+
+_SIMULATOR = f"{Backend.__module__}:embedded_simulator"
+
+
+@dataclass(frozen=True, slots=True)
+class PackedSetup:
+    """The setup of a packed run, as its configuration claims it."""
+
+    perception: str
+    """Perception, as `--perception` names it."""
+    decision: str
+    """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
+    model: str
+    """The decision model's name, if it has one."""
+    simulator: str
+    """Simulator, unless it is the usual one."""
+
+
+def packed_setup(header: Submission) -> PackedSetup:
+    """Return the setup of a packed run. Names of early versions are read as those of today."""
+    backend = with_current_paths(header.config.get("backend"))
+    parts: dict[str, Any] = backend if isinstance(backend, dict) else {}
+    decision, perception = (_mapping(parts.get(f"{name}_options")) for name in ("decision", "perception"))
+    kind = str(parts.get("decision", "")).rpartition(":")[2].removesuffix("_match")
+    rates = [f"{name}={value}" for name, value in _mapping(decision.get("noise")).items()]
+    simulator = str(parts.get("simulator", ""))
+    return PackedSetup(
+        perception=word_of(str(parts.get("perception", "")), perception),
+        decision=",".join([kind, *rates]),
+        model=str(decision.get("model", decision.get("path", ""))),
+        simulator="" if simulator == _SIMULATOR else simulator,
+    )
+
+
+def _mapping(value: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+    return value if isinstance(value, dict) else {}
