@@ -41,7 +41,7 @@ def main() -> None:
     if not asked.stage_only:
         shutil.rmtree(SITE, ignore_errors=True)
         zensical = Path(sys.executable).with_name("zensical")
-        subprocess.run([zensical, "build", "--clean"], cwd=ROOT, check=True)
+        subprocess.run([zensical, "build", "--clean", "--strict"], cwd=ROOT, check=True)
         sys.stdout.write(f"{SITE / 'index.html'}\n")
 
 

@@ -17,7 +17,7 @@ from evonav.world.simulator import Action
 class Move:
     """One discrete action.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> evonav.Move(evonav.Action.TURN_LEFT)
         Move(action=<Action.TURN_LEFT: 'TURN_LEFT'>)
@@ -30,7 +30,7 @@ class Move:
 class NavigateTo:
     """Go towards a point along planner waypoints, at most `SensorConfig.max_travel_m` this round.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> evonav.NavigateTo((3.5, 2.0))
         NavigateTo(position_m=(3.5, 2.0), face_m=None)
@@ -46,7 +46,7 @@ class NavigateTo:
 class Stop:
     """End the stage here.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> evonav.Stop("nothing left to explore")
         Stop(reason='nothing left to explore')
@@ -71,7 +71,7 @@ class ViewSchedule:
 class SensorConfig:
     """The sensors that an agent needs (default: 3D-Mem's schedule), within the limits of `ProtocolConfig`.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> sensors = evonav.SensorConfig(needs_rgb=True)
         >>> sensors.first_round
@@ -91,7 +91,7 @@ class SensorConfig:
 class Agent(Protocol):
     """An agent as evonav evaluates it: a subclass, or any class with these methods and `sensors`.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> class Bold(evonav.Agent):
         ...     def begin_stage(self, goal):

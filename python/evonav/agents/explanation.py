@@ -31,7 +31,7 @@ class Explanation:
 
     Records then contain the object entries, and `evonav view` draws them with the map. Nothing of it is scored.
 
-    Example:
+    Examples:
         >>> from evonav import Agent, Explanation, ObjectMap, OccupancyMap
         >>> class Mine(Agent):
         ...     def begin_task(self, task):

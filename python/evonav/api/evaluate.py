@@ -78,7 +78,7 @@ def evaluate(
         StoreError: The folder holds a run of another configuration or cannot be written.
         DecisionError: The decision model cannot be asked from here.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> class GiveUp(evonav.Agent):
         ...     def act(self, observation):

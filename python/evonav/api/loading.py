@@ -98,7 +98,7 @@ def load_houses(
     Raises:
         HouseError: There is no such file, or it cannot be read.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> house = evonav.load_houses("bundled")[0]
         >>> house.name
@@ -132,7 +132,7 @@ def load_tasks(source: str | Path = BUNDLED, limit: int | None = None) -> TaskLi
     Raises:
         TaskError: The folder holds no task.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> tasks = evonav.load_tasks("bundled")
         >>> tasks[1].public(stage=1).category
@@ -171,7 +171,7 @@ def generate_tasks(
         TaskError: No house gives a task; says why.
         StoreError: `out` holds other tasks, or cannot be written.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> tasks = evonav.generate_tasks("bundled", limit=1, workers=0)
         >>> tasks[0].num_stages

@@ -27,7 +27,7 @@ Columns = dict[str, list[Any]]
 class Run:
     """A run, finished or not: its tables, pages and rows, read from its folder when they are first asked for.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> run = evonav.evaluate("stay-still", "random-walk", limit=1, workers=0)
         >>> table = run.summary()
@@ -168,7 +168,7 @@ def load_run(path: str | Path) -> Run:
     Raises:
         StoreError: There is no run there.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> path = evonav.evaluate("stay-still", limit=1, workers=0).path
         >>> evonav.load_run(path).agents

@@ -32,7 +32,7 @@ Place = Pose | Sequence[float]
 class Simulator:
     """A house to look at and move in, with an agent's eyes: ground-truth detections and visible occupancy.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> house = evonav.load_houses("bundled")[2]
         >>> simulator = evonav.Simulator(house)

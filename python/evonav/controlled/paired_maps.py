@@ -105,7 +105,7 @@ def pair_svg(pair: Sequence[Rollout]) -> str:
     panels = join(_panel(one, frame, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(pair))
     dotted = (
         '<path class="walk" d="M0 8h40" stroke-width="3"/>'
-        '<text class="quiet" x="48" y="12">reference trajectory that the agent was walked along before</text>'
+        '<text class="quiet" x="48" y="12">reference trajectory along which the agent was guided before</text>'
     )
     name, top_px = f"{first.task_id}: {first.agent}", HEAD_PX + panel_height_px(frame, PANEL_PX) + FOOT_PX
     return sheet(name, head + lines + image + panels, width_px, top_px, GAP_PX, foot=dotted, foot_px=28)
@@ -150,7 +150,7 @@ def walk_and_course(rollout: Rollout, frame: Frame) -> str:
     points = [cm(point) for walk in rollout.walks for taken in walk.trace for point in taken.path_m]
     drawn = ""
     if len(points) > 1:
-        hint = title("reference trajectory that the agent was walked along before")
+        hint = title("reference trajectory along which the agent was guided before")
         width = f"{0.7 * frame.unit:.1f}"
         drawn = f'<path class="walk" stroke-width="{width}" d="{polyline(simplified(points))}">{hint}</path>'
     return drawn + target_move(rollout.record, frame) + course(rollout.record, frame, rollout.success_radius_m)

@@ -19,7 +19,7 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
     last one ends the episode (`terminated`; nothing is ever truncated). docs/gym.md describes spaces, rewards and
     infos.
 
-    Example:
+    Examples:
         >>> import evonav.gym, gymnasium
         >>> env = gymnasium.make("evonav/LifelongNav-v0", observations=("depth", "category"))
         >>> observation, info = env.reset(seed=0)

@@ -50,7 +50,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     An episode that has ended restarts at the next step (`AutoresetMode.NEXT_STEP`), whose action is ignored and whose
     reward is 0, or in the same step (`SAME_STEP`). A background thread builds the next houses in the meantime.
 
-    Example:
+    Examples:
         >>> import evonav.gym, gymnasium
         >>> envs = gymnasium.make_vec("evonav/LifelongNav-v0", num_envs=4, observations=("depth", "category"))
         >>> observations, infos = envs.reset(seed=0)

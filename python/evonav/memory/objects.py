@@ -96,7 +96,7 @@ class ObjectMap:
     `overlap_radius_m` of the entry's) and visual similarity (cosine of features; without features, 1 for the same
     label), if that exceeds `match_threshold`. Otherwise it becomes an entry. Simulator ids are not used.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> simulator = evonav.Simulator(evonav.load_houses()[2])
         >>> memory = evonav.ObjectMap()

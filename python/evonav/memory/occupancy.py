@@ -64,7 +64,7 @@ class OccupancyMap:
 
     Only `update` (or `integrate`) sets cells; the last observation of a cell counts.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> simulator = evonav.Simulator(evonav.load_houses()[2])
         >>> cells = evonav.OccupancyMap(simulator.map_frame)

@@ -66,7 +66,7 @@ class MapFrame:
 class Observation:
     """The input of one decision round: views around the agent, the heading view last.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> simulator = evonav.Simulator(evonav.load_houses()[0])
         >>> view = simulator.look()

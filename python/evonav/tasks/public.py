@@ -12,7 +12,7 @@ from evonav.sensors.observation import MapFrame
 class TaskInfo:
     """An agent's information before the first stage.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> simulator = evonav.Simulator(evonav.load_houses()[0])
         >>> task = evonav.TaskInfo("mine", num_stages=1, max_rounds=50, map_frame=simulator.map_frame, seed=0)
@@ -35,7 +35,7 @@ class Goal:
 
     Instructions follow the grammar of `evonav.tasks.language`.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> goal = evonav.load_tasks("bundled")[1].public(stage=1)
         >>> goal.category, goal.reference_image.shape

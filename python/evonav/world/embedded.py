@@ -23,7 +23,7 @@ class EmbeddedSimulator:
     Angles of poses are canonical (`Pose.canonical`), so a simulator that uses degrees gives the same bits. Calls
     release the GIL. A pickle contains the house and the pose; the rest is computed again in a few milliseconds.
 
-    Example:
+    Examples:
         >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
         >>> simulator.reset(house)  # doctest: +SKIP
         >>> simulator.render(rgb=False).depth_m.shape  # doctest: +SKIP

@@ -11,7 +11,7 @@ _DECIMALS_DEG = 4
 class Pose:
     """An agent's position and view: left-handed frame, y up, metres and radians.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> pose = evonav.Pose.of_degrees(1.0, 0.9, 2.0, yaw_deg=90.0, horizon_deg=30.0)
         >>> pose.position_m, pose.yaw_deg

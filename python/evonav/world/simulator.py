@@ -15,7 +15,7 @@ from evonav.world.pose import Pose
 class Action(Enum):
     """Discrete actions, as the paper spells them (Sec. 3.1).
 
-    Example:
+    Examples:
         >>> import evonav
         >>> [action.value for action in evonav.Action]
         ['MOVE_FORWARD', 'TURN_LEFT', 'TURN_RIGHT', 'STOP']

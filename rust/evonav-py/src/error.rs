@@ -9,7 +9,7 @@ create_exception!(
     PyException,
     "The root of all errors that evonav raises; each says what is wrong and what to do.
 
-Example:
+Examples:
     >>> import evonav
     >>> try:
     ...     evonav.load_tasks('nowhere')

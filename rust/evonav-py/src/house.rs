@@ -17,7 +17,7 @@ type ObjectFootprints = (String, String, Vec<(Vec<Vec2>, f64, f64)>);
 ///
 /// Metres in AI2-THOR's frame: x right, y up, z forward. `plot()` draws it from above.
 ///
-/// Example:
+/// Examples:
 ///     >>> import evonav
 ///     >>> house = evonav.load_houses("bundled")[1]
 ///     >>> [room.room_type for room in house.rooms]

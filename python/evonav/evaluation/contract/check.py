@@ -74,7 +74,7 @@ def check_agent(
         seed: Seed of the agent.
         timeout_s: Time limit of an answer.
 
-    Example:
+    Examples:
         >>> import evonav
         >>> report = evonav.check_agent("stay-still")
         >>> report.is_ok
