@@ -79,21 +79,23 @@ SUCCESS = (
 )
 STALENESS = (
     Measure("stale_visits", "stale visits", "", _mean("num_stale_visits")),
-    Measure("stale_path_m", "walked for stale entries", "m", _mean("stale_path_m")),
-    Measure("stale_path_share", "of its way", "%", _share("stale_path_m", "path_length_m")),
+    Measure("stale_path_m", "path for stale entries", "m", _mean("stale_path_m")),
+    Measure("stale_path_share", "path for stale entries, share", "%", _share("stale_path_m", "path_length_m")),
     Measure(
         "stale_evident",
         "stale entries whose empty place was seen",
         "%",
         _share("num_stale_evident", "num_stale_at_start"),
     ),
-    Measure("stale_cleared", "of them cleared in the stage", "%", _share("num_stale_cleared", "num_stale_evident")),
+    Measure(
+        "stale_cleared", "such entries cleared in the stage", "%", _share("num_stale_cleared", "num_stale_evident")
+    ),
     Measure("rounds_to_clear", "rounds until cleared", "rounds", _mean("rounds_to_clear", "num_stale_cleared")),
     Measure("metres_to_clear", "metres until cleared", "m", _mean("metres_to_clear", "num_stale_cleared")),
     Measure(
-        "moved_found", "moved objects, of those seen, found anew", "%", _share("num_moved_found", "num_moved_seen")
+        "moved_found", "moved objects that were seen and got an entry", "%", _share("num_moved_found", "num_moved_seen")
     ),
-    Measure("rounds_to_find", "rounds until found", "rounds", _mean("rounds_to_find", "num_moved_found")),
+    Measure("rounds_to_find", "rounds until they got it", "rounds", _mean("rounds_to_find", "num_moved_found")),
     Measure("forgotten", "objects forgotten", "", _later(_mean("num_forgotten"))),
 )
 MEMORY = (
@@ -101,8 +103,8 @@ MEMORY = (
     Measure("precision", "precision at the end", "%", _rest("num_stale_entries", "num_entries")),
     Measure("recall", "recall at the end", "%", _mean("recall")),
     Measure("precision_before", "precision before a change", "%", _mean("precision_before")),
-    Measure("precision_at_start", "precision after it", "%", _later(_mean("precision_at_start"))),
-    Measure("recall_at_start", "recall after it", "%", _later(_mean("recall_at_start"))),
+    Measure("precision_at_start", "precision after a change", "%", _later(_mean("precision_at_start"))),
+    Measure("recall_at_start", "recall after a change", "%", _later(_mean("recall_at_start"))),
     Measure("duplicates", "duplicates", "", _mean("num_duplicates")),
     Measure("position_error_m", "position error", "m", _mean("position_error_m")),
 )
