@@ -2,10 +2,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# The versions of requirements-dev.txt, for the versions of Python that it was made for; later ones take the newest.
+LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('--constraint requirements-dev.txt')")
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-procthor test-models lint format bench wheel data readme docs clean
+.PHONY: help setup demo test test-procthor test-models lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -13,17 +15,17 @@ help:  ## list these commands
 $(VENV)/.maturin:
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
-	@$(BIN)/python -m pip install --quiet --group build
+	@$(BIN)/python -m pip install --quiet --group build $(LOCK)
 	@touch $@
 
 # The package with what its reports draw plots with: all that the demo needs.
 $(VENV)/.built: $(VENV)/.maturin pyproject.toml $(RUST_SOURCES)
 	@echo "Building evonav in $(VENV), which takes some minutes the first time ..."
-	@$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[viz]"
+	@$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[viz]" $(LOCK)
 	@touch $@
 
-$(VENV)/.dependencies: $(VENV)/.maturin pyproject.toml
-	$(BIN)/python -m pip install --quiet --group dev
+$(VENV)/.dependencies: $(VENV)/.maturin pyproject.toml requirements-dev.txt
+	$(BIN)/python -m pip install --quiet --group dev $(LOCK)
 	touch $@
 
 setup: $(VENV)/.built $(VENV)/.dependencies  ## build the package, and install all that tests and lint need, into .venv
@@ -98,6 +100,11 @@ readme: setup  ## renew the table and the picture of the README
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs
 	$(BIN)/python scripts/build_docs.py
+
+# The same file serves every system and version of Python, by markers. Its first lines tell Dependabot how it is made.
+lock: $(VENV)/.maturin  ## renew requirements-dev.txt with the newest versions
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 --group dev --upgrade --output-file requirements-dev.txt
 
 clean:  ## delete the environments and all that was built
 	rm -rf $(VENV) $(VENV)-models $(VENV)-procthor target dist out
