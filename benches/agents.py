@@ -18,13 +18,13 @@ from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo,
 from evonav.agents.registry import BUILT_IN
 from evonav.decision.question import Question, Reply
 from evonav.decision.text.matcher import TextMatch
+from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.perception import Perception, StageScene
-from evonav.report.run import PAPER_ORDER
 from evonav.sensors.observation import Observation
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_file

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from results import ROOT, pooled_tasks, run_agents, spread, write_parts
 
+from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentSummary, house_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
@@ -21,7 +22,7 @@ from evonav.perception.shorthand import read_word
 from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
-from evonav.report.run import PAPER_ORDER, Run, load_run
+from evonav.report.run import Run, load_run
 from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect

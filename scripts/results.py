@@ -17,13 +17,14 @@ from pathlib import Path
 from behaviour_tables import STRATA, behaviour_of, cause_share_table, counter_table, end_table, success_by_group
 
 from evonav.component import Component
+from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
-from evonav.report.run import PAPER_ORDER, Run, load_run
+from evonav.report.run import Run, load_run
 from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import Table

@@ -2,7 +2,8 @@
 
 import pytest
 
-from evonav.cli.display import counted_as, in_parts, show_tables
+from evonav.cli.display import in_parts, show_tables
+from evonav.counted import counted
 from evonav.report.tables.table import Table
 
 WIDE = Table(
@@ -29,12 +30,21 @@ def test_a_wide_table_is_printed_in_parts_that_fit(monkeypatch, capsys, width):
     assert parts[-1].best == {(0, len(parts[-1].columns) - 1)}
 
 
-def test_numbers_have_their_noun():
-    assert (counted_as(1, "agent"), counted_as(0, "agent"), counted_as(2, "agent")) == (
-        "1 agent",
-        "0 agents",
-        "2 agents",
+def test_every_part_tells_the_rows_apart():
+    rows = tuple(
+        (agent, decision, seed, *["12.3"] * 9) for agent in ("fu", "ftu") for decision in "xy" for seed in "01"
     )
+    columns = ("Agent", "decision", "seed", *(f"column {number}" for number in range(9)))
+    parts = in_parts(Table("Cells", columns, rows), 60)
+    assert len(parts) > 1
+    assert all([row[:3] for row in part.rows] == [row[:3] for row in rows] for part in parts)
+    same = Table("Same", columns, (rows[0], rows[0]))
+    assert all(part.columns[0] == "Agent" != part.columns[1] != "decision" for part in in_parts(same, 30)[1:])
+
+
+def test_numbers_have_their_noun():
+    shown = [counted(1, "house"), counted(0, "house"), counted(2, "entry"), counted(1000, "day")]
+    assert shown == ["1 house", "0 houses", "2 entries", "1,000 days"]
 
 
 def test_no_bracket_is_swallowed(capsys):

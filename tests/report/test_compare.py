@@ -18,6 +18,7 @@ from evonav.report.compare.compare import Comparison, compare, comparison_json
 from evonav.report.compare.selection import read_compared_agents
 from evonav.report.export import csv_cell
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
+from evonav.report.run import load_run
 
 SUCCESS = EndState.SUCCESS
 
@@ -84,7 +85,9 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     def pairs(*asked: object, **options) -> list[tuple[str, str]]:
         return [(found.b, found.a) for found in compare(read_compared_agents([str(word) for word in asked]), **options)]
 
-    assert pairs(a) == [("fu", "ftu"), ("fu", "my_module:Agent"), ("ftu", "my_module:Agent")]
+    assert pairs(a) == [("ftu", "fu"), ("my_module:Agent", "fu"), ("my_module:Agent", "ftu")]
+    assert pairs(a) == [(pair.b, pair.a) for pair in load_run(a).pairs]  # as in the report
+    assert pairs(a, "fu", "ftu") == [("fu", "ftu")]
     assert pairs(a, "my_module:Agent", "fu") == pairs(f"{a}:my_module:Agent", f"{a}:fu")
     assert pairs(a, "my_module:Agent", "fu") == [("my_module:Agent", "fu")]
     assert pairs(a, b) == [(f"a:{name}", f"b:{name}") for name in outcomes]
@@ -92,8 +95,8 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     assert pairs(a, baseline="ftu") == [("fu", "ftu"), ("my_module:Agent", "ftu")]
     for cell in ("one", "two"):
         lettered_run(tmp_path / "sweep" / "runs" / cell, outcomes)
-    assert pairs(tmp_path / "sweep", "ftu", "fu") == [("one:ftu", "two:ftu"), ("one:fu", "two:fu")]
-    assert pairs(f"{tmp_path / 'sweep'}:fu") == [("one:fu", "two:fu")]
+    assert pairs(tmp_path / "sweep", "ftu", "fu") == [("two:ftu", "one:ftu"), ("two:fu", "one:fu")]
+    assert pairs(f"{tmp_path / 'sweep'}:fu") == [("two:fu", "one:fu")]
     for asked, match in (
         ((a, "fu"), "two agents are needed"),
         ((a, "nobody"), "has no agent 'nobody'; it has fu, ftu"),

@@ -51,7 +51,7 @@ def test_a_report_can_be_worked(
     assert found["squares"] >= found["cells"]
     assert found["uses"]
     assert found["overflow"] <= 0
-    assert (found["nothing"], found["noTasks"], found["everything"]) == ("0 of 1 tasks", 0, "1 tasks")
+    assert (found["nothing"], found["noTasks"], found["everything"]) == ("0 of 1 task", 0, "1 task")
     assert found["before"] == num_stages
     assert found["without"] == 0
     assert found["sorted"] == "descending"
@@ -163,3 +163,23 @@ def test_the_page_carries_its_policy_first(write_run: WriteRun) -> None:
     assert policy.startswith("default-src &#39;none&#39;; script-src &#39;sha256-")
     assert "unsafe" not in policy
     assert not re.search(r"<[^>]+\sstyle=", text)
+
+
+@pytest.mark.slow
+def test_no_table_is_cut_off_on_a_laptop(tmp_path: Path) -> None:
+    states = {"fu": "sfsff", "stage-reset": "ffsfs"}
+    records = [
+        stage_record(
+            agent, f"task-{i:02}", j + 1, EndState.SUCCESS if (letter == "s") == (i % 4 < 3) else EndState.FAILURE
+        )
+        for agent, letters in states.items()
+        for i in range(12)
+        for j, letter in enumerate(letters)
+    ]
+    records = [one.model_copy(update={"num_stages": 5, "house": f"house-{one.task_id}"}) for one in records]
+    run = record_run(tmp_path / "run", records, {f"task-{i:02}": 5 for i in range(12)}, list(states))
+    wide = "[...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth)"
+    probe = f"({{tables: document.querySelectorAll('.scroll').length, wide: {wide}.map((box) => box.innerText)}})"
+    found = probed(write_report(run), probe, tmp_path, "1400,900")
+    assert found["tables"] >= 6
+    assert found["wide"] == []

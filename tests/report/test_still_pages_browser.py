@@ -72,5 +72,5 @@ def test_the_gallery_is_searched(tmp_path: Path, write_run: WriteRun) -> None:
     }"""
     with Chromium(tmp_path / "profile") as browser:
         browser.open(index)
-        assert browser.run(f"({search})('bundled')") == ["1 tasks", 1]
-        assert browser.run(f"({search})('no such task')") == ["0 of 1 tasks", 0]
+        assert browser.run(f"({search})('bundled')") == ["1 task", 1]
+        assert browser.run(f"({search})('no such task')") == ["0 of 1 task", 0]

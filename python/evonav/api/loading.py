@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar, overload
 
 from evonav._core import House
 from evonav.api.progress import progress_bar
+from evonav.counted import counted
 from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.generation.dataset import generate_dataset, inherited_names
@@ -189,7 +190,7 @@ def generate_tasks(
             options=options,
             limit=limit,
             workforce=Workforce(RunSettings(workers=workers).num_workers),
-            on_progress=lambda state: show(state.share, 1.0, f"{state.num_tasks} tasks"),
+            on_progress=lambda state: show(state.share, 1.0, counted(state.num_tasks, "task")),
         )
     return LazyList([task_file(root) for root in found.roots], lambda file: load_task(file.path))
 

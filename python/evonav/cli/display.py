@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from evonav.counted import counted
+
 EXIT_INTERRUPTED = 130
 LINE_EVERY_S = 60.0
 """Seconds between two lines of progress where there is no terminal."""
@@ -52,8 +54,8 @@ def show_tables(tables: "Iterable[Table]") -> None:
 def in_parts(table: "Table", width: int) -> "list[Table]":
     """Split the columns of a table, without its notes, so that no line is longer than `width`.
 
-    Every part repeats the columns that name a row: the first, and those after it without a heading. A cell wider than
-    the space that these leave is wrapped.
+    Every part repeats the columns that name a row: the first ones, as many as tell all rows apart. A cell wider than the
+    space that these leave is wrapped.
     """
     from dataclasses import replace
 
@@ -61,7 +63,8 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
         heading = table.columns[column].split()
         return _GAP + max(len(text) for text in ("", *heading, *(row[column] for row in table.rows)))
 
-    num_keys = 1 + next((k for k, name in enumerate(table.columns[1:]) if name), 0)
+    prefixes = range(1, len(table.columns))
+    num_keys = next((k for k in prefixes if len({row[:k] for row in table.rows}) == len(table.rows)), 1)
     widths = [width_of(column) for column in range(len(table.columns))]
     taken = 1 + min(sum(widths[:num_keys]), width // 2)
     groups: list[list[int]] = [[]]
@@ -83,11 +86,6 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
             )
         )
     return parts
-
-
-def counted_as(number: int, noun: str) -> str:
-    """Return a number with its noun: `1 agent`, `2 agents`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def write_texts(*texts: "tuple[Path | None, Callable[[], str]]", label: str = "written") -> None:
@@ -219,8 +217,8 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
 
 def _counts(state: "GenerationProgress") -> str:
     failed = f", {state.num_failed} failed" if state.num_failed else ""
-    rejected = f"{counted_as(state.num_rejected, 'house')} rejected"
-    return f"{counted_as(state.num_tasks, 'task')} ({state.tasks_per_s:.1f}/s), {rejected}{failed}"
+    rejected = f"{counted(state.num_rejected, 'house')} rejected"
+    return f"{counted(state.num_tasks, 'task')} ({state.tasks_per_s:.1f}/s), {rejected}{failed}"
 
 
 @contextmanager

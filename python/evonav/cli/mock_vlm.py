@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.display import counted_as
+from evonav.counted import counted
 
 
 def mock_vlm(
@@ -50,4 +50,4 @@ def mock_vlm(
             while True:
                 time.sleep(3600.0)
         except KeyboardInterrupt:
-            typer.echo(f"{counted_as(server.num_requests, 'request')} served")
+            typer.echo(f"{counted(server.num_requests, 'request')} served")

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
+from evonav.counted import counted
 from evonav.errors import StoreError
+from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState
-from evonav.report.run import RecordedStage, agents_in_order, load_run
+from evonav.report.run import RecordedStage, load_run
 from evonav.report.tables.numbers import NONE, points
 from evonav.report.tables.table import Table
 from evonav.statistics import PairedEffect, paired_effect
@@ -117,7 +119,7 @@ def load_analysis(directory: Path) -> Analysis:
                 num_unscored += 1
     if not agents:
         raise StoreError(f"{directory}: no agent was run: `evonav controlled evaluate {directory}` first")
-    ordered = agents_in_order((), list(agents))
+    ordered = agents_in_order(agents)
     for arm in record.arms:
         for agent in ordered:
             outcomes.setdefault((arm.name, agent), {})
@@ -166,8 +168,8 @@ def _drop_table(analysis: Analysis) -> Table:
     keys = {(fixed, agent, key) for agent in analysis.paired_agents for key in analysis.keys(agent)}
     num_houses = len({house_of(analysis.outcomes[arm, agent][key].row) for arm, agent, key in keys})
     notes = (
-        f"{num_houses} houses. Rates in %; changes in points, Not Fixed minus Fixed, with 95% intervals (bootstrap by "
-        "house) and paired two-sided p (signs exchanged by house).",
+        f"{counted(num_houses, 'house')}. Rates in %; changes in points, Not Fixed minus Fixed, with 95% "
+        "intervals (bootstrap by house) and paired two-sided p (signs exchanged by house).",
         *_caveats(analysis),
     )
     return Table("Fixed / Not Fixed", ("agent", "pairs", "Fixed", "Not Fixed", "change", "p"), tuple(rows), notes)
@@ -185,9 +187,9 @@ def _caveats(analysis: Analysis) -> list[str]:
     }
     found = []
     if near:
-        found.append(f"In {len(near)} pairs the evaluated stage begins within {radius_m:g} m of the target.")
+        found.append(f"In {counted(len(near), 'pair')} the evaluated stage begins within {radius_m:g} m of the target.")
     if analysis.num_unscored:
-        found.append(f"{analysis.num_unscored} stages are errored or not run, and left out with their pairs.")
+        found.append(f"Left out with their pairs, as errored or not run: {counted(analysis.num_unscored, 'stage')}.")
     return found
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav import _core
+from evonav.counted import counted
 from evonav.errors import EvonavError, HouseError, SimulationError
 from evonav.generation.pipeline import generate_task
 from evonav.generation.validation.problems import ProblemKind
@@ -147,4 +148,4 @@ def task_outcome(house: House, *, allow_unknown_assets: bool = False) -> str:
         task = generate_task(house, seed=0, allow_unknown_assets=allow_unknown_assets)
     except EvonavError as error:
         return f"no: {str(error).removeprefix(f'house {house.name}: ')}"
-    return f"yes: {task.num_stages} stages with seed 0"
+    return f"yes: {counted(task.num_stages, 'stage')} with seed 0"

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from evonav.counted import counted
 from evonav.drawing.pictures import Picture, house_picture
 from evonav.generation.house_check import HouseCheck, odd_bodies, task_outcome
 from evonav.generation.validation.problems import KINDS, ProblemKind
@@ -49,9 +50,9 @@ def house_view(found: HouseCheck, *, allow_unknown_assets: bool = False) -> Hous
 def summary_of(house: House) -> str:
     """Return the numbers of a house in one line."""
     area_m2 = sum(area_of_m2(room.polygon_m) for room in house.rooms)
-    parts = (_count(len(house.rooms), "room"), f"{area_m2:.1f} m2", _count(len(house.objects), "object"))
+    parts = (counted(len(house.rooms), "room"), f"{area_m2:.1f} m2", counted(len(house.objects), "object"))
     categories = {item.category for item in house.objects}
-    return f"{', '.join(parts)} of {len(categories)} categories, {_count(len(house.doors), 'door')}"
+    return f"{', '.join(parts)} of {counted(len(categories), 'category')}, {counted(len(house.doors), 'door')}"
 
 
 def area_of_m2(outline_m: Sequence[tuple[float, float]]) -> float:
@@ -70,7 +71,3 @@ def _rooms(house: House) -> list[tuple[str, str, str, str]]:
 def _odd(found: Counter[ProblemKind]) -> str:
     parts = [f"{KINDS[kind]} ({number})" for kind, number in sorted(found.items())]
     return f"{'; '.join(parts)}: published houses have such flaws, too" if parts else ""
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav._core import House, ObjectEntry
+from evonav.counted import counted
 from evonav.sensors.observation import View
 
 if TYPE_CHECKING:  # agents start fast, and few draw
@@ -155,7 +156,9 @@ class ObjectMap:
         """Return the number of entries and the most common labels."""
         counts = Counter(entry.label for entry in self.entries).most_common(3)
         shown = "".join(f", {count} {label}" for label, count in counts)
-        return f"ObjectMap({len(self)} entries{shown}{', ...' if len(self) > sum(n for _, n in counts) else ''})"
+        return (
+            f"ObjectMap({counted(len(self), 'entry')}{shown}{', ...' if len(self) > sum(n for _, n in counts) else ''})"
+        )
 
     def plot(self, house: House | None = None) -> "Picture":
         """Draw the entries from above.

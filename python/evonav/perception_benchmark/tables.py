@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from evonav.counted import counted
 from evonav.perception_benchmark.other_scores import Group
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.export import csv_text
@@ -64,7 +65,8 @@ def _headline(found: Sequence[Scores]) -> Table:
         "What perceptions find",
         _overall(found),
         {head: (head.lower(), {}) for head in ("AP50", "AP", "precision", "recall", "F1")},
-        f"{first.num_tasks} tasks in {first.num_houses} houses, {first.num_views} views each perception. {INTERVALS}",
+        f"{counted(first.num_tasks, 'task')} in {counted(first.num_houses, 'house')}, "
+        f"{counted(first.num_views, 'view')} each perception. {INTERVALS}",
         "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95.",
     )
     counts = [(str(one.overall["recall"].n), str(one.overall["precision"].n)) for one in found]

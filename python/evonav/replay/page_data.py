@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import FrontierBelief
+from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.svg import clean, cm, polyline, simplified
 from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
@@ -30,7 +31,6 @@ from evonav.replay.types import (
 from evonav.report.maps.round_words import choice_words, entry_name, reason_words
 from evonav.report.maps.stage_map import change_words, outcome_words
 from evonav.report.tables.causes import sentence
-from evonav.report.tables.numbers import count
 from evonav.tasks.language import noun_of
 
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
@@ -357,7 +357,7 @@ def _facts(record: StageRecord) -> list[list[str]]:
         facts.append(("shortest path", f"{record.reference_length_m:.1f} m"))
     if record.terminal_distance_m is not None:
         facts.append(("target at the end", f"{record.terminal_distance_m:.2f} m away"))
-    facts.append(("target in view", count(record.num_target_visible_rounds, "round")))
+    facts.append(("target in view", counted(record.num_target_visible_rounds, "round")))
     if record.has_stopped:
         facts.append(("stopped", record.stop_reason or "yes"))
     elif record.terminal is not None:

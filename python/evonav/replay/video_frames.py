@@ -5,6 +5,7 @@ from io import BytesIO
 
 from PIL import Image
 
+from evonav.counted import counted
 from evonav.drawing.files import png_of
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.style import light_css
@@ -137,7 +138,7 @@ def _position(stage: ReplayedStage, index: int, budget: int) -> str:
         note = step.note or "this agent does not tell what it knows"
     else:
         num_stale = sum(entry.record.is_stale for entry in step.entries)
-        note = f"{len(step.entries)} entries, {num_stale} stale (red; the evaluator's knowledge)"
+        note = f"{counted(len(step.entries), 'entry')}, {num_stale} stale (red; the evaluator's knowledge)"
     return _text("where", SIZE[0] - MARGIN, 18, f"{where} (budget {budget})") + _text(
         "panel-note", LEFTS[1] + 4, 16, _fitted(note, 13, MAP_PX)
     )

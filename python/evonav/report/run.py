@@ -2,13 +2,14 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
+from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
@@ -16,8 +17,6 @@ from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import FailureCause
 
-PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
-"""Agents in the order of the paper's tables."""
 NOTES = ("tasks_dir", "task_digests", "sessions")
 """Entries of a run's header that do not change its records: the folder and digests of its tasks, and its commands."""
 
@@ -168,7 +167,7 @@ def load_run(run_dir: Path) -> Run:
         outcomes: dict[tuple[str, str, int], RecordedStage] = {}
         states = store.states()
         planned = store.meta("num_stages")
-        agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
+        agents = agents_in_order([*(store.meta("agents") or ()), *(agent for agent, _, _ in states)])
         rows = {(row.agent, row.task_id, row.stage): row for row in read_stage_metrics(store)}
         for agent in agents:
             keys = sorted(key for key in states if key[0] == agent)
@@ -204,9 +203,3 @@ def _check(
         )
     if num_stages and not 1 <= stage <= num_stages.get(task_id, 0):
         raise StoreError(f"{run_dir}: stage {stage} of {task_id} by {agent} is no stage of this run")
-
-
-def agents_in_order(planned: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
-    """Return the agents of a run: the paper's in the order of its tables, then the others by name."""
-    rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
-    return tuple(sorted({*(planned or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))

@@ -16,6 +16,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
@@ -206,7 +207,7 @@ class SubmissionFile:
 
 def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> tuple[Submission, dict[str, bytes]]:
     there: list[str] = store.meta("agents") or []
-    chosen = list(agents) if agents is not None else [agent for agent in there if agent not in BASELINES]
+    chosen = agents_in_order([agent for agent in there if agent not in BASELINES] if agents is None else agents)
     digests: dict[str, str] | None = store.meta("task_digests")
     stages: dict[str, int] = store.meta("num_stages") or {}
     if not chosen:

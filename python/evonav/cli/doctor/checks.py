@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from evonav.cli.examples import DOCS
+from evonav.counted import counted
 from evonav.parallel.local import num_cores
 from evonav.perception.predicted import STACKS, StackConfig, StackName, weights_of
 from evonav.perception.weights import models_folder, places
@@ -137,7 +138,7 @@ def _bundled() -> Result:
     with bundled_tasks() as folder:
         roots = task_roots(folder)
         task = load_task(roots[0])
-    return "ok", f"{len(roots)}, the first of {task.num_stages} stages"
+    return "ok", f"{len(roots)}, the first of {counted(task.num_stages, 'stage')}"
 
 
 def _renderer() -> Result:
@@ -258,7 +259,7 @@ def _models(stack: StackName) -> Result:
         finding = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
         remedy = "fetched at first use" if folder is None else f"{DOCS}/perception.md says where to download them"
         return "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy
-    return "ok", f"{len(files)} files in {where}"
+    return "ok", f"{counted(len(files), 'file')} in {where}"
 
 
 def _coco() -> Result:

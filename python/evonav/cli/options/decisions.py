@@ -77,7 +77,8 @@ def print_estimate(
     from rich.console import Console
     from rich.table import Table
 
-    from evonav.cli.display import counted_as, progress
+    from evonav.cli.display import progress
+    from evonav.counted import counted
     from evonav.decision.vlm.counting import OUTPUT_TOKENS
     from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
 
@@ -86,9 +87,7 @@ def print_estimate(
     with progress() as show:
         estimates = estimate_run(agents, tasks, config, options, num_workers=num_workers, on_progress=show)
     first = estimates[0]
-    title = (
-        f"Estimate for {counted_as(first.num_stages, 'stage')}, from {first.num_stages_run} run with the text matcher"
-    )
+    title = f"Estimate for {counted(first.num_stages, 'stage')}, from {first.num_stages_run} run with the text matcher"
     table = Table(title=title)
     for heading in ("agent", "requests", "by kind", "tokens in", "95%", "tokens out", "dollars"):
         table.add_column(heading, justify="left" if heading in ("agent", "by kind") else "right")
@@ -115,7 +114,7 @@ def _relative(error: float) -> str:
 
 def print_spending(out: Path) -> None:
     """Print what the models of a run were asked and cost, over all calls of the command."""
-    from evonav.cli.display import counted_as
+    from evonav.counted import counted
     from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
 
     path = out / LEDGER_NAME
@@ -126,7 +125,7 @@ def print_spending(out: Path) -> None:
         cost = f", ${spent.cost_usd:.4f}" if spent.cost_usd else ""
         reserved = f", and ${spent.set_aside_usd:.4f} reserved" if spent.set_aside_usd > 1e-9 else ""
         typer.echo(
-            f"{spent.model}: {counted_as(spent.num_asked, 'question')} asked{lost}, "
+            f"{spent.model}: {counted(spent.num_asked, 'question')} asked{lost}, "
             f"{spent.num_replayed} answered from exchanges; "
             f"{spent.input_tokens} tokens in, {spent.output_tokens} out{cost}{reserved}"
         )

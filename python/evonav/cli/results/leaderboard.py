@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, progress_bar
+from evonav.cli.display import progress_bar
 from evonav.cli.options import completion
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import BUNDLED, Limit, Subset, chosen_tasks
 from evonav.cli.results.submission import SCORES_ONLY_HELP
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -57,9 +58,9 @@ def leaderboard(
         )
     for one in board.unranked:
         typer.echo(f"{one.status}: {one.file}: {one.detail}")
-    agents = counted_as(sum(map(len, board.tables.values())), "agent")
+    agents = counted(sum(map(len, board.tables.values())), "agent")
     page = write_leaderboard(board, out, page_title)
-    tables = counted_as(len(board.tables), "table")
+    tables = counted(len(board.tables), "table")
     typer.echo(f"leaderboard: {page} ({agents} in {tables}; {len(board.unranked)} not ranked)")
 
 

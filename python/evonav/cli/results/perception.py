@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, interruptible, progress_bar, show_tables
+from evonav.cli.display import interruptible, progress_bar, show_tables
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
@@ -16,6 +16,7 @@ from evonav.cli.options.shared import (
     Tasks,
     chosen_tasks,
 )
+from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run_settings import RunSettings
@@ -97,7 +98,7 @@ def perception(
             typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
     if measured.failures:
         typer.echo(
-            f"incomplete: {counted_as(len(measured.tasks), 'task')} done; run the same command again to resume",
+            f"incomplete: {counted(len(measured.tasks), 'task')} done; run the same command again to resume",
             err=True,
         )
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, print_checks, progress_bar, show
+from evonav.cli.display import print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -54,7 +55,7 @@ def pack(
     header = pack(run, target, agents=names, about=about)
     typer.echo(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
-        f" {counted_as(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)"
+        f" {counted(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)"
     )
     if dataset is not None:
         for path in write_eval_results(target, dataset):
@@ -111,7 +112,7 @@ def _print(file: Path, verdict: "Verdict") -> None:
     )
     num_tasks = 0 if verdict.submission is None else len(verdict.submission.tasks)
     if verdict.is_accepted and verdict.num_required < num_tasks:
-        typer.echo(f"verified {verdict.num_required} of {counted_as(num_tasks, 'task')}; without --limit, all")
+        typer.echo(f"verified {verdict.num_required} of {counted(num_tasks, 'task')}; without --limit, all")
     if verdict.is_accepted and verdict.submission is not None:
         scores = Table(title="SR and SPL in %, as scored again")
         for column in ("agent", "n", "SR", "SPL"):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, status
+from evonav.cli.display import status
 from evonav.cli.options.shared import (
     Exchanges,
     OldTask,
@@ -16,6 +16,7 @@ from evonav.cli.options.shared import (
     listed,
     numbers_of,
 )
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,7 +76,7 @@ def video(
 
         speed = fps or (ACTIONS_FPS if budget > MANY_ROUNDS else ROUNDS_FPS)
         num = write_video((pictures(one) for one in stages[1]), out, fps=speed, width_px=width)
-    typer.echo(f"video: {out} ({agent} in {stages[0][0].record.task_id}, {counted_as(num, 'picture')})")
+    typer.echo(f"video: {out} ({agent} in {stages[0][0].record.task_id}, {counted(num, 'picture')})")
 
 
 def rerun(

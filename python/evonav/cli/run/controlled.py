@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from evonav.cli.display import counted_as, interruptible, print_table, show_tables, status
+from evonav.cli.display import interruptible, print_table, show_tables, status
 from evonav.cli.group import Command, new_app
 from evonav.cli.options.decisions import decision_component
 from evonav.cli.options.settings import with_settings
@@ -21,6 +21,7 @@ from evonav.cli.options.shared import (
     Seed,
     names_of,
 )
+from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run import Progress
@@ -100,7 +101,7 @@ def generate(
         )
     record = made.record
     arms = ", ".join(arm.name for arm in record.arms)
-    typer.echo(f"{counted_as(len(record.task_ids), 'task')} in each arm ({arms}) in {out}; {made.num_new} new")
+    typer.echo(f"{counted(len(record.task_ids), 'task')} in each arm ({arms}) in {out}; {made.num_new} new")
     for rejection in record.rejections:
         typer.echo(f"  without: {rejection.house}: {rejection.reason}")
 

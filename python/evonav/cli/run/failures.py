@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as
 from evonav.cli.options.shared import RunAgents, RunFolder, listed
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +46,7 @@ def _print_group(group: "Sequence[FailureRow]", *, is_brief: bool) -> None:
     what = "tried again" if first.is_retried else "errored"
     where = f"{first.task_id} stage {first.stage}"
     if len(group) > 1:
-        where = f"{counted_as(len(group), 'stage')}, first: {where}"
+        where = f"{counted(len(group), 'stage')}, first: {where}"
     typer.echo(f"{first.agent} {where}: {what}, since {first.kind.phrase}: {first.message}")
     if first.traceback and not is_brief:
         typer.echo("".join(f"    {line}\n" for line in first.traceback.rstrip().splitlines()))
@@ -63,7 +63,7 @@ def print_failures(run: "Path") -> None:
     for is_retried, what in ((True, "tried again"), (False, "errored")):
         reasons = Counter(_reason(row) for row in rows if row.is_retried is is_retried)
         for reason, count in sorted(reasons.items()):
-            typer.echo(f"{counted_as(count, 'stage')} {what}: {reason}")
+            typer.echo(f"{counted(count, 'stage')} {what}: {reason}")
     if any(_is_budget(row) and not row.is_retried for row in rows):
         typer.echo("to continue: run the same command with a higher --max-cost and --retry-errored")
     if rows:

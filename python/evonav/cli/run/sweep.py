@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import EXIT_INTERRUPTED, counted_as, show, show_tables
+from evonav.cli.display import EXIT_INTERRUPTED, show, show_tables
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -161,7 +162,7 @@ def _print_plan(
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
         check_agent_name(agent, is_in_process=settings.in_process)
     has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
-    table = Table(title=f"{counted_as(len(cells), 'cell')} into {out}", title_justify="left")
+    table = Table(title=f"{counted(len(cells), 'cell')} into {out}", title_justify="left")
     table.add_column("cell", overflow="fold", min_width=20)
     table.add_column("agents", overflow="fold")
     for heading in ("tasks", "stages", *(["requests", "tokens in", "dollars"] if has_models else [])):
@@ -184,7 +185,7 @@ def _print_plan(
             total += run.num_stages
             table.add_row(cell.name, ", ".join(cell.agents), str(len(run.request.tasks)), str(run.num_stages), *cost)
     show(table)
-    typer.echo(counted_as(total, "stage") + (f", about ${total_usd:.2f}" if total_usd else ""))
+    typer.echo(counted(total, "stage") + (f", about ${total_usd:.2f}" if total_usd else ""))
     if has_models and settings.prices is None:
         typer.echo("no prices: name a file of prices in the sweep file, such as prices = 'prices.json'")
     if settings.max_cost is not None and total_usd > settings.max_cost:

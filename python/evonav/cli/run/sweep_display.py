@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from evonav.cli.display import LINE_EVERY_S
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -143,7 +144,7 @@ class SweepProgress:
             table.add_column(heading, justify="right", no_wrap=True)
         shown, num_before, num_after = self._shown()
         if num_before:
-            table.add_row(Text(f"{num_before} cells finished", style="dim"))
+            table.add_row(Text(f"{counted(num_before, 'cell')} finished", style="dim"))
         for name in shown:
             state = self.cells[name]
             took_s = 0.0 if state.began_s is None else (state.ended_s or 0.0) - state.began_s
@@ -158,7 +159,7 @@ class SweepProgress:
                 *([f"${costs.get(name, 0.0):.2f}"] if costs else []),
             )
         if num_after:
-            table.add_row(Text(f"{num_after} cells to come", style="dim"))
+            table.add_row(Text(f"{counted(num_after, 'cell')} to come", style="dim"))
         return Group(table, Text(self.line(), style="bold"))
 
     def _shown(self) -> tuple[list[str], int, int]:

@@ -41,7 +41,8 @@ def card(
     """
     from datetime import datetime, timezone
 
-    from evonav.cli.display import counted_as, status
+    from evonav.cli.display import status
+    from evonav.counted import counted
     from evonav.generation.statistics.compute import statistics_of_folders
     from evonav.report.cards.dataset_card import CardOptions, write_dataset_card
     from evonav.report.cards.hub_benchmark import EVAL_NAME
@@ -53,6 +54,6 @@ def card(
         root = found.parent if found.name == DATASET_NAME else found
         statistics = statistics_of_folders([root])
         cards = write_dataset_card(root, out, statistics, options)
-    typer.echo(f"cards: {', '.join(map(str, cards))} ({counted_as(statistics.num_tasks, 'task')})")
+    typer.echo(f"cards: {', '.join(map(str, cards))} ({counted(statistics.num_tasks, 'task')})")
     typer.echo(f"next: hf upload {repo} {out} --repo-type dataset --exclude {EVAL_NAME}")
     typer.echo(f"The Hub accepts {EVAL_NAME} once it lists evonav as a framework; upload it then.")

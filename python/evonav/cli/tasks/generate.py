@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, generation_progress, interruptible
+from evonav.cli.display import generation_progress, interruptible
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     AnyAsset,
@@ -18,6 +18,7 @@ from evonav.cli.options.shared import (
     Subset,
     read_houses,
 )
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -96,7 +97,7 @@ def generate(
 
 def _tell(made: "GenerationSummary", out: Path) -> None:
     rate = f" in {made.seconds:.0f} s ({made.num_new / made.seconds:.1f} tasks/s)" if made.num_new else ""
-    counts = f"{counted_as(len(made.roots), 'task')} in {out}, from {counted_as(made.num_houses, 'house')}"
+    counts = f"{counted(len(made.roots), 'task')} in {out}, from {counted(made.num_houses, 'house')}"
     typer.echo(f"{counts}; {made.num_new} new{rate}")
     for reason, count in made.reasons.most_common():
-        typer.echo(f"  {counted_as(count, 'house')} without a task: {reason}")
+        typer.echo(f"  {counted(count, 'house')} without a task: {reason}")

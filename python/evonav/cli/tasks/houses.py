@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from evonav.cli.display import counted_as, status
+from evonav.cli.display import status
 from evonav.cli.group import HELP_NAMES, Command, Group, new_app
 from evonav.cli.options.shared import (
     BUNDLED,
@@ -17,6 +17,7 @@ from evonav.cli.options.shared import (
     listed,
     read_houses,
 )
+from evonav.counted import counted
 
 EXIT_WRONG = 1
 
@@ -124,7 +125,7 @@ def check_houses(
         for finding in found.findings:
             if not only_wrong or finding.severity == "wrong":
                 typer.echo(f"       {finding.severity}: {finding}")
-    typer.echo(f"{num_wrong} of {counted_as(num_houses, 'house')} wrong")
+    typer.echo(f"{num_wrong} of {counted(num_houses, 'house')} wrong")
     if num_wrong:
         raise typer.Exit(EXIT_WRONG)
 
@@ -166,4 +167,4 @@ def fetch_houses(
     for name in wanted:
         entry = fetched.manifest.splits[name]
         state = "fetched" if name in fetched.new else "verified"
-        typer.echo(f"{NAME}:{name}\t{entry.num_houses} houses\t{state}\t{fetched.folder / entry.file}")
+        typer.echo(f"{NAME}:{name}\t{counted(entry.num_houses, 'house')}\t{state}\t{fetched.folder / entry.file}")

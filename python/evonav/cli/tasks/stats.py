@@ -66,18 +66,18 @@ def print_statistics(found: "TaskStatistics") -> None:
     """Print statistics in tables and lines of 80 columns."""
     from rich.console import Console
 
-    from evonav.cli.display import counted_as
+    from evonav.counted import counted
 
     console = Console(highlight=False)
     counts = ((found.num_tasks, "task"), (found.num_stages, "stage"), (found.num_houses, "house"))
-    what = ", ".join(counted_as(number, noun) for number, noun in counts)
+    what = ", ".join(counted(number, noun) for number, noun in counts)
     console.print(f"{what}; seeds {', '.join(map(str, found.seeds))}; {', '.join(found.generators)}")
     if found.weighting is not None:
         weighting = found.weighting
         console.print(
             f"reweighted to {weighting.mix} by {weighting.by}: equals {weighting.effective_num_tasks:.0f} equally "
             f"weighted tasks, covers {100 * weighting.covered_share:.0f}% of the mix, leaves out "
-            f"{weighting.num_left_out} tasks"
+            f"{counted(weighting.num_left_out, 'task')}"
         )
     console.print(_metrics(found))
     for test in found.tests:

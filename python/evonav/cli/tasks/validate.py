@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, progress_bar
+from evonav.cli.display import progress_bar
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import AnyAsset, Limit, TaskFolder, task_folder
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
@@ -73,8 +74,8 @@ def print_report(report: "FolderReport", *, is_verbose: bool = False) -> None:
         console.print(table, markup=False)
     num_tasks = len(report.reports)
     verdict = "valid" if not report.num_invalid else "INVALID"
-    counted = f"{num_tasks - report.num_invalid} of {counted_as(num_tasks, 'task')} valid"
-    console.print(f"{verdict}: {counted}, {counted_as(num_stages, 'stage')}")
+    num_valid = f"{num_tasks - report.num_invalid} of {counted(num_tasks, 'task')} valid"
+    console.print(f"{verdict}: {num_valid}, {counted(num_stages, 'stage')}")
     if report.source_counts and is_verbose:
         counts = ", ".join(f"{num} {kind}" for kind, num in report.source_counts.most_common())
         console.print(f"oddities of the source houses, which make no task invalid: {counts}", markup=False)

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import counted_as, progress_bar
+from evonav.cli.display import progress_bar
 from evonav.cli.options.decisions import DryRun
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
+from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
@@ -48,14 +49,14 @@ def write(
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"
         num_left = estimate.num_questions - estimate.num_cached
         counts = f"{estimate.num_cached} answered by the cache; {num_left} to ask"
-        typer.echo(f"{counted_as(estimate.num_questions, 'question')}, {counts}:")
+        typer.echo(f"{counted(estimate.num_questions, 'question')}, {counts}:")
         typer.echo(f"at most {estimate.usage.input_tokens} tokens in, {estimate.usage.output_tokens} out{cost}")
         return
     with progress_bar("tasks") as show:
         writing = write_texts(folder, client, limit=limit, on_task=lambda state: show(state.num_done, state.num_tasks))
     _tell(writing)
     cost = "" if account.cost_usd is None else f", ${account.cost_usd:.4f}"
-    counts = f"{counted_as(account.num_asked, 'question')} asked, {account.num_replayed} answered from exchanges"
+    counts = f"{counted(account.num_asked, 'question')} asked, {account.num_replayed} answered from exchanges"
     typer.echo(f"{counts}; {account.usage.input_tokens} tokens in, {account.usage.output_tokens} out{cost}")
     if writing.stopped is not None:
         typer.echo(f"stopped: {writing.stopped}; run again to resume", err=True)
@@ -64,7 +65,7 @@ def write(
 
 def _tell(writing: "Writing") -> None:
     typer.echo(
-        f"{counted_as(writing.num_written, 'stage')} written, {writing.num_written_before} written before, "
+        f"{counted(writing.num_written, 'stage')} written, {writing.num_written_before} written before, "
         f"{writing.failures.total()} keep the texts that they had ({writing.num_done} of {writing.num_tasks} tasks)"
     )
     for kind, count in sorted(writing.failures.items()):

@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from evonav.agents.agent import Agent
+from evonav.counted import counted
 from evonav.evaluation.contract.points import Check
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
@@ -118,7 +119,7 @@ def place_of(traceback: str) -> str:
 
 
 def _end(record: StageRecord) -> str:
-    rounds = "1 round" if record.num_rounds == 1 else f"{record.num_rounds} rounds"
+    rounds = counted(record.num_rounds, "round")
     return f"it stopped after {rounds}" if record.has_stopped else f"it went on for all {rounds}"
 
 

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentSummary, agent_pairs, summarise, summary_json
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import write_atomically
@@ -27,10 +28,10 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
     with RunStore(run_dir) as store:
         agents: list[str] = store.meta("agents") or []
         num_stages = sum(store.meta("num_stages").values())
-        records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
+        records = {agent: list(store.records(agent, is_brief=True)) for agent in agents_in_order(agents)}
         backend = (store.meta("config") or {}).get("backend", {})
         models = store.meta(MODELS_KEY)
-    summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
+    summaries = {agent: summarise(agent, mine, num_stages) for agent, mine in records.items()}
     content = summary_json(list(summaries.values()), agent_pairs(records))
     if make := backend.get("perception"):
         content["perception"] = word_of(make, backend.get("perception_options", {}))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from evonav.counted import counted
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.parallel.folders import sha256_of_file, write_atomically
 from evonav.report.cards.croissant import CROISSANT_NAME, METADATA_NAME, croissant
@@ -68,7 +69,8 @@ def write_dataset_card(folder: Path, out: Path, statistics: TaskStatistics, opti
         _copy(tasks, out)
     metadata = write_atomically(out / METADATA_NAME, tasks.metadata)
     name = options.name or f"EvoNav-Bench: {tasks.record.name}"
-    what = f"{tasks.record.num_tasks} tasks with {len(tasks.rows)} stages in homes that change between visits"
+    size = f"{counted(tasks.record.num_tasks, 'task')} with {counted(len(tasks.rows), 'stage')}"
+    what = f"{size} in homes that change between visits"
     description = f"Lifelong navigation in {what}, in the form of EvoNav-Bench (arXiv:2609.08292)."
     about = {
         "name": tasks.record.name,

@@ -96,9 +96,11 @@ def compare(
     baseline: str | None = None,
     allow_differences: bool = False,
 ) -> list[Comparison]:
-    """Compare every pair of agents, the earlier minus the later, or each agent with the baseline.
+    """Compare every pair of agents, or each agent with the baseline.
 
-    Of several runs with the same agents, an agent is compared with itself in the other runs.
+    Of two agents that the arguments name, or that are of two runs that they name, the difference is the first minus the
+    second. Of two that nobody named, such as all agents of a run, it is the later minus the earlier in the run's order,
+    as in the report. Of several runs with the same agents, an agent is compared with itself in the other runs.
 
     Args:
         compared_agents: Agents from `read_compared_agents`.
@@ -173,7 +175,7 @@ def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> li
                 f"baseline {baseline!r} is none of {', '.join(compared.name for compared in compared_agents)}"
             )
         return [(first[0], compared) for compared in compared_agents if compared is not first[0]]
-    pairs = [(later, earlier) for earlier, later in combinations(compared_agents, 2)]
+    pairs = [(a, b) if a.place == b.place else (b, a) for a, b in combinations(compared_agents, 2)]
     num_runs = len({compared.run.run_dir.resolve() for compared in compared_agents})
     # Two runs of the same six agents: the question is what the settings changed, agent by agent.
     if 1 < num_runs < len(compared_agents):

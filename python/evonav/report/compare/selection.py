@@ -21,6 +21,8 @@ class ComparedAgent:
     """Name in tables: the agent, with its run where several runs are compared."""
     run: Run
     agent: str
+    place: tuple[int, int] = (0, 0)
+    """Place among the runs and agents that the arguments name; agents of a run that none names share a place."""
 
     @cached_property
     def rows(self) -> dict[tuple[str, int], StageMetrics]:
@@ -53,13 +55,13 @@ def read_compared_agents(arguments: Sequence[str]) -> list[ComparedAgent]:
             raise InvalidArgumentError(f"{argument!r} after {before!r}: write RUN:AGENT for it, too")
         else:
             requested[-1][1].append(argument)
-    compared_agents: list[ComparedAgent] = []
-    for run_dir, agents in ((run_dir, agents) for run_dirs, agents in requested for run_dir in run_dirs):
-        for compared in agents_of(load_run(run_dir), agents):
-            there = [(other.run.run_dir, other.agent) for other in compared_agents]
-            if (compared.run.run_dir, compared.agent) not in there:
-                compared_agents.append(compared)
-    return _named(compared_agents)
+    compared_agents: dict[tuple[Path, str], ComparedAgent] = {}
+    for i, (run_dirs, agents) in enumerate(requested):
+        for run_dir in run_dirs:
+            for j, compared in enumerate(agents_of(load_run(run_dir), agents)):
+                placed = replace(compared, place=(i, j if agents else 0))
+                compared_agents.setdefault((compared.run.run_dir, compared.agent), placed)
+    return _named(list(compared_agents.values()))
 
 
 def _runs_of(folder: Path) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from evonav.counted import counted
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip, Part
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, points
@@ -114,7 +115,7 @@ def comparison_table(one: Comparison) -> Table:
         for field, effect in effects.items()
     )
     columns = ("%", one.b, one.a, "difference [95% CI]", "p", "verdict")
-    only = f"Only {one.b} succeeded in {one.all.num_only_b} stages, only {one.a} in {one.all.num_only_a}."
+    only = f"Only {one.b} succeeded in {counted(one.all.num_only_b, 'stage')}, only {one.a} in {one.all.num_only_a}."
     return Table(f"{one.b} minus {one.a}, n = {one.all.n}", columns, rows, (only, METHOD, *_notes_on(effects)))
 
 
@@ -244,7 +245,9 @@ def warnings(comparisons: Sequence[Comparison]) -> list[str]:
     for one in comparisons:
         if one.dropped:
             reasons = ", ".join(f"{count} {reason}" for reason, count in one.dropped.items())
-            lines.append(f"{one.b} and {one.a}: {sum(one.dropped.values())} stages are not compared: {reasons}.")
+            num = sum(one.dropped.values())
+            num_dropped = f"{counted(num, 'stage')} {'is' if num == 1 else 'are'}"
+            lines.append(f"{one.b} and {one.a}: {num_dropped} not compared: {reasons}.")
         if one.settings:
             differing = "; ".join(f"{key}: {b} / {a}" for key, (a, b) in one.settings.items())
             lines.append(f"{one.b} and {one.a} were run with different settings: {differing}.")
@@ -256,10 +259,10 @@ def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 
     p = f"p = {p_words(effect.adjusted_p)}".replace("= <", "< ")
     measured = f"{points(effect, scale_of(field))}{' points' if field in RATES else ''}, {p}"
     measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
-    on = f"on {effect.n} stages of {effect.num_clusters} houses"
+    on = f"on {counted(effect.n, 'stage')} of {counted(effect.num_clusters, 'house')}"
     verdict = effect.verdict
     if verdict == "equal":
-        return f"{a} and {b} are equal on each of {effect.n} stages."
+        return f"{a} and {b} are equal on each of {counted(effect.n, 'stage')}."
     if verdict == "few":
         return f"{b} minus {a}: {measured} {on}: with fewer than {MIN_CLUSTERS} houses, or all alike, one cannot tell."
     if verdict == "tie":

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.drawing.style import file_css
 from evonav.drawing.svg import escape, slug
@@ -9,7 +10,6 @@ from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.report.maps.trajectory import change, course
 from evonav.report.tables.causes import sentence
-from evonav.report.tables.numbers import count
 from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 
@@ -56,12 +56,12 @@ def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
         return "nothing changed"
     rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
     room = rooms.get(transition.room_id or "", transition.room_id or "a room")
-    moved = f"{count(len(transition.relocations), 'object')} moved"
+    moved = f"{counted(len(transition.relocations), 'object')} moved"
     phrases = [f"{mode_words(transition.mode)} in the {room}: {moved}"] if transition.mode is not None else []
     if transition.kind == "activities":
         phrases.append(f"daily activities, most in the {room}: {moved}")
     counts = {"came": transition.num_added, "went": transition.num_removed, "opened or switched": transition.num_states}
-    phrases.extend(f"{count(number, 'object')} {what}" for what, number in counts.items() if number)
+    phrases.extend(f"{counted(number, 'object')} {what}" for what, number in counts.items() if number)
     return ", ".join(phrases)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from evonav.counted import counted
 from evonav.drawing.floor_plan import furniture, ground, item_labels, labels, moving_ids
 from evonav.drawing.svg import clean, join, slug
 from evonav.evaluation.records.schema import EndState, StageRecord
@@ -12,7 +13,6 @@ from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.trajectory import change, course, rounds
 from evonav.report.run import Run, Task
 from evonav.report.tables.causes import sentence
-from evonav.report.tables.numbers import count
 
 
 def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
@@ -95,14 +95,14 @@ def _uses(prefix: str, stage: int) -> str:
 
 def _facts(record: StageRecord) -> str:
     """Return the numbers of a stage in a line."""
-    parts = [count(record.num_rounds, "round")]
+    parts = [counted(record.num_rounds, "round")]
     if record.path_length_m is not None:
         shortest = "" if record.reference_length_m is None else f" (shortest {record.reference_length_m:.1f} m)"
         parts.append(f"walked {record.path_length_m:.1f} m{shortest}")
-    parts.append(f"target in view in {count(record.num_target_visible_rounds, 'round')}")
+    parts.append(f"target in view in {counted(record.num_target_visible_rounds, 'round')}")
     num_stale = sum(entry.is_stale for entry in record.entries)
     if record.entries:
-        parts.append(f"{len(record.entries)} entries, {num_stale} stale")
+        parts.append(f"{counted(len(record.entries), 'entry')}, {num_stale} stale")
     if record.is_snapped:
         parts.append("start moved to the nearest free place")
     if record.transition.is_agent_in_room:

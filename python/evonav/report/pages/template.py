@@ -8,8 +8,8 @@ from importlib.resources import files
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from evonav.counted import counted
 from evonav.drawing.svg import clean
-from evonav.report.tables.numbers import count
 
 
 def text_of(name: str) -> Markup:
@@ -28,7 +28,7 @@ def page_environment() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
     )
-    environment.globals["count"] = count
+    environment.globals["counted"] = counted
     return environment
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from evonav.counted import counted
 from evonav.evaluation.metrics.navigation import Rates
 from evonav.report.paper.tables import NUM_STAGES, PAPER, PaperResult, Perception
 from evonav.report.run import Run
@@ -175,4 +176,4 @@ def _run_size(run: Run) -> str:
     """Describe the size of a run, and whether it is complete."""
     num_stages = sum(run.num_stages.values())
     part = ", incomplete" if any(summary.is_incomplete for summary in run.summaries) else ""
-    return f"{len(run.num_stages)} tasks, {num_stages} stages{part}"
+    return f"{counted(len(run.num_stages), 'task')}, {counted(num_stages, 'stage')}{part}"

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary
-from evonav.report.run import PAPER_ORDER, Run
+from evonav.report.run import Run
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson

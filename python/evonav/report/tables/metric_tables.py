@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from evonav.counted import counted
 from evonav.evaluation.metrics.aggregate import MEASURES, explain
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
@@ -51,7 +52,9 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
             written = partial(estimate_text, scale=100 if measure.unit == "%" else 1, digits=_DIGITS[measure.unit])
             lines.append((name, *(written(cell, has_n=cell.n != totals[agent]) for agent, cell in cells.items())))
     houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
-    sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
+    sizes = "; ".join(
+        f"{agent} {counted(totals[agent], 'stage')} of {counted(houses[agent], 'house')}" for agent in found
+    )
     note = f"{sizes}. 95% bootstrap over houses. In parentheses: how many stages have a value, if not all."
     notes = (note, STRICT_NOTE) if kind == "success" else (note,)
     return Table(TITLES[kind], ("Measure", *found), tuple(lines), notes)

@@ -74,11 +74,6 @@ def estimate_text(
     return f"{text} ({estimate.n})" if has_n else text
 
 
-def count(number: int, noun: str) -> str:
-    """Return a number of things in words: `1 house`, `2 houses`."""
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
-
-
 def scaled(interval: Interval | None, scale: float = 100) -> Interval | None:
     """Return an interval in other units, by default in percent."""
     return None if interval is None else (scale * interval[0], scale * interval[1])

@@ -4,13 +4,14 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Literal
 
+from evonav.counted import counted
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import Run
 from evonav.report.tables import table as tables
-from evonav.report.tables.numbers import NONE, count, percent, points, rate
+from evonav.report.tables.numbers import NONE, percent, points, rate
 from evonav.statistics import MIN_CLUSTERS
 
 
@@ -92,11 +93,13 @@ def statements(run: Run) -> list[str]:
     lines = [_highest("success rate", scored, "sr"), _highest("SPL", scored, "spl")] if len(scored) > 1 else []
     pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
     if pairs and all(pair.sr.num_clusters < MIN_CLUSTERS for pair in pairs):
-        return [*lines, f"{count(pairs[0].sr.num_clusters, 'house')}: too few to tell agents apart."]
+        return [*lines, f"{counted(pairs[0].sr.num_clusters, 'house')}: too few to tell agents apart."]
     for pair in pairs:
         effects = (("SR", pair.sr), ("SPL", pair.spl))
         found = (f"{name} {points(one)} points, {tables.verdict_words(pair.a, pair.b, one)}" for name, one in effects)
-        lines.append(f"{pair.b} minus {pair.a}, on the {pair.n} stages that both scored: {'; '.join(found)}.")
+        lines.append(
+            f"{pair.b} minus {pair.a}, on the {counted(pair.n, 'stage')} that both scored: {'; '.join(found)}."
+        )
     return lines
 
 
@@ -109,4 +112,4 @@ def _highest(title: str, summaries: Sequence[AgentSummary], name: Literal["sr", 
         names = [first.agent, *(summary.agent for summary in others)]
         return f"{', '.join(names[:-1])} and {names[-1]} have the same {title}, {percent(highest)}%, the highest."
     measured = rate(highest, getattr(first, f"{name}_ci95"))
-    return f"{first.agent} has the highest {title}, {measured} % of {first.n} stages."
+    return f"{first.agent} has the highest {title}, {measured} % of {counted(first.n, 'stage')}."

@@ -6,6 +6,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from evonav.counted import counted
 from evonav.drawing.files import check_picture, write_picture
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.style import file_css, map_css
@@ -13,7 +14,6 @@ from evonav.drawing.svg import escape, join, slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.maps.legend import TASK_ENTRIES, legend
 from evonav.report.pages.template import page_text, text_of
-from evonav.report.tables.numbers import count
 from evonav.report.tables.table import mode_words
 from evonav.report.tasks.floor_plans import (
     TaskDrawing,
@@ -85,7 +85,7 @@ def write_gallery(
         text_of("tasks.js"),
         has_drawings=True,
         name=name,
-        summary=f"{count(len(cards), 'task')}, {count(num_stages, 'stage')}",
+        summary=f"{counted(len(cards), 'task')}, {counted(num_stages, 'stage')}",
         cards=cards,
         mode_words={mode: mode_words(mode) for card in cards for mode in card["modes"]},
         modes=sorted({mode for card in cards for mode in card["modes"]}),

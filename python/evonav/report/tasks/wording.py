@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Callable
 
+from evonav.counted import counted
 from evonav.evaluation.records.schema import FloorPlan
-from evonav.report.tables.numbers import count
 from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage
@@ -102,7 +102,7 @@ def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
 
 def _moved_text(evolution: Evolution) -> str:
     """Describe how many objects moved, and how far."""
-    text = f"{count(len(evolution.changes), 'object')} moved"
+    text = f"{counted(len(evolution.changes), 'object')} moved"
     if evolution.changes:
         farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
         text += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"

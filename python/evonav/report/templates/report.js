@@ -58,7 +58,7 @@
       const off = new Set(all("input[type=checkbox]", filters).filter((box) => !box.checked).map((box) => box.value));
       hidden = off;
       hideAgents(document);
-      filters.querySelector("output").textContent = shown === total ? `${total} tasks` : `${shown} of ${total} tasks`;
+      filters.querySelector("output").textContent = `${shown === total ? "" : `${shown} of `}${total} ${total === 1 ? "task" : "tasks"}`;
     };
     filters.addEventListener("input", apply);
     apply();

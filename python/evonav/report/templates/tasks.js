@@ -11,7 +11,7 @@
         && (!mode.value || data.modes.split(" ").includes(mode.value)));
       shown += !card.hidden;
     }
-    form.querySelector("output").textContent = shown === cards.length ? `${shown} tasks` : `${shown} of ${cards.length} tasks`;
+    form.querySelector("output").textContent = `${shown === cards.length ? "" : `${shown} of `}${cards.length} ${cards.length === 1 ? "task" : "tasks"}`;
   };
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("input", apply);
