@@ -54,8 +54,8 @@ def show_tables(tables: "Iterable[Table]") -> None:
 def in_parts(table: "Table", width: int) -> "list[Table]":
     """Split the columns of a table, without its notes, so that no line is longer than `width`.
 
-    Every part repeats the columns that name a row: the first ones, as many as tell all rows apart. A cell wider than the
-    space that these leave is wrapped.
+    Every part repeats the columns that name a row: the first ones, as many as tell all rows apart. A cell that is wider
+    than the space that is left is wrapped.
     """
     from dataclasses import replace
 
