@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from evonav.counted import counted
 from evonav.drawing.svg import slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.cards.hub_benchmark import METRICS, RESULTS_DIR, eval_results_yaml
 from evonav.report.cards.yaml_text import Yaml
-from evonav.report.tables.numbers import count
 from evonav.submission.pack import SUFFIX, SubmissionFile
 from evonav.submission.packed_setup import packed_setup
 
@@ -32,7 +32,12 @@ def write_eval_results(pack: Path, dataset: str) -> list[Path]:
     texts = {}
     for agent, row in header.summary["agents"].items():
         decision = f"{setup.decision} {setup.model}".strip()
-        notes = [f"agent {agent}", f"decision {decision}", count(len(header.tasks), "task"), count(row["n"], "stage")]
+        notes = [
+            f"agent {agent}",
+            f"decision {decision}",
+            counted(len(header.tasks), "task"),
+            counted(row["n"], "stage"),
+        ]
         intervals = {metric: row[f"{metric}_ci95"] for metric in METRICS}
         notes += [
             f"{metric.upper()} 95% CI {100 * ends[0]:.1f} to {100 * ends[1]:.1f}"
