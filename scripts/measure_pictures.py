@@ -77,39 +77,37 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     console = Console()
     network = None if asked.no_detector else load_yolov4_tiny(weights_path(asked.models))
-    measured = houses_of_set(asked.houses, asked.set)
-    result: dict[str, Any] = {
-        "set": asked.set,
-        "houses": asked.houses,
-        "views": asked.views,
-        "seed": asked.seed,
-        "style": asked.style,
-    }
-    if network is not None:
-        recalls = recall_by_type(network, views(measured, asked.views, asked.seed, style=asked.style))
-        result["recall"] = {name: recall.as_json() for name, recall in recalls.items()}
-        console.print(recall_table(recalls, asked.set))
-    ours = [view.rgb for view in views(measured, NUM_STATISTICS, asked.seed, style=asked.style, looks=LIKE_RECORDED)]
     recorded = [frame for folder in asked.recorded for frame in recorded_frames(folder)]
-    columns = {"ours": statistics_of(ours)}
-    if recorded:
-        columns["recorded"] = statistics_of([resized(frame, ours[0].shape[0]) for frame in recorded])
-    fires = {}
+    houses = houses_of_set(asked.houses, asked.set)
+    result = {name: getattr(asked, name) for name in ("set", "houses", "views", "seed", "style", "pixels")}
     if network is not None:
-        fires = {name: fires_a_frame(network, some) for name, some in (("ours", ours), ("recorded", recorded)) if some}
+        measured = views(houses, asked.views, asked.seed, style=asked.style, image_px=asked.pixels)
+        recalls = recall_by_type(network, measured)
+        console.print(recall_table(recalls, asked.set))
+        result["recall"] = {name: recall.as_json() for name, recall in recalls.items()}
+    like_recorded = views(houses, NUM_STATISTICS, asked.seed, style=asked.style, looks=LIKE_RECORDED)
+    ours = [view.rgb for view in like_recorded]
+    pictures = {"ours": ours, **({"recorded": recorded} if recorded else {})}
+    columns = {name: statistics_of([resized(one, len(ours[0])) for one in some]) for name, some in pictures.items()}
+    fires = {} if network is None else {name: fires_a_frame(network, some) for name, some in pictures.items()}
+    console.print(statistics_table(columns, fires))
     result["statistics"] = {name: one.as_json() for name, one in columns.items()}
     result["fires_a_frame"] = fires
-    console.print(statistics_table(columns, fires))
     (asked.out / "pictures.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if asked.sheet:
-        design = houses_of_set(asked.houses, "design")
-        shown = fullest_views(design, asked.sheet, asked.seed, style=asked.style)
-        found = None if network is None or not asked.boxes else [matched(network, view) for view in shown]
-        contact_sheet(shown, found).save(asked.out / "sheet.png")
-        if recorded:
-            beside = fullest_views(design, asked.sheet, asked.seed, style=asked.style, looks=LIKE_RECORDED)
-            paired_sheet(recorded, [view.rgb for view in beside]).save(asked.out / "beside.png")
+        write_sheets(asked, network if asked.boxes else None, recorded)
     console.print(f"{asked.out}: {', '.join(sorted(path.name for path in asked.out.iterdir()))}")
+
+
+def write_sheets(asked: argparse.Namespace, network: YoloV4Tiny | None, recorded: Sequence[NDArray[np.uint8]]) -> None:
+    """Writes `sheet.png`, with what a network finds if it is given, and `beside.png` if there are recorded frames."""
+    design = houses_of_set(asked.houses, "design")
+    shown = fullest_views(design, asked.sheet, asked.seed, style=asked.style)
+    found = None if network is None else [matched(network, view) for view in shown]
+    contact_sheet(shown, found).save(asked.out / "sheet.png")
+    if recorded:
+        beside = fullest_views(design, asked.sheet, asked.seed, style=asked.style, looks=LIKE_RECORDED)
+        paired_sheet(recorded, [view.rgb for view in beside]).save(asked.out / "beside.png")
 
 
 def recall_by_type(network: YoloV4Tiny, some: Iterable[PictureView]) -> dict[str, Recall]:
@@ -119,7 +117,10 @@ def recall_by_type(network: YoloV4Tiny, some: Iterable[PictureView]) -> dict[str
         for truth, confidence in zip(view.truths, matched(network, view), strict=True):
             found["all"].append(confidence)
             found[truth.type].append(confidence)
-    return {kind: Recall(tuple(found[kind])) for kind in sorted(found, key=lambda kind: (-len(found[kind]), kind))}
+    return {
+        kind: Recall(tuple(found[kind]))
+        for kind in sorted(found, key=lambda kind: (kind != "all", -len(found[kind]), kind))
+    }
 
 
 def matched(network: YoloV4Tiny, view: PictureView) -> list[float]:
@@ -208,6 +209,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--views", type=int, default=320)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--style", choices=get_args(Style), default="default", help="style that the simulator draws in")
+    parser.add_argument("--pixels", type=int, default=300, help="side of the measured images; default: 300")
     parser.add_argument("--set", choices=SETS, default="held-out", help="houses to measure on")
     parser.add_argument("--recorded", nargs="*", type=Path, default=[], help="folders of recorded AI2-THOR frames")
     parser.add_argument("--sheet", type=int, default=0, metavar="N", help="views of design houses to draw on a sheet")
