@@ -161,8 +161,8 @@ def _readme(
         has_bundled_houses=tasks.has_bundled_houses,
         extensions=[name for name, value in tasks.record.parameters.extensions if value is not None],
         statistics=statistics,
-        num_categories={key: _num_values(statistics, key) for key in ("goal_categories", "house_categories")},
-        num_objects=sum(statistics.distribution("house_categories").counts),  # type: ignore[union-attr]
+        num_categories={key: len(_counts(statistics, key)) for key in ("goal_categories", "house_categories")},
+        num_objects=sum(_counts(statistics, "house_categories")),
         paper=Markup(_paper_table(statistics).markdown()),  # noqa: S704 - numbers and our own labels
         dataset_sha256=sha256s[DATASET_NAME],
         max_listed=MAX_LISTED,
@@ -174,9 +174,9 @@ def _readme(
     return text + "\n"
 
 
-def _num_values(statistics: TaskStatistics, key: str) -> int:
+def _counts(statistics: TaskStatistics, key: str) -> tuple[int, ...]:
     found = statistics.distribution(key)
-    return 0 if found is None else len(found.names)
+    return () if found is None else found.counts
 
 
 def _paper_table(statistics: TaskStatistics) -> Table:
