@@ -4,7 +4,10 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets},
+    assets::{
+        Catalogue, UnknownAssets,
+        material::{Material, MaterialKind},
+    },
     geometry::Pose,
     house::House,
     sensors::{
@@ -15,6 +18,7 @@ use evonav_core::{
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
+    textures::texture_of,
     world::{mesh::SceneMesh, scene::Scene},
 };
 
@@ -106,6 +110,18 @@ fn bench_raster(c: &mut Criterion) {
             visible_bodies(&scene, &mesh, &caster, &View::from(*camera), [x, z], 1.5)
         });
     });
+    // A pixel of a textured floor, far away and close up.
+    let floor = Material { kind: MaterialKind::Planks, variant: 0 };
+    let texture = texture_of(floor).expect("planks have a texture");
+    for (name, width2) in [("between_copies", 2.0), ("one_copy", 4.0)] {
+        c.bench_function(&format!("textures/sample_1000_{name}"), |b| {
+            b.iter(|| {
+                let place = |i: u16| (f32::from(i) * 0.013, f32::from(i) * 0.007);
+                let samples = (0..1000).map(place);
+                samples.fold(0, |sum, (u, v)| sum ^ texture.sample(u, v, black_box(width2)))
+            });
+        });
+    }
     c.bench_function("mesh/build", |b| b.iter(|| SceneMesh::build(black_box(&scene))));
     c.bench_function("raycast3d/build", |b| b.iter(|| RayCaster::build(black_box(&mesh))));
 }

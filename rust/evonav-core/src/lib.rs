@@ -1,7 +1,8 @@
 //! The algorithms of evonav in pure Rust: houses, the simulator, mapping and task generation.
 //!
 //! Modules import each other in one direction: [`house`] -> [`assets`] -> [`world`] -> [`sensors`]
-//! -> [`memory`], with [`simulator`], [`generation`], [`perception`] and [`unigoal`] on top.
+//! -> [`memory`], with [`simulator`], [`generation`], [`perception`] and [`unigoal`] on top;
+//! [`textures`] belong to [`sensors`].
 //! Lengths are in metres and angles in radians, in AI2-THOR's frame: left-handed, y up, yaw
 //! clockwise from +z seen from above.
 
@@ -16,6 +17,7 @@ pub mod perception;
 pub mod rng;
 pub mod sensors;
 pub mod simulator;
+pub mod textures;
 pub mod unigoal;
 pub mod world;
 

@@ -8,5 +8,6 @@ mod recorded;
 mod solids;
 
 mod catalogue;
+mod materials;
 mod shapes;
 mod shapes_open;

@@ -7,5 +7,6 @@ mod scenes;
 mod images;
 mod png;
 mod raster;
+mod textures;
 mod visible_bodies;
 mod visible_px;

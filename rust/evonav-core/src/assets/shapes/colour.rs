@@ -16,6 +16,12 @@ impl Paint {
         Self { colour, kind }
     }
 
+    /// Return the paint as it looks: pale wood is painted, and its grain does not show.
+    fn finished(self) -> Self {
+        let is_painted = self.kind == MaterialKind::Wood && is_pale(self.colour);
+        if is_painted { self.of(MaterialKind::Smooth) } else { self }
+    }
+
     /// Return the same colour on another material.
     pub const fn of(self, kind: MaterialKind) -> Self {
         Self { kind, ..self }
@@ -66,7 +72,7 @@ pub fn hash(text: &str) -> u32 {
 /// is that of `otherwise`, unless the asset is made of something else.
 pub fn tint(asset: &Asset, index: usize, otherwise: Paint) -> Paint {
     let colour = asset.colours.get(index).copied().unwrap_or(otherwise.colour);
-    Paint { colour, kind: substance(asset, otherwise.kind) }
+    Paint { colour, kind: substance(asset, otherwise.kind) }.finished()
 }
 
 /// Return the kind of what is wood or cloth on most assets of a category.
@@ -85,6 +91,11 @@ fn substance(asset: &Asset, usual: MaterialKind) -> MaterialKind {
 pub fn shade(paint: Paint, factor: f64) -> Paint {
     let scaled = |channel| (f64::from(channel) * factor).round().clamp(0.0, 255.0) as u8;
     Paint { colour: paint.colour.map(scaled), ..paint }
+}
+
+/// Return whether wood of a colour is painted white rather than shows its grain.
+pub fn is_pale(colour: [u8; 3]) -> bool {
+    colour.iter().all(|&channel| channel > 175)
 }
 
 /// Return the colour that a material shows indoors: black reflects a little and white not all.

@@ -22,7 +22,7 @@ use crate::{
     assets::{Asset, part::Part},
     house::Condition,
 };
-pub(crate) use colour::lit;
+pub(crate) use colour::{is_pale, lit};
 use sketch::Sketch;
 pub use sketch::{Detail, ShapeTraits};
 

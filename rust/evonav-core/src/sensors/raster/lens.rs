@@ -236,6 +236,11 @@ pub(super) struct Rays {
 }
 
 impl Rays {
+    /// Return the place of the camera.
+    pub fn eye_m(&self) -> [f32; 3] {
+        self.eye_m
+    }
+
     /// Return the world points of a block of pixels, and the width of each pixel there, across the
     /// ray.
     #[inline(always)]

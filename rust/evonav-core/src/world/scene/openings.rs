@@ -5,7 +5,7 @@ use crate::{
         Asset,
         material::{Finish, Material, MaterialKind},
         part::Part,
-        shapes::lit,
+        shapes::{is_pale, lit},
     },
     geometry::{Vec2, Vec3, add, compose, rotate, yaw_rotation},
     house::{House, Opening},
@@ -31,12 +31,12 @@ const SKY: [u8; 3] = [190, 215, 235];
 pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);
-    let finish = |index: usize, otherwise: [u8; 3], kind: MaterialKind| Finish {
-        colour: lit(colours.get(index).copied().unwrap_or(otherwise)),
-        material: Material::named(kind, &door.asset_id),
+    let finish = |index: usize, otherwise: [u8; 3]| {
+        let colour = colours.get(index).copied().unwrap_or(otherwise);
+        let kind = if is_pale(colour) { MaterialKind::Smooth } else { MaterialKind::Wood };
+        Finish { colour: lit(colour), material: Material::named(kind, &door.asset_id) }
     };
-    let wood = finish(0, [150, 105, 70], MaterialKind::Wood);
-    let trim = finish(1, [225, 220, 210], MaterialKind::Smooth);
+    let [wood, trim] = [finish(0, [150, 105, 70]), finish(1, [225, 220, 210])];
     let bar = BAR_M.min(0.1 * (along[1] - along[0]));
     let depth = [-FRAME_HALF_M, FRAME_HALF_M];
     let inner = [along[0] + bar, along[1] - bar];

@@ -105,7 +105,7 @@ impl Lit {
         let normal = mesh.faces[patch.face].normal;
         let level = (0.8 + 0.2 * normal[1] + 0.06 * normal[0]) as f32;
         let shades = &self.bends.light[block * LANES..][..LANES];
-        let channels = patch.colours(mesh).map(|channel| {
+        let channels = patch.colours(mesh, rays).map(|channel| {
             std::array::from_fn::<_, LANES, _>(|lane| to_byte(channel[lane] * level * shades[lane]))
         });
         std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8))

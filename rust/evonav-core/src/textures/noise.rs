@@ -1,0 +1,81 @@
+//! Noise that repeats, from whole numbers and basic arithmetic alone: the same on every platform.
+
+/// Scramble whole numbers to a whole number.
+pub fn hash(x: u32, y: u32, seed: u32) -> u32 {
+    let mut h = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77);
+    h = (h ^ seed.wrapping_mul(0xc2b2_ae3d)).wrapping_add(0x27d4_eb2f);
+    h = (h ^ h >> 15).wrapping_mul(0x2c1b_3c6d);
+    h = (h ^ h >> 12).wrapping_mul(0x297a_2d39);
+    h ^ h >> 15
+}
+
+/// Return a number between 0 and 1 for whole numbers.
+pub fn random(x: u32, y: u32, seed: u32) -> f32 {
+    (hash(x, y, seed) >> 8) as f32 / 16_777_216.0
+}
+
+/// Return smooth noise between 0 and 1 at `[u, v]`, which repeats every 1 in both directions.
+///
+/// # Arguments
+/// * `cells` - number of random values from 0 to 1 in each direction.
+pub fn noise(u: f32, v: f32, cells: [u32; 2], seed: u32) -> f32 {
+    let [(x0, x1, fx), (y0, y1, fy)] = [lattice(u, cells[0]), lattice(v, cells[1])];
+    let at = |x: u32, y: u32| random(x, y, seed);
+    mix(mix(at(x0, y0), at(x1, y0), fx), mix(at(x0, y1), at(x1, y1), fx), fy)
+}
+
+/// Return the cells before and after a coordinate, and the smoothed distance from the first.
+fn lattice(u: f32, cells: u32) -> (u32, u32, f32) {
+    let scaled = fract(u) * cells as f32;
+    let cell = (scaled as u32).min(cells - 1);
+    let t = scaled - cell as f32;
+    (cell, (cell + 1) % cells, t * t * (3.0 - 2.0 * t))
+}
+
+/// Return the sum of `octaves` of noise, each twice as fine and half as strong, between 0 and 1.
+pub fn fractal(u: f32, v: f32, cells: [u32; 2], octaves: u32, seed: u32) -> f32 {
+    let (mut sum, mut weight, mut total) = (0.0, 1.0, 0.0);
+    for octave in 0..octaves {
+        let cells = cells.map(|count| count << octave);
+        sum += weight * noise(u, v, cells, seed.wrapping_add(101 * octave));
+        total += weight;
+        weight *= 0.5;
+    }
+    sum / total
+}
+
+/// Return the part of a number after its whole part, from 0 to 1.
+pub fn fract(value: f32) -> f32 {
+    let rest = value - value as i32 as f32;
+    if rest < 0.0 { rest + 1.0 } else { rest }
+}
+
+/// Return the number between `a` and `b` at a share of the way.
+pub fn mix(a: f32, b: f32, share: f32) -> f32 {
+    a + (b - a) * share
+}
+
+/// Return the colour between two others at a share of the way.
+pub fn blend(a: [f32; 3], b: [f32; 3], share: f32) -> [f32; 3] {
+    std::array::from_fn(|i| mix(a[i], b[i], share))
+}
+
+/// Return 0 up to `from`, 1 beyond `to` and a smooth ramp between.
+pub fn ramp(from: f32, to: f32, value: f32) -> f32 {
+    let t = ((value - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Return a wave between -1 and 1 of period 1, close to the sine.
+pub fn wave(value: f32) -> f32 {
+    let t = fract(value);
+    let half = if t < 0.5 { t } else { t - 0.5 };
+    let arch = 16.0 * half * (0.5 - half);
+    if t < 0.5 { arch } else { -arch }
+}
+
+/// Return how dark and light a groove or an edge `width` wide is at a distance from it: 1 on it, 0
+/// beyond.
+pub fn line(distance: f32, width: f32) -> f32 {
+    1.0 - ramp(0.5 * width, width, distance.abs())
+}
