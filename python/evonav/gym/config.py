@@ -14,6 +14,7 @@ ActionMode = Literal["actions", "waypoints"]
 WaypointFrame = Literal["relative", "polar", "start"]
 Reward = Literal["sparse", "spl", "progress"]
 StopMode = Literal["explicit", "automatic"]
+RenderView = Literal["camera", "map"]
 
 ObservationName = Literal[
     "depth",
@@ -76,6 +77,10 @@ class NavConfig(BaseModel):
     success_radius_m: float = Field(ProtocolConfig().success_radius_m, ge=0.01, le=100.0)
     style: Style = SimulatorConfig().style
     """Way in which the colours of `rgb` are drawn: `outlined`, `plain` (the fastest) or `default`."""
+    render_view: RenderView = "camera"
+    """Picture that `render` gives: what the agent's `camera` sees, or a `map` of the house with path and target."""
+    map_px: int = Field(400, ge=32, le=2048)
+    """Side of the map in pixels."""
     reward: Reward = "progress"
     reference_image_px: int = Field(300, ge=1, le=4096)
     """Side of `reference_image` in pixels; images of another size are resampled."""

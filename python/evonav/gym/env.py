@@ -9,6 +9,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from evonav.gym.config import NavConfig
+from evonav.gym.modes import RENDER_MODES
 from evonav.gym.vector_env import Infos, Observations, VectorEnv
 
 
@@ -27,7 +28,7 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
         ((128, 128), 1)
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # type: ignore[misc]
 
     def __init__(
         self,
@@ -44,7 +45,7 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
             tasks: Folder of tasks; by default the bundled ones.
             subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
-            render_mode: `rgb_array`, or none.
+            render_mode: `rgb_array` for pictures of `render_view` (`NavConfig`), or none.
             **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
@@ -88,7 +89,11 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
         return self._observation(), float(rewards[0]), bool(terminations[0]), False, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the agent's view, `(H, W, 3)`, in mode `rgb_array`."""
+        """Return a picture in mode `rgb_array`: the camera's, `(H, W, 3)`, or the map, `(S, S, 3)`.
+
+        Raises:
+            ResetNeeded: No task was begun.
+        """
         views = self._batch.render()
         return None if views is None else views[0]
 

@@ -20,8 +20,9 @@ from evonav import _core
 from evonav.agents.agent import SensorConfig
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
-from evonav.gym import spaces
+from evonav.gym import modes, spaces
 from evonav.gym.config import STOP, NavConfig
+from evonav.gym.map_view import MapView
 from evonav.gym.stage import RewardedStage, task_result
 from evonav.gym.worlds import StageWorld, TaskSource, WorldLoader
 from evonav.world.pose import Pose
@@ -59,7 +60,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": ["rgb_array"],
+        "render_modes": list(modes.RENDER_MODES),
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -85,7 +86,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             num_envs: Number B of environments.
             subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
-            render_mode: `rgb_array`, or none.
+            render_mode: `rgb_array` for pictures of `render_view` (`NavConfig`), or none.
             num_threads: Threads that move and render; by default one per core. Results do not depend on it.
             copy: Whether every step returns arrays of its own. Otherwise a step overwrites the images of the previous
                 one, which saves the allocation of their memory.
@@ -98,9 +99,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             InvalidArgumentError: A setting is out of range.
             TaskError: The folder has no tasks, or not the subset.
         """
+        modes.check_render_mode(render_mode)
         given = {name: getattr(config, name) for name in config.model_fields_set} if config else {}
         self.config = NavConfig(**(given | settings))
-        mode = _autoreset_mode(autoreset_mode)
+        mode = modes.autoreset_mode(autoreset_mode)
         self.metadata = self.metadata | {"autoreset_mode": mode}  # type: ignore[misc]
         self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
         self.single_observation_space = spaces.observation_space(self.config)
@@ -121,6 +123,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         self.loader = WorldLoader(TaskSource(tasks, subset=subset), self.config, cache_mb * 2**20)
         self._images: dict[str, NDArray[Any]] = {}
         self._episodes: list[_Episode] = []
+        self._maps: dict[int, MapView] = {}
+        """Maps of all agents; empty if they are not rendered."""
         self._randoms: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
         self._poses = np.zeros((num_envs, 5))
         self._origins = np.zeros((num_envs, 5))
@@ -212,6 +216,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 self._has_succeeded[index], self._has_arrived[index] = 1, 0
                 continue
             end = self._pose(index)
+            self._walk(index, [(end.x_m, end.z_m)])
             stops = is_stop[index] or (is_automatic and episode.rewarded.is_within_radius(end))
             rewards[index] = episode.rewarded.advance(end, lengths_m[index], distances_m[index], is_stop=stops)
             if episode.rewarded.progress.is_over:
@@ -226,9 +231,17 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return not self._episodes or self._episodes[index].is_over
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Return the agents' views, `(H, W, 3)` each, in mode `rgb_array`."""
-        if self.render_mode != "rgb_array":
+        """Return a picture of each agent in mode `rgb_array`: its camera's `(H, W, 3)`, or a map `(S, S, 3)`.
+
+        Raises:
+            ResetNeeded: No task was begun.
+        """
+        if self.render_mode is None:
             return None
+        if not self._episodes:
+            raise ResetNeeded("no task was begun: call reset first")
+        if self.config.render_view == "map":
+            return tuple(self._maps[index].draw(self._pose(index)) for index in range(self.num_envs))
         rgb = np.empty((self.num_envs, self.config.height_px, self.config.width_px, 3), np.uint8)
         self._batch.render(depth_m=None, rgb=rgb, labels=None)
         return tuple(rgb)
@@ -255,6 +268,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         path_m = self._batch.plan_one(index, at.target_m)
         if path_m:
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
+        if self.render_mode is not None and self.config.render_view == "map":
+            self._maps[index] = MapView(self.config, at, start)
         is_last = at.stage == at.task.num_stages
         self.loader.prefetch(numbers[is_last], 1 if is_last else at.stage + 1)
         length_m = motion.polyline_length_m(path_m) if path_m else None
@@ -320,7 +335,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         num_passed = self._batch.follow(index, stops)
         self._has_succeeded[index] = num_passed == len(points)
         self._has_arrived[index] = is_end and num_passed == len(points)
+        self._walk(index, points[:num_passed])
         return motion.polyline_length_m(way[: num_passed + 1])
+
+    def _walk(self, index: int, points_m: list[tuple[float, float]]) -> None:
+        if index in self._maps:
+            self._maps[index].walk(points_m)
 
     def _pose(self, index: int) -> Pose:
         return Pose(*self._poses[index].tolist())
@@ -380,15 +400,6 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 "reference_length_m": math.nan if length_m is None else length_m,
             }
         return info
-
-
-def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    expected = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
-    for known in expected:
-        if mode in (known, known.value):
-            return known
-    names = " or ".join(repr(known.value) for known in expected)
-    raise InvalidArgumentError(f"argument `autoreset_mode` is {mode!r}, expected {names}")
 
 
 def _num_cores() -> int:
