@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.gym.config import STEP_COST, SUCCESS_REWARD, NavConfig
 from evonav.world.pose import Pose
@@ -63,6 +65,15 @@ class RewardedStage:
     def is_within_radius(self, end: Pose) -> bool:
         """Return whether the stage would be a success if it ended at `end`."""
         return self.progress.score((end.x_m, end.z_m)).is_success
+
+    def oracle(self) -> dict[str, Any]:
+        """Return the target, the geodesic distance to it and the reference length, for `info["oracle"]`."""
+        length_m = self.progress.reference_length_m
+        return {
+            "target_m": np.array(self.progress.target_m),
+            "geodesic_distance_m": self.distance_m,
+            "reference_length_m": math.nan if length_m is None else length_m,
+        }
 
     def result(self, stage: int, end: Pose) -> dict[str, Any]:
         """Return the stage's metrics, equal to what `evonav evaluate` records for the same steps.

@@ -1,7 +1,6 @@
 """Run many environments at once: Rust moves and renders all agents in parallel, without Python's lock."""
 
 import math
-import os
 from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from evonav.gym.config import STOP, NavConfig
 from evonav.gym.map_view import MapView
 from evonav.gym.stage import RewardedStage, task_result
 from evonav.gym.worlds import StageWorld, TaskSource, WorldLoader
+from evonav.parallel.local import num_cores
 from evonav.world.pose import Pose
 
 Observations = dict[str, Any]
@@ -116,7 +116,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             turn_rad=math.radians(camera.turn_deg),
             grid_m=camera.grid_m,
             min_area_px=self.config.min_mask_px,
-            num_threads=num_threads or _num_cores(),
+            num_threads=num_threads or num_cores(),
         )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -390,19 +390,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     def info(self, index: int) -> Infos:
         """Return the info of one environment, without what the end of a stage adds."""
         episode = self._episodes[index]
-        at, progress = episode.at, episode.rewarded.progress
+        at = episode.at
         info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": at.task.num_stages}
         if self.config.oracle_info:
-            length_m = progress.reference_length_m
-            info["oracle"] = {
-                "target_m": np.array(progress.target_m),
-                "geodesic_distance_m": episode.rewarded.distance_m,
-                "reference_length_m": math.nan if length_m is None else length_m,
-            }
+            info["oracle"] = episode.rewarded.oracle()
         return info
-
-
-def _num_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
