@@ -106,7 +106,7 @@ def test_the_shell_gets_its_answers():
 
 def test_completion_does_not_slow_the_start():
     """Neither defining completions nor examples loads what they are about."""
-    heavy = ("evonav.agents", "evonav.decision", "rich.live", "tomllib", "tomli")
+    heavy = ("annotated_types", "evonav._core", "evonav.agents", "evonav.decision", "rich.live", "tomllib", "tomli")
     code = f"import sys, evonav.cli; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
@@ -156,6 +156,18 @@ def test_every_help_is_short_plain_and_complete():
             assert text or param.hidden, f"{name}: {param.name} has no help"
             assert not re.search(r"\[[a-z#/@]", text), f"{name}: {param.name}: rich would take the bracket for a style"
             assert "docs/" not in text, f"{name}: {param.name}: an installed package has no docs"
+
+
+def test_the_help_of_long_options_has_room_at_80_columns():
+    shown = CliRunner().invoke(app, ["evaluate", "-h"], env={"COLUMNS": "80"}).stdout
+    panel = shown.partition("─ Decision model ─")[2].partition("╰")[0]
+    assert "│ --vlm-mode MODE " in panel
+    assert "│ --base-url URL " in panel
+    assert "│ --[no-]exchange-images " in panel
+    assert "[default: exchange-images]" in panel
+    column = re.search(r"Store the images of questions too\.", panel)
+    assert column is not None, "a short sentence fits on one line"
+    assert "evonav evaluate --limit 5" in shown
 
 
 def test_options_that_mean_the_same_are_declared_once():

@@ -107,12 +107,13 @@ add_examples(app)
 
 def main() -> None:
     """Run the command; an error of evonav or of a file is printed as one line, without a traceback."""
-    from evonav.errors import EvonavError
-
     try:
         app()
-    except (EvonavError, OSError) as error:
-        if os.environ.get(DEBUG_VARIABLE, "0") not in ("", "0"):
+    except Exception as error:
+        from evonav.errors import EvonavError  # the command must start fast
+
+        is_expected = isinstance(error, EvonavError | OSError)
+        if not is_expected or os.environ.get(DEBUG_VARIABLE, "0") not in ("", "0"):
             raise
         typer.echo(f"error: {error}", err=True)
         sys.exit(EXIT_ERROR)

@@ -33,6 +33,34 @@ class _Shown:
         pieces: list[str] = super().collect_usage_pieces(ctx)  # type: ignore[misc]
         return [piece for piece in pieces if piece not in hidden]
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - click's
+        """Show an option's names and type in one column, so that its help has room."""
+        for param in self.get_params(ctx):
+            if param.param_type_name == "option":
+                _show_in_one_column(param, ctx)
+        super().format_help(ctx, formatter)  # type: ignore[misc]
+
+
+MAX_TYPE = 16
+"""Characters of the longest type that the help shows; a longer list of choices is part of the option's help."""
+
+
+def _show_in_one_column(param: Any, ctx: Any) -> None:  # noqa: ANN401 - click's
+    """Change an option for the help, which is the last that the process does with it."""
+    names = sorted(param.opts, key=len)
+    if param.secondary_opts:
+        default = str((param.opts if param.default else param.secondary_opts)[0]).lstrip("-")
+        param._get_default_string = lambda **_: default
+        names = [f"--[no-]{name[2:]}" if f"--no-{name[2:]}" in param.secondary_opts else name for name in names]
+    shown = param.display_type_rich(ctx=ctx) or ""
+    if len(shown) > MAX_TYPE:
+        choices = shown.strip("<[]>").split("|")
+        if not all(choice in (param.help or "") for choice in choices):
+            param.help = f"One of {', '.join(choices)}. {param.help or ''}"
+        shown = names[-1].rpartition("-")[2].upper()
+    param.opts, param.secondary_opts = [f"{', '.join(names)} {shown}".rstrip()], []
+    param.display_type_rich = _without_type
+
 
 def _without_type(ctx: Any) -> None:  # noqa: ANN401 - click's
     """Stand for the type of an argument, which its name tells."""

@@ -14,7 +14,6 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
-from annotated_types import Ge
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.settings_model import Settings
@@ -95,7 +94,7 @@ class Options:
             what, _, default = text.partition(" Default: ")
             text = f"{what} Default: the file's{', else ' + default if default else '.'}"
         flags = f"{self.flag(name)}/--no-{self.flag(name)[2:]}" if found.default is True else self.flag(name)
-        least: Any = next((limit.ge for limit in found.metadata if isinstance(limit, Ge)), None)
+        least: Any = next((limit.ge for limit in found.metadata if hasattr(limit, "ge")), None)
         metavar = _METAVARS.get(name) or _metavar(found.annotation)
         return typer.Option(
             flags, min=least, help=text, rich_help_panel=self.panel, hidden=self.hidden, metavar=metavar

@@ -37,7 +37,7 @@ def compare(
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
     plot: PlotFile = None,
 ) -> None:
-    """Compare agents on the same stages: `compare RUN A B` is A minus B.
+    """Compare agents on the same stages: `RUN A B` is A minus B.
 
     Without names, each pair is the later minus the earlier agent of the run, as in its report. Differences have 95%
     intervals and p-values, and the stages with different outcomes are listed.
