@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.house.files import HouseTexts
+from evonav.perception.coco import TYPE_OF_CLASS
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, SimulatorConfig, Style
@@ -26,40 +27,13 @@ VIEWS_A_HOUSE = 4
 MIN_AREA = 0.01
 """Part of the picture that an object must fill."""
 
-# Classes of COCO that are right for a type, as COCO's annotators would name it. An armchair is often either.
 CLASSES_OF_TYPE: dict[str, tuple[str, ...]] = {
-    "Apple": ("apple",),
-    "AlarmClock": ("clock",),
+    **{kind: (name,) for name, kind in TYPE_OF_CLASS.items()},
     "ArmChair": ("chair", "couch"),
-    "BaseballBat": ("baseball bat",),
-    "BasketBall": ("sports ball",),
-    "Bed": ("bed",),
-    "Book": ("book",),
-    "Bottle": ("bottle",),
-    "Bowl": ("bowl",),
-    "CellPhone": ("cell phone",),
-    "Chair": ("chair",),
-    "Cup": ("cup",),
-    "DiningTable": ("dining table",),
-    "Fork": ("fork",),
-    "Fridge": ("refrigerator",),
-    "HousePlant": ("potted plant",),
-    "Knife": ("knife",),
-    "Laptop": ("laptop",),
-    "Microwave": ("microwave",),
     "Mug": ("cup",),
-    "RemoteControl": ("remote",),
-    "Sink": ("sink",),
-    "Sofa": ("couch",),
-    "Spoon": ("spoon",),
-    "TeddyBear": ("teddy bear",),
-    "Television": ("tv",),
-    "TennisRacket": ("tennis racket",),
-    "Toaster": ("toaster",),
-    "Toilet": ("toilet",),
-    "Vase": ("vase",),
     "WineBottle": ("bottle",),
 }
+"""COCO's classes that are right for a type. COCO's annotators call an armchair either."""
 
 
 @dataclass(frozen=True)
