@@ -135,11 +135,17 @@ def test_a_folder_of_models_comes_before_the_package(monkeypatch: pytest.MonkeyP
         ({"min_confidence": 2}, "min_confidence is 2, expected 0..1"),
         ({"side_px": 600}, "side_px is 600, expected a multiple of 32"),
         ({"device": "cuda"}, "leave device out"),
+        ({"side": 608}, "predicted:coco has no option 'side'; there are min_confidence, side_px"),
     ],
 )
 def test_bad_options_are_named(options: dict[str, object], message: str) -> None:
     with pytest.raises(InvalidArgumentError, match=message):
         predicted_perception("coco", **options)
+
+
+def test_the_mini_detector_names_bad_options_too() -> None:
+    with pytest.raises(InvalidArgumentError, match="predicted:mini has no option 'side_px'"):
+        predicted_perception("mini", side_px=608)
 
 
 def test_doctor_looks_for_the_weights(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

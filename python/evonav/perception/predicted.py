@@ -347,13 +347,22 @@ def predicted_perception(
     if stack == "mini":
         from evonav.perception.mini import MiniPerception
 
+        _check_names("mini", options, ("min_confidence", "min_cells"))
         return MiniPerception(**options)
     if stack == "coco":
         from evonav.perception.coco import CocoPerception
 
         if device not in ("auto", "cpu"):
             raise InvalidArgumentError(f"predicted:coco computes on the processor, not on {device!r}: leave device out")
+        _check_names("coco", options, ("min_confidence", "side_px"))
         return CocoPerception(models, **options)
     if stack != "auto" and stack not in STACKS:
         raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}, mini, coco")
     return StackPerception(stack, StackConfig.from_options(options), models, device)
+
+
+def _check_names(stack: str, options: Mapping[str, Any], names: tuple[str, ...]) -> None:
+    """Raise `InvalidArgumentError` if a stack has no option of a name."""
+    for name in options:
+        if name not in names:
+            raise InvalidArgumentError(f"predicted:{stack} has no option {name!r}; there are {', '.join(names)}")
