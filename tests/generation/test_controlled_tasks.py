@@ -1,6 +1,7 @@
 """Arms of a controlled analysis: the same goal, the same walk, and nothing but the evolution between them."""
 
 import dataclasses
+import gzip
 import json
 import shutil
 from itertools import pairwise
@@ -182,9 +183,15 @@ def test_the_houses_of_tasks_give_the_same_pairs(tmp_path):
 
 
 def test_the_command_says_what_it_made_and_what_is_missing(tmp_path):
+    """The house lacks a start and the size of an asset, which options of the command give."""
     runner = CliRunner()
-    houses = tmp_path / "houses.jsonl"
-    houses.write_text(next(bundled_houses(1)).to_json() + "\n", encoding="utf-8")
+    houses, sizes = tmp_path / "houses.jsonl", tmp_path / "sizes.json"
+    document = json.loads(next(bundled_houses(1)).to_json())
+    del document["metadata"]["agent"]
+    first = document["objects"][0]
+    first["assetId"] = "0123456789abcdef"
+    houses.write_text(json.dumps(document) + "\n", encoding="utf-8")
+    sizes.write_text('{"0123456789abcdef": {"category": "DiningTable", "size_m": [1, 0.7, 1.5]}}')
     config = tmp_path / "small.toml"
     config.write_text("reference_image_px = 64\nreference_min_visible_px = 10\n")
     out = tmp_path / "out"
@@ -199,9 +206,20 @@ def test_the_command_says_what_it_made_and_what_is_missing(tmp_path):
         str(config),
         "--workers",
         "0",
+        "--start",
+        "auto",
+        "--assets",
+        str(sizes),
     ]
     made = runner.invoke(app, command, catch_exceptions=False)
     assert "1 task in each arm (fixed, evolved)" in made.output
+    for arm in ("fixed", "evolved"):
+        (root,) = task_roots(out / "tasks" / arm)
+        metadata = json.loads(gzip.decompress((root / "houses/stage_1.json.gz").read_bytes()))["metadata"]
+        assert set(metadata["evonav_assets"]) == {"0123456789abcdef"}
+        assert metadata["evonav_start"] == "auto"
+    with pytest.raises(StoreError, match="another folder"):
+        runner.invoke(app, command[:-2], catch_exceptions=False)
     with pytest.raises(StoreError, match="evonav controlled evaluate"):
         runner.invoke(app, ["controlled", "report", str(out)], catch_exceptions=False)
     with pytest.raises(TaskError, match="evonav controlled generate"):

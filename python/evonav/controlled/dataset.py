@@ -15,7 +15,7 @@ from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import HOUSE_TIMEOUT_S, PARTIAL_NAME, is_complete, outcome_of, worker_of
 from evonav.house import House
-from evonav.house.files import HouseText, HouseTexts
+from evonav.house.files import HouseCompletion, HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
@@ -48,6 +48,7 @@ def generate_controlled(
     *,
     options: ControlledOptions | None = None,
     limit: int | None = None,
+    completion: HouseCompletion | None = None,
     workforce: Workforce | None = None,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> ControlledSummary:
@@ -58,6 +59,7 @@ def generate_controlled(
         out: Gets `tasks/<arm>`, `journal.jsonl` and, when all is done, `controlled.json`.
         options: Must be the folder's own when it already holds tasks.
         limit: Only the first houses; must be the folder's own, too.
+        completion: Completes each house as it is read; must be the folder's own, too.
         workforce: Default: this process.
         on_progress: Called with tasks done and all tasks, when it begins and after every one.
 
@@ -72,12 +74,13 @@ def generate_controlled(
     if limit is not None and limit < 1:
         raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
     sources = _sources(source)
-    houses = list(islice(_houses(source), limit))
+    houses = list(islice(_houses(source, completion), limit))
     run = {
         "evonav": __version__,
         "houses": {one.name: one.sha256 for one in sources},
         "limit": limit,
         "options": options.model_dump(mode="json"),
+        **({} if completion is None else {"completed": dict(completion.identity)}),
     }
     out = out.resolve()
     with writing(out), closing(Journal(out, run)) as journal:
@@ -213,14 +216,15 @@ def _is_tasks(source: Path | str) -> bool:
     return Path(source).is_dir() and any(Path(source).glob("*/task.json"))
 
 
-def _houses(source: Path | str) -> Iterator[HouseText]:
+def _houses(source: Path | str, completion: HouseCompletion | None) -> Iterator[HouseText]:
     """Yield the houses of files, or the first houses of a folder's tasks."""
     if not _is_tasks(source):
-        yield from HouseTexts(source)
+        yield from HouseTexts(source, completion)
         return
     for root in task_roots(Path(source)):
         header = parse_record(TaskHeader, read_file(root / "task.json"), root / "task.json")
-        yield HouseText(header.house.name, read_house(root / "houses/stage_1.json.gz"))
+        house = HouseText(header.house.name, read_house(root / "houses/stage_1.json.gz"))
+        yield house if completion is None else house._replace(text=completion.complete(*house))
 
 
 def _sources(source: Path | str) -> tuple[SourceFile, ...]:

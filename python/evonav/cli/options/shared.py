@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
+    from evonav.world.house_options import HouseOptions
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
@@ -149,11 +150,17 @@ Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run; an
 def read_houses(houses: "Path | str", assets: Path | None, start: str) -> "HouseTexts":
     """Return houses, with the sizes of `--assets` and the starts of `--start`."""
     from evonav.house.files import HouseTexts
+
+    return HouseTexts(houses, house_options(assets, start))
+
+
+def house_options(assets: Path | None, start: str) -> "HouseOptions | None":
+    """Return what `--assets` and `--start` add to houses; `None` for nothing."""
     from evonav.world.house_options import HouseOptions
 
     if start not in ("file", "auto"):
         raise typer.BadParameter(f"--start {start}: expected file or auto")
-    return HouseTexts(houses, HouseOptions.of(assets, "auto" if start == "auto" else "file"))
+    return HouseOptions.of(assets, "auto" if start == "auto" else "file")
 
 
 def names_of(agents: "Sequence[str] | None") -> list[str]:

@@ -14,11 +14,14 @@ from evonav.cli.options.shared import (
     HOUSES,
     Agents,
     AnyAsset,
+    AssetFile,
     GeneratorFile,
     Limit,
     OldTask,
     RetryErrored,
     Seed,
+    StartOfHouses,
+    house_options,
     names_of,
 )
 from evonav.counted import counted
@@ -65,6 +68,8 @@ def generate(
     seed: Seed = 0,
     config: GeneratorFile = None,
     allow_unknown_assets: AnyAsset = False,
+    assets: AssetFile = None,
+    start: StartOfHouses = "file",
 ) -> None:
     """Generate the same tasks in arms that differ in one thing.
 
@@ -96,6 +101,7 @@ def generate(
             out,
             options=options,
             limit=limit,
+            completion=house_options(assets, start),
             workforce=workers.workforce(),
             on_progress=lambda done, total: show(f"{done} of {total}"),
         )
