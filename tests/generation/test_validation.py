@@ -85,7 +85,7 @@ def test_the_command_says_what_is_wrong_and_exits_with_1(
 ) -> None:
     from typer.testing import CliRunner
 
-    arguments = ["tasks", "validate", str(folder), "--workers", "0", "--json", str(tmp_path / "found.json")]
+    arguments = ["tasks", "validate", str(folder), "--workers", "0"]
     good = CliRunner().invoke(app, arguments)
     assert good.exit_code == 0, good.output
     assert "2 of 2 tasks valid" in good.output
@@ -94,10 +94,15 @@ def test_the_command_says_what_is_wrong_and_exits_with_1(
     assert bad.exit_code == 1
     assert "1 of 2 tasks valid" in bad.output
     assert "schema" in bad.output
-    found = json.loads((tmp_path / "found.json").read_text(encoding="utf-8"))
+    as_json = CliRunner().invoke(app, [*arguments, "--json"])
+    assert as_json.exit_code == 1
+    found = json.loads(as_json.stdout)
     assert found["num_invalid"] == 1
     assert {problem["kind"] for problem in found["problems"]} == {"schema"}
     assert {problem["task_id"] for problem in found["problems"]} == {root.name}
+    old = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "found.json")])
+    assert f"--json > {tmp_path / 'found.json'}" in old.stderr
+    assert json.loads((tmp_path / "found.json").read_text(encoding="utf-8")) == found
 
 
 def test_every_kind_is_explained() -> None:

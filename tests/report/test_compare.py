@@ -138,7 +138,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     assert re.search(r"^% +ftu +fu +difference|^ +ftu +fu +difference", result.output, re.MULTILINE), (
         "in the order named"
     )
-    assert max(len(line) for line in result.output.splitlines() if not line.startswith("written")) <= 80
+    assert max(len(line) for line in result.output.splitlines() if not line.startswith(("written", "note"))) <= 80
     found = one(run, "ftu", "fu")
     rows = {(row["part"], row["measure"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}
     effect = found.all.effects["success"]
@@ -147,6 +147,9 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     assert float(rows["relocated", "success"]["difference"]) == 0.75
     told = json.loads(files["json"].read_text())
     assert told == json.loads(json.dumps(comparison_json([found])))
+    again = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", "--json", "--csv", str(files["csv"])])
+    assert json.loads(again.stdout) == told, "nothing else on standard output"
+    assert "note: --json now prints" in result.stderr
     assert told["comparisons"][0]["parts"][0]["effects"]["success"]["verdict"] == "b"
     command = f"evonav view {run} --task task-01 --agent ftu,fu --stage 2"
     assert command in files["md"].read_text()

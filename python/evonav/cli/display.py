@@ -88,13 +88,15 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
     return parts
 
 
-def write_texts(*texts: "tuple[Path | None, Callable[[], str]]", label: str = "written") -> None:
-    """Write the files whose paths are given, and print the paths after a label."""
+def write_texts(
+    *texts: "tuple[Path | None, Callable[[], str]]", label: str = "written", is_error: bool = False
+) -> None:
+    """Write the files whose paths are given, and print the paths after a label; to standard error if `is_error`."""
     from evonav.parallel.folders import write_atomically
 
     for path, text in texts:
         if path is not None:
-            typer.echo(f"{label}: {write_atomically(path, text())}")
+            typer.echo(f"{label}: {write_atomically(path, text())}", err=is_error)
 
 
 def print_table(summaries: "list[AgentSummary]") -> None:

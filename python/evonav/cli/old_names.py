@@ -33,6 +33,8 @@ OLD_OPTIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     }
 )
 """Options by command: the old spelling, and the one that took its place."""
+JSON_FILES = ("evonav compare", "tasks validate")
+"""Commands whose `--json FILE` wrote a file; `--json` now prints."""
 
 
 def in_new_names(group: str, command_line: Sequence[str], *, is_quiet: bool = False) -> list[str]:
@@ -51,6 +53,11 @@ def in_new_names(group: str, command_line: Sequence[str], *, is_quiet: bool = Fa
         if word == "--":
             break
         option, equals, value = word.partition("=")
+        follows = value if equals else rest[place + 1] if place + 1 < len(rest) else ""
+        if option == "--json" and f"{group} {name}" in JSON_FILES and follows.endswith(".json"):
+            rest[place] = f"--json-file{equals}{value}"
+            if not is_quiet:
+                typer.echo(f"note: --json now prints: write --json > {follows}", err=True)
         if option in renamed:
             rest[place] = f"{renamed[option]}{equals}{value}"
             if not is_quiet:

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.options.shared import AsJson
+
 EXIT_BROKEN = 1
 _STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
@@ -19,9 +21,7 @@ def doctor(
             help="VLM: address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's.",
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON instead of a table, for programs and bug reports.")
-    ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Check what works on this machine, and how to install the rest.
 

@@ -141,6 +141,9 @@ AnyAsset = Annotated[
         help="Give assets that are missing from the catalogue the usual size of their category.",
     ),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
+OldJsonFile = Annotated[Path | None, typer.Option("--json-file", metavar="FILE", hidden=True)]
+"""What `--json FILE` was; see `evonav.cli.old_names`."""
 RetryErrored = Annotated[
     bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]

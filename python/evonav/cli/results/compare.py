@@ -6,7 +6,16 @@ from typing import Annotated
 import typer
 
 from evonav.cli.display import show_tables, write_texts
-from evonav.cli.options.shared import ComparedRuns, CsvFile, LatexFile, MarkdownFile, PlotFile, listed
+from evonav.cli.options.shared import (
+    AsJson,
+    ComparedRuns,
+    CsvFile,
+    LatexFile,
+    MarkdownFile,
+    OldJsonFile,
+    PlotFile,
+    listed,
+)
 
 
 def compare(
@@ -31,9 +40,8 @@ def compare(
     md: MarkdownFile = None,
     latex: LatexFile = None,
     csv: CsvFile = None,
-    json: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a JSON file, with the stages whose outcome differs.")
-    ] = None,
+    as_json: AsJson = False,
+    json_file: OldJsonFile = None,
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
     plot: PlotFile = None,
 ) -> None:
@@ -42,7 +50,7 @@ def compare(
     Without names, each pair is the later minus the earlier agent of the run, as in its report. Differences have 95%
     intervals and p-values, and the stages with different outcomes are listed.
     """
-    import json as json_text
+    import json
 
     from rich.console import Console
 
@@ -56,17 +64,22 @@ def compare(
     found = compare_agents(
         read_compared_agents(runs), measures=listed(measure), baseline=baseline, allow_differences=allow_differences
     )
-    console = Console()
-    show_tables(wording.terminal_tables(found))
-    for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
-        console.print(line, markup=False, highlight=False)
-    console.print(wording.METHOD, style="dim", highlight=False)
+    content = json.dumps(comparison_json(found), indent=1) + "\n"
+    if as_json:
+        typer.echo(content, nl=False)
+    else:
+        console = Console()
+        show_tables(wording.terminal_tables(found))
+        for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
+            console.print(line, markup=False, highlight=False)
+        console.print(wording.METHOD, style="dim", highlight=False)
     write_texts(
         (md, lambda: wording.comparison_markdown(found)),
         (latex, lambda: wording.comparison_latex(found)),
         (csv, lambda: wording.comparison_csv(found)),
-        (json, lambda: json_text.dumps(comparison_json(found), indent=1) + "\n"),
+        (json_file, lambda: content),
         (html, lambda: comparison_page(found, None if html is None else html.parent)),
+        is_error=as_json,
     )
     if plot is not None:
-        typer.echo(f"written: {write_plots([comparison_plot(found)], plot)}")
+        typer.echo(f"written: {write_plots([comparison_plot(found)], plot)}", err=as_json)

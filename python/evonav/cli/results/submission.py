@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.display import print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
+from evonav.cli.options.shared import AsJson, Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def verify(
         bool,
         typer.Option("--scores-only", help=SCORES_ONLY_HELP),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON instead of a table.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Check a packed run by replaying its actions.
 

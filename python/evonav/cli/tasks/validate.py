@@ -1,14 +1,13 @@
 """`evonav tasks validate`: check task files."""
 
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import progress_bar
+from evonav.cli.display import progress_bar, write_texts
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AnyAsset, Limit, TaskFolder, task_folder
+from evonav.cli.options.shared import AnyAsset, AsJson, Limit, OldJsonFile, TaskFolder, task_folder
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -24,9 +23,8 @@ def validate(
     workers: "RunSettings",
     folder: TaskFolder = None,
     limit: Limit = None,
-    json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write a JSON file with all problems.")
-    ] = None,
+    as_json: AsJson = False,
+    json_file: OldJsonFile = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also count oddities that the source houses have themselves.")
     ] = False,
@@ -46,9 +44,11 @@ def validate(
             allow_unknown_assets=allow_unknown_assets,
             on_progress=on_progress,
         )
-    if json_file is not None:
-        write_json(report, json_file)
-    print_report(report, is_verbose=verbose)
+    write_texts((json_file, lambda: report_json(report)))
+    if as_json:
+        typer.echo(report_json(report), nl=False)
+    else:
+        print_report(report, is_verbose=verbose)
     if report.problems:
         raise typer.Exit(1)
 
@@ -81,15 +81,9 @@ def print_report(report: "FolderReport", *, is_verbose: bool = False) -> None:
         console.print(f"oddities of the source houses, which make no task invalid: {counts}", markup=False)
 
 
-def write_json(report: "FolderReport", path: Path) -> None:
-    """Write all problems, and how many of them the source houses already have.
-
-    Raises:
-        TaskError: It cannot be written.
-    """
+def report_json(report: "FolderReport") -> str:
+    """Return all problems as JSON, and how many of them the source houses already have."""
     import json
-
-    from evonav.errors import TaskError
 
     document = {
         "num_tasks": len(report.reports),
@@ -97,7 +91,4 @@ def write_json(report: "FolderReport", path: Path) -> None:
         "problems": [problem.model_dump() for problem in report.problems],
         "own": dict(sorted(report.source_counts.items())),
     }
-    try:
-        path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise TaskError(f"{path}: cannot be written: {error.strerror or error}") from error
+    return json.dumps(document, indent=2) + "\n"
