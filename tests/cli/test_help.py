@@ -79,14 +79,21 @@ def test_agents_of_a_run_are_completed(tmp_path):
 
 def test_runs_and_subsets_are_completed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for folder in ("out/one", "out/other", "tasks"):
+    for folder in ("out/one", "out/other", "out/sweep/runs/cell", "src/deep", "tasks"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "out/one/records.sqlite").touch()
+    (tmp_path / "out/sweep/runs/cell/records.sqlite").touch()
     (tmp_path / "tasks/dataset.json").write_text(json.dumps({"split": "test", "num_tasks": 40}))
     assert completion.runs("o") == ["out/"]
-    assert completion.runs("out/o") == ["out/one", "out/other/"]
+    assert completion.runs("") == ["out/"]
+    assert completion.runs("out/o") == ["out/one"], "a folder without a run is left out"
+    assert completion.runs("out/s") == ["out/sweep/"]
+    assert completion.runs("src/") == []
     assert completion.runs("nowhere/") == []
     assert completion.task_folders("ta") == ["tasks"]
+    assert completion.task_folders("") == ["bundled", "tasks"]
+    monkeypatch.setattr(completion, "MAX_FOLDERS", 1)
+    assert completion.runs("") == ["out/"], "a folder with too many folders is offered without a look"
 
     class Context:
         params = {"tasks": tmp_path / "tasks"}  # noqa: RUF012

@@ -3,6 +3,9 @@
 from pathlib import Path
 from typing import Any
 
+MAX_FOLDERS = 1000
+"""Folders that a completion looks at: the shell waits for it."""
+
 
 def agents(incomplete: str) -> list[str]:
     """Names of agents; after a comma, further ones."""
@@ -31,12 +34,12 @@ def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click'
 
 def runs(incomplete: str) -> list[str]:
     """Folders of runs, and folders on the way to some."""
-    return _folders(incomplete, ("records.sqlite",))
+    return _folders(incomplete, "records.sqlite")
 
 
 def task_folders(incomplete: str) -> list[str]:
-    """Folders of tasks, and folders on the way to some."""
-    return _folders(incomplete, ("dataset.json",))
+    """Folders of tasks, folders on the way to some, and `bundled`."""
+    return [*(["bundled"] if "bundled".startswith(incomplete) else []), *_folders(incomplete, "dataset.json")]
 
 
 def subsets(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
@@ -53,13 +56,40 @@ def subsets(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's c
     return [name for size in sizes if (name := f"{split}-{size}").startswith(incomplete)]
 
 
-def _folders(incomplete: str, names: tuple[str, ...]) -> list[str]:
-    """Folders that begin as typed: with a slash to go on in, without where one of the files is in it."""
+def _folders(incomplete: str, name: str) -> list[str]:
+    """Folders that begin as typed: without a slash where the file is in it, with one where it is further below."""
     typed = Path(incomplete)
     parent, start = (typed, "") if incomplete.endswith("/") or not incomplete else (typed.parent, typed.name)
+    shown = []
+    for path in _subfolders(parent, start):
+        if (path / name).is_file():
+            shown.append(str(path))
+        elif _is_below(path, name):
+            shown.append(f"{path}/")
+    return shown
+
+
+def _subfolders(parent: Path, start: str = "") -> list[Path]:
+    """Folders in a folder, without hidden ones unless these are asked for."""
     try:
-        folders = sorted(path for path in parent.iterdir() if path.name.startswith(start) and path.is_dir())
+        found = sorted(path for path in parent.iterdir() if path.name.startswith(start) and path.is_dir())
     except OSError:
         return []
-    shown = [path for path in folders if start.startswith(".") or not path.name.startswith(".")]
-    return [str(path) if any((path / name).is_file() for name in names) else f"{path}/" for path in shown]
+    return [path for path in found if start.startswith(".") or not path.name.startswith(".")]
+
+
+def _is_below(folder: Path, name: str) -> bool:
+    """Return whether the file is at most three levels down, or there are too many folders to look at."""
+    level = [folder]
+    num_left = MAX_FOLDERS
+    for _ in range(3):
+        below: list[Path] = []
+        for path in level:
+            below += _subfolders(path)
+            if len(below) > num_left:
+                return True
+        if any((path / name).is_file() for path in below):
+            return True
+        num_left -= len(below)
+        level = below
+    return False

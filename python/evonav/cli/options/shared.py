@@ -143,7 +143,7 @@ AnyAsset = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
 OldJsonFile = Annotated[Path | None, typer.Option("--json-file", metavar="FILE", hidden=True)]
-"""What `--json FILE` was; see `evonav.cli.old_names`."""
+"""The option that the old `--json FILE` stands for (`evonav.cli.old_names`)."""
 RetryErrored = Annotated[
     bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]
