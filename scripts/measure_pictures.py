@@ -77,18 +77,17 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     console = Console()
     network = None if asked.no_detector else load_yolov4_tiny(weights_path(asked.models))
-    recorded = [frame for folder in asked.recorded for frame in recorded_frames(folder)]
+    recorded = [resized(frame, asked.pixels) for folder in asked.recorded for frame in recorded_frames(folder)]
     houses = houses_of_set(asked.houses, asked.set)
+    drawn = {"style": asked.style, "image_px": asked.pixels}
     result = {name: getattr(asked, name) for name in ("set", "houses", "views", "seed", "style", "pixels")}
     if network is not None:
-        measured = views(houses, asked.views, asked.seed, style=asked.style, image_px=asked.pixels)
-        recalls = recall_by_type(network, measured)
+        recalls = recall_by_type(network, views(houses, asked.views, asked.seed, **drawn))
         console.print(recall_table(recalls, asked.set))
         result["recall"] = {name: recall.as_json() for name, recall in recalls.items()}
-    like_recorded = views(houses, NUM_STATISTICS, asked.seed, style=asked.style, looks=LIKE_RECORDED)
-    ours = [view.rgb for view in like_recorded]
+    ours = [view.rgb for view in views(houses, NUM_STATISTICS, asked.seed, looks=LIKE_RECORDED, **drawn)]
     pictures = {"ours": ours, **({"recorded": recorded} if recorded else {})}
-    columns = {name: statistics_of([resized(one, len(ours[0])) for one in some]) for name, some in pictures.items()}
+    columns = {name: statistics_of(some) for name, some in pictures.items()}
     fires = {} if network is None else {name: fires_a_frame(network, some) for name, some in pictures.items()}
     console.print(statistics_table(columns, fires))
     result["statistics"] = {name: one.as_json() for name, one in columns.items()}
