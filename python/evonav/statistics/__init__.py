@@ -2,7 +2,8 @@
 
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate
 from evonav.statistics.counts import ChiSquare, chi_square, mcnemar
-from evonav.statistics.interval import Z_95, Interval, percentile_interval, student_quantile, widened_tail, wilson
+from evonav.statistics.distributions import student_quantile
+from evonav.statistics.interval import Z_95, Interval, percentile_interval, widened_tail, wilson
 from evonav.statistics.paired import (
     DETECTABLE_Z,
     LEVEL,

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from evonav.statistics.distributions import chi_square_tail, fair_binomial_cdf
+
 LEAST_EXPECTED = 5.0
 """Cells of a chi-square test that expect fewer are merged: below it the distribution is not a chi-square's."""
 
@@ -41,11 +43,9 @@ def chi_square(observed: Sequence[float], expected: Sequence[float]) -> ChiSquar
         cells[-1] = [cells[-1][0] + pending[0], cells[-1][1] + pending[1]]
     if len(cells) < 2:
         return None
-    from scipy.special import chdtrc
-
     statistic = math.fsum((count - mean) ** 2 / mean for count, mean in cells)
     num_degrees = len(cells) - 1
-    return ChiSquare(statistic, num_degrees, float(chdtrc(num_degrees, statistic)), len(cells))
+    return ChiSquare(statistic, num_degrees, chi_square_tail(num_degrees, statistic), len(cells))
 
 
 def mcnemar(num_only_a: int, num_only_b: int) -> float:
@@ -54,7 +54,5 @@ def mcnemar(num_only_a: int, num_only_b: int) -> float:
     For comparison with tables that ignore houses: where outcomes hang together within houses, it is below 5% more often
     than one time in twenty under no difference (docs/statistics.md has how often). `sign_flip` is not.
     """
-    from scipy.special import bdtr
-
     n, less = num_only_a + num_only_b, min(num_only_a, num_only_b)
-    return min(1.0, 2 * float(bdtr(less, n, 0.5))) if n else 1.0
+    return min(1.0, 2 * fair_binomial_cdf(less, n)) if n else 1.0

@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.statistics.distributions import normal_cdf, student_quantile
+
 Interval = tuple[float, float]
 
 Z_95 = 1.959963984540054
@@ -55,14 +57,5 @@ def widened_tail(num_clusters: int) -> float:
     Args:
         num_clusters: Clusters that are resampled, at least 2.
     """
-    from scipy.special import ndtr
-
     widening = math.sqrt(num_clusters / (num_clusters - 1))
-    return float(ndtr(-widening * student_quantile(num_clusters - 1)))
-
-
-def student_quantile(num_degrees: int) -> float:
-    """Return the quantile of Student's t with `num_degrees` that is exceeded one time in forty."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(num_degrees, 0.975))
+    return normal_cdf(-widening * student_quantile(num_clusters - 1))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap
+from evonav.statistics.distributions import normal_cdf
 from evonav.statistics.interval import Z_95, Interval, percentile_interval
 
 LATTICE = 8192
@@ -196,7 +197,5 @@ def power(difference: float, standard_error: float) -> float:
     """Return the chance that a test at 5%, two-sided, finds a true difference with this standard error."""
     if standard_error == 0.0:
         return 0.0 if difference == 0.0 else 1.0
-    from scipy.special import ndtr
-
     shift = abs(difference) / standard_error
-    return float(ndtr(shift - Z_95) + ndtr(-shift - Z_95))
+    return normal_cdf(shift - Z_95) + normal_cdf(-shift - Z_95)
