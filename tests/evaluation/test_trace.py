@@ -259,6 +259,18 @@ def test_the_loss_of_an_agents_process_is_repeated_without_asking_it(tmp_path, n
     assert stages[2].record.is_scored
 
 
+def test_an_agent_lost_between_stages_begins_anew_in_the_replay(own_fu_run):
+    def num_known(stages):
+        return len(stages[1].rounds[0].entries)
+
+    kept = replay_of(own_fu_run, "fu")
+    lost_at = {1: None, 2: 2, 3: 2}
+    rewrite(own_fu_run, lambda record: record.model_copy(update={"memory_lost_at": lost_at[record.stage]}))
+    lost = replay_of(own_fu_run, "fu")
+    assert [stage.record.memory_lost_at for stage in lost] == [None, 2, 2]
+    assert num_known(lost) < num_known(kept)
+
+
 def test_what_cannot_be_run_again_is_shown_as_recorded(own_fu_run):
     run_dir = own_fu_run
 

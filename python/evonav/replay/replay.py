@@ -163,7 +163,7 @@ class RunReplay:
                     yield replayed
                     if outcome.record.stage == last:
                         break
-                    if _loss(outcome.record):
+                    if _loss(outcome.record) or _begins_anew(stored.get(outcome.record.stage + 1)):
                         recorder.agent = make_agent(agent_name, self.backend.decision.create(seed))
                         episode.replace_agent(recorder.agent)
         for number, record in stored.items():
@@ -184,6 +184,11 @@ def _loss(record: StageRecord) -> Loss | None:
     if record.state is not EndState.ERRORED or error is None or error.kind not in LOSSES:
         return None
     return Loss(len(record.trace), error.kind, error.message)
+
+
+def _begins_anew(record: StageRecord | None) -> bool:
+    """Return whether the agent's process was lost just before a stage."""
+    return record is not None and record.memory_lost_at == record.stage
 
 
 def _is_beyond_replay(record: StageRecord) -> bool:

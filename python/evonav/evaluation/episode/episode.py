@@ -53,6 +53,7 @@ class Episode:
         )
         self._state = EpisodeState()
         self._last_costs: Mapping[str, float] = {}
+        self._is_replaced = False
 
     def run(self) -> Iterator[StageOutcome]:
         """Run the stages in order.
@@ -86,7 +87,8 @@ class Episode:
             if run.failure is not None:
                 failed = (*failed, stage)
             pose = self._end_pose(stage)
-            is_lost = run.failure in LOSSES or self._context.agent.is_lost
+            is_lost = run.failure in LOSSES or self._context.agent.is_lost or self._is_replaced
+            self._is_replaced = False
             if is_lost:
                 self._state = EpisodeState()
 
@@ -108,6 +110,7 @@ class Episode:
         """Use another agent from the next stage on, as after the loss of a process; for replays in one process."""
         hosted, baseline = _hosted(agent)
         self._context = replace(self._context, agent=hosted, baseline=baseline)
+        self._is_replaced = True
 
     def _cpu_s(self) -> float:
         """Return the CPU time of this process and of the agent's own process."""
