@@ -2,6 +2,7 @@
 
 mod delta;
 mod document;
+mod lights;
 mod node;
 mod parse;
 mod read;
@@ -9,6 +10,7 @@ mod schema;
 mod validate;
 
 pub use delta::{AddedObject, HouseDelta, ObjectMove, StateChange};
+pub use lights::Lamp;
 pub use schema::{
     Condition, EXTERIOR, House, Object, Opening, OwnAsset, Room, Start, Surface, Wall,
 };

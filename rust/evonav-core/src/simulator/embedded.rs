@@ -10,7 +10,7 @@ use crate::{
     house::{House, HouseDelta},
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Style, Want, render_view},
+        raster::{FrameBuffer, Light, Style, Want, render_lit},
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
@@ -58,6 +58,7 @@ pub struct EmbeddedSimulator {
     navigation: Navigation,
     start_m: Vec2,
     rays: OnceLock<RayCaster>,
+    light: OnceLock<Light>,
 }
 
 impl EmbeddedSimulator {
@@ -100,8 +101,16 @@ impl EmbeddedSimulator {
     ) -> Result<Self, Error> {
         let mesh = SceneMesh::build(&scene);
         let start_m = start_of(&house, &scene, &navigation)?;
-        let simulator =
-            Self { house, config, scene, mesh, navigation, start_m, rays: OnceLock::new() };
+        let simulator = Self {
+            house,
+            config,
+            scene,
+            mesh,
+            navigation,
+            start_m,
+            rays: OnceLock::new(),
+            light: OnceLock::new(),
+        };
         simulator.view(&simulator.start()).check()?;
         Ok(simulator)
     }
@@ -170,7 +179,9 @@ impl EmbeddedSimulator {
     /// # Errors
     /// [`Error::InvalidArgument`] as [`View::check`].
     pub fn render(&self, view: &View, want: Want, out: &mut FrameBuffer) -> Result<(), Error> {
-        render_view(&self.mesh, view, want, out)
+        let light = (want.rgb == Some(Style::Default))
+            .then(|| self.light.get_or_init(|| Light::build(&self.house, &self.scene, &self.mesh)));
+        render_lit(&self.mesh, light, view, want, out)
     }
 
     /// Return whether an agent fits at `[x, z]` and can move there from the house's start.

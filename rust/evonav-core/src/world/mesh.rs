@@ -35,6 +35,13 @@ pub struct Face {
     pub colour: [u8; 3],
 }
 
+impl Face {
+    /// Return the face as it is seen from behind; its corners run the other way round.
+    pub(crate) fn reversed(&self) -> Self {
+        Self { normal: self.normal.map(|n| -n), offset_m: -self.offset_m, ..*self }
+    }
+}
+
 /// One convex part: its vertices and faces are consecutive.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PartMesh {

@@ -200,6 +200,23 @@ impl Lens {
         Some(([a, b, at_centre - a * self.centre_px[0] - b * self.centre_px[1]], facing))
     }
 
+    /// Return the image coordinates and the nearness of world points `p` in an orthographic view:
+    /// `row . [p, 1]`.
+    pub fn map_rows(&self) -> [[f32; 4]; 3] {
+        let (Optics::Perspective { focal_px: scale }
+        | Optics::Orthographic { pixels_per_m: scale }) = self.optics;
+        let [right, down, forward] = self.axes;
+        let row = |axis: Vec3, scale: f64, at: f64| {
+            let offset = at - scale * dot(axis, self.eye_m);
+            [axis[0] * scale, axis[1] * scale, axis[2] * scale, offset].map(|term| term as f32)
+        };
+        [
+            row(right, scale, self.centre_px[0]),
+            row(down, scale, self.centre_px[1]),
+            row(forward, -1.0, self.horizon_m()),
+        ]
+    }
+
     /// Return the relation between pixels and world points.
     pub fn rays(&self) -> Rays {
         let [right, down, forward] = self.axes;

@@ -2,11 +2,13 @@
 
 mod canvas;
 mod lens;
+mod light;
 mod render;
 mod shader;
 mod style;
 mod visible_px;
 
-pub use render::{FrameBuffer, Want, render, render_view};
+pub use light::Light;
+pub use render::{FrameBuffer, Want, render, render_lit, render_view};
 pub use style::Style;
 pub use visible_px::visible_px;

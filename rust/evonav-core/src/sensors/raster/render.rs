@@ -12,6 +12,7 @@ use crate::{
         raster::{
             canvas::{Canvas, LANES},
             lens::{Lens, Optics, Scratch},
+            light::Light,
             shader::Shader,
             style::Style,
         },
@@ -63,7 +64,7 @@ pub fn render(
     render_view(mesh, &View::from(*camera), want, out)
 }
 
-/// Render one view into `out`.
+/// Render one view into `out`; of [`Style::Default`], in an even light.
 ///
 /// The error of depth is under 0.1 mm within 10 m. Of surfaces at equal depth the one drawn first
 /// stays. The order depends only on mesh and view, and so does every pixel.
@@ -75,6 +76,20 @@ pub fn render(
 /// O(parts + faces in view + pixels they cover).
 pub fn render_view(
     mesh: &SceneMesh,
+    view: &View,
+    want: Want,
+    out: &mut FrameBuffer,
+) -> Result<(), Error> {
+    render_lit(mesh, None, view, want, out)
+}
+
+/// Render one view as [`render_view`], with the light of the house where the style wants it.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] as [`View::check`].
+pub fn render_lit(
+    mesh: &SceneMesh,
+    light: Option<&Light>,
     view: &View,
     want: Want,
     out: &mut FrameBuffer,
@@ -92,7 +107,7 @@ pub fn render_view(
         let part = &mesh.parts[out.scratch.visible[index].1 as usize];
         draw_part(mesh, part, &lens, want, out);
     }
-    resolve(mesh, &lens, want, out);
+    resolve(mesh, light, &lens, want, out);
     Ok(())
 }
 
@@ -107,7 +122,7 @@ pub(super) fn draw_part(
     let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
     for index in part.faces.clone() {
         let face = &mesh.faces[index];
-        let Some(found) = lens.nearness_plane(face) else { continue };
+        let Some((plane, facing)) = lens.nearness_plane(face) else { continue };
         let Scratch { local_m, projected_px, clipped_m, polygon_px, .. } = scratch;
         polygon_px.clear();
         let corners = mesh.corners_of(face);
@@ -122,9 +137,9 @@ pub(super) fn draw_part(
         }
         let tag = if want.rgb.is_some() { index as u32 } else { face.body } + 1;
         if let Some(style) = want.rgb {
-            shader.note(style, mesh, index, found);
+            shader.note(style, mesh, index, facing);
         }
-        canvas.fill(polygon_px, found.0, tag);
+        canvas.fill(polygon_px, plane, tag);
     }
 }
 
@@ -151,7 +166,13 @@ fn clip_near(
 }
 
 /// Turn the canvas into images.
-fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
+fn resolve(
+    mesh: &SceneMesh,
+    light: Option<&Light>,
+    lens: &Lens,
+    want: Want,
+    out: &mut FrameBuffer,
+) {
     let FrameBuffer { depth_m, instances, rgb, canvas, shader, .. } = out;
     let num_pixels = canvas.width_px * canvas.height_px;
     depth_m.resize(num_pixels, 0.0);
@@ -178,7 +199,7 @@ fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     }
     rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
     if let Some(style) = want.rgb {
-        shader.shade(style, mesh, lens, canvas, rgb);
+        shader.shade(style, mesh, light, lens, canvas, rgb);
     }
 }
 

@@ -7,11 +7,17 @@ use crate::sensors::raster::{
 
 /// Width of the corners' darkness, as a share of the image's height.
 const CORNER_REACH: f64 = 0.012;
-/// Darkness of a corner; `LINE_SHADE` is that of a silhouette's line.
-const CORNER_SHADE: f32 = 0.38;
-const LINE_SHADE: f32 = 0.30;
 /// Bend in the middle of a corner of a room.
 const FULL_BEND: f32 = 0.7;
+
+/// The greatest darkness, 0 to 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shades {
+    /// Darkness in concave corners.
+    pub corner: f32,
+    /// Darkness of lines around silhouettes, if there are lines.
+    pub line: Option<f32>,
+}
 
 /// The light that corners and silhouettes leave in one row, and the row continued at both ends.
 #[derive(Debug, Clone, Default)]
@@ -22,7 +28,7 @@ pub(super) struct Bends {
 
 impl Bends {
     /// Set `light` for a row.
-    pub fn darken(&mut self, canvas: &Canvas, row: usize, optics: Optics, has_lines: bool) {
+    pub fn darken(&mut self, canvas: &Canvas, row: usize, optics: Optics, shades: Shades) {
         let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
         self.light.clear();
         self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
@@ -31,8 +37,10 @@ impl Bends {
             Optics::Perspective { focal_px } => (false, focal_px as f32),
             Optics::Orthographic { pixels_per_m } => (true, pixels_per_m as f32),
         };
-        let passes = [(corner_px, false), (1, true)];
-        for (reach_px, is_line) in passes.into_iter().take(1 + usize::from(has_lines)) {
+        let line = shades.line.map(|shade| (1, true, shade));
+        for (reach_px, is_line, most) in
+            [Some((corner_px, false, shades.corner)), line].into_iter().flatten()
+        {
             let scale = scale_px / reach_px as f32;
             let centre = canvas.row(row);
             let has_both = row >= reach_px && row + reach_px < canvas.height_px;
@@ -50,16 +58,24 @@ impl Bends {
             let orthographic = |_: f32| 1.0;
             match (is_line, is_orthographic) {
                 (true, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, line_shade)
+                    darken_row(light, centre, neighbours, scale, in_perspective, |bend| {
+                        most * line_shade(bend)
+                    })
                 }
                 (false, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, corner_shade)
+                    darken_row(light, centre, neighbours, scale, in_perspective, |bend| {
+                        corner_shade(bend, most)
+                    })
                 }
                 (true, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, line_shade)
+                    darken_row(light, centre, neighbours, scale, orthographic, |bend| {
+                        most * line_shade(bend)
+                    })
                 }
                 (false, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, corner_shade)
+                    darken_row(light, centre, neighbours, scale, orthographic, |bend| {
+                        corner_shade(bend, most)
+                    })
                 }
             }
         }
@@ -98,13 +114,13 @@ fn darken_row(
     }
 }
 
-/// Return the darkness in a corner. A large bend is not a corner but a surface far behind an edge.
-fn corner_shade(bend: f32) -> f32 {
+/// Return the darkness in a corner, `most` or less. A large bend is not a corner but a surface far behind an edge.
+fn corner_shade(bend: f32, most: f32) -> f32 {
     let is_corner = (1.8 - bend).clamp(0.0, 1.0);
-    CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
+    most * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
-/// Return the darkness of a silhouette's line.
+/// Return the share of the darkness of a silhouette's line.
 fn line_shade(bend: f32) -> f32 {
-    LINE_SHADE * (bend - 1.0).clamp(0.0, 1.0)
+    (bend - 1.0).clamp(0.0, 1.0)
 }

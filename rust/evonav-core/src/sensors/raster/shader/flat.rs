@@ -8,13 +8,16 @@ use crate::{
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::Optics,
-        shader::bends::Bends,
+        shader::bends::{Bends, Shades},
     },
     world::mesh::{Face, dot},
 };
 
 /// Share of a face's light that comes from the camera.
 const LAMP_SHARE: f32 = 0.36;
+/// Darkness of a corner; `LINE_SHADE` is that of a silhouette's line.
+const CORNER_SHADE: f32 = 0.38;
+const LINE_SHADE: f32 = 0.30;
 /// Brightness of black surfaces; without it their corners would be invisible.
 const BLACK: f32 = 22.0;
 /// Colour behind windows and missing walls, before the lamp's share is subtracted.
@@ -82,8 +85,9 @@ impl Flat {
 
     /// Fill `rgb` from a drawn canvas.
     pub fn shade(&mut self, canvas: &Canvas, optics: Optics, has_lines: bool, rgb: &mut [u8]) {
+        let shades = Shades { corner: CORNER_SHADE, line: has_lines.then_some(LINE_SHADE) };
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            self.bends.darken(canvas, row, optics, has_lines);
+            self.bends.darken(canvas, row, optics, shades);
             if let Optics::Orthographic { .. } = optics {
                 self.level_facing(canvas, row);
             }

@@ -4,12 +4,13 @@
 //! of its surface there, and the light that falls on them.
 
 use crate::{
-    geometry::Vec3,
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::{Lens, Rays},
+        light::Light,
         shader::{
-            bends::Bends,
+            bends::{Bends, Shades},
+            edges::Edges,
             flat::to_byte,
             surface::{Lanes, Patch},
         },
@@ -20,94 +21,129 @@ use crate::{
 /// Colour behind windows and missing walls.
 const SKY: [u8; 3] = [204, 222, 236];
 
-/// A face in view.
-#[derive(Debug, Clone, Copy, Default)]
-struct Seen {
-    /// Distance of its plane from the camera; in orthographic views the cosine between its normal
-    /// and the viewing direction.
-    facing: f32,
-}
+/// Sunlight, times the lamps' and the sky's.
+const SUN: [f32; 3] = [1.25, 1.18, 1.05];
+/// Darkness of corners, most of which is in the light.
+const SHADES: Shades = Shades { corner: 0.15, line: None };
+/// Light in views without a house around them.
+const EVEN: f32 = 0.85;
+/// Coefficients `a - b x` of the response to brightness `x`: near 1 in the middle, flat at white.
+const RESPONSE: [f32; 2] = [1.2, 0.36];
+/// Exposure: brightness of a white surface in light of 1.
+const EXPOSURE: f32 = 1.0;
 
-/// The faces in view, and working memory.
+/// Working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Lit {
-    faces: Vec<Seen>,
     bends: Bends,
+    edges: Edges,
+}
+
+/// What all blocks of an image have in common.
+struct Shot<'a> {
+    mesh: &'a SceneMesh,
+    light: Option<&'a Light>,
+    rays: Rays,
 }
 
 impl Lit {
-    pub fn begin(&mut self, num_faces: usize) {
-        self.faces.resize(num_faces, Seen::default());
-    }
-
-    pub fn note(&mut self, index: usize, _plane: Vec3, facing: f64) {
-        self.faces[index] = Seen { facing: facing as f32 };
-    }
-
-    pub fn shade(&mut self, mesh: &SceneMesh, lens: &Lens, canvas: &Canvas, rgb: &mut [u8]) {
-        let rays = lens.rays();
+    pub fn shade(
+        &mut self,
+        mesh: &SceneMesh,
+        light: Option<&Light>,
+        lens: &Lens,
+        canvas: &Canvas,
+        rgb: &mut [u8],
+    ) {
+        let shot = Shot { mesh, light, rays: lens.rays() };
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            self.bends.darken(canvas, row, lens.optics, false);
+            self.bends.darken(canvas, row, lens.optics, SHADES);
             let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
-            for block in 0..canvas.blocks_per_row() {
-                let colours = self.block(mesh, &rays, canvas, [row, block]);
+            for (block, shades) in self.bends.light.as_chunks().0.iter().enumerate() {
+                let colours = shot.block(canvas, [row, block], shades);
                 match whole.get_mut(block) {
                     Some(pixels) => pixels.copy_from_slice(colours.as_flattened()),
                     None => rest.copy_from_slice(&colours.as_flattened()[..rest.len()]),
                 }
             }
         }
+        self.edges.smooth(canvas, rgb);
     }
+}
 
-    fn block(
-        &self,
-        mesh: &SceneMesh,
-        rays: &Rays,
-        canvas: &Canvas,
-        [row, block]: [usize; 2],
-    ) -> [[u8; 3]; LANES] {
+impl Shot<'_> {
+    /// Return the colours of a block.
+    fn block(&self, canvas: &Canvas, [row, block]: [usize; 2], shades: &Lanes) -> [[u8; 3]; LANES] {
         let index = canvas.row_blocks(row).start + block;
         let tags = &canvas.tags[index];
-        let (position_m, footprint_m) = rays.points(row, block, &canvas.nearness[index]);
+        let (position_m, footprint_m) = self.rays.points(row, block, &canvas.nearness[index]);
         let mut colours = [SKY; LANES];
-        let mut lane = 0;
-        while lane < LANES {
-            let tag = tags[lane];
-            let is_first = tag > 0 && !tags[..lane].contains(&tag);
-            if is_first {
-                let face = tag as usize - 1;
-                let patch = Patch { face, position_m, footprint_m };
-                let found = self.patch(mesh, rays, &patch, &canvas.nearness[index], block);
-                for (colour, found) in colours
-                    .iter_mut()
-                    .zip(found)
-                    .zip(tags)
-                    .filter_map(|(pair, &other)| (other == tag).then_some(pair))
-                {
-                    *colour = found;
+        let mut rest = [true; LANES];
+        // Most blocks lie within one face.
+        for first in 0..LANES {
+            let tag = tags[first];
+            if !rest[first] || tag == 0 {
+                continue;
+            }
+            let mut last = first;
+            for lane in first..LANES {
+                if tags[lane] == tag {
+                    last = lane;
+                    rest[lane] = false;
                 }
             }
-            lane += 1;
+            let patch = Patch { face: tag as usize - 1, position_m, footprint_m };
+            let found = self.patch(&patch, [first, last], shades);
+            for lane in first..=last {
+                if tags[lane] == tag {
+                    colours[lane] = found[lane];
+                }
+            }
         }
         colours
     }
 
+    /// Return the colours of a block as if one face covered it; `ends` are its first and last pixel
+    /// that the face does cover.
     #[inline(always)]
-    fn patch(
-        &self,
-        mesh: &SceneMesh,
-        rays: &Rays,
-        patch: &Patch,
-        nearness: &Lanes,
-        block: usize,
-    ) -> [[u8; 3]; LANES] {
-        let _ = (rays, nearness, self.faces[patch.face].facing);
-        let normal = mesh.faces[patch.face].normal;
-        let level = (0.8 + 0.2 * normal[1] + 0.06 * normal[0]) as f32;
-        let shades = &self.bends.light[block * LANES..][..LANES];
-        let channels = patch.colours(mesh, rays).map(|channel| {
-            std::array::from_fn::<_, LANES, _>(|lane| to_byte(channel[lane] * level * shades[lane]))
+    fn patch(&self, patch: &Patch, ends: [usize; 2], shades: &Lanes) -> [[u8; 3]; LANES] {
+        let light = self.light_on(patch, ends);
+        let surface = patch.colours(self.mesh, &self.rays);
+        let channels: [[u32; LANES]; 3] = std::array::from_fn(|channel| {
+            std::array::from_fn(|lane| {
+                let [a, b] = RESPONSE;
+                let x = surface[channel][lane] * light[channel][lane] * shades[lane];
+                let x = (x * (EXPOSURE / 255.0)).min(0.5 * a / b);
+                to_byte(255.0 * x * (a - b * x))
+            })
         });
         std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8))
+    }
+
+    /// Return the light on a block: the square root of its strength, since colours are too.
+    #[inline(always)]
+    fn light_on(&self, patch: &Patch, [first, last]: [usize; 2]) -> [Lanes; 3] {
+        let Some(light) = self.light else {
+            return [[EVEN; LANES]; 3];
+        };
+        let face = &light.field.faces[patch.face];
+        let at = |lane: usize| light.field.at(face, patch.position_m.map(|axis| axis[lane]));
+        let (start, end) = (at(first), at(last));
+        let share = 1.0 / (last - first).max(1) as f32;
+        let between = |channel: usize| -> Lanes {
+            let step = (end[channel] - start[channel]) * share;
+            std::array::from_fn(|lane| start[channel] + step * (lane as f32 - first as f32))
+        };
+        let smooth: [Lanes; 3] = std::array::from_fn(between);
+        if !face.is_sunny {
+            return smooth.map(|channel| channel.map(|light| light.max(0.0).sqrt()));
+        }
+        let (reach, slope) = (light.sun.reaches(&patch.position_m), between(3));
+        std::array::from_fn(|channel| {
+            std::array::from_fn(|lane| {
+                let sun = SUN[channel] * reach[lane] * slope[lane];
+                (smooth[channel][lane] + sun).max(0.0).sqrt()
+            })
+        })
     }
 }

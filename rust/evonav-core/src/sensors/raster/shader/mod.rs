@@ -1,15 +1,16 @@
 //! Compute colours after visibility, in one of the [`Style`]s.
 
 mod bends;
+mod edges;
 mod flat;
 mod lit;
 mod surface;
 
 use crate::{
-    geometry::Vec3,
     sensors::raster::{
         canvas::Canvas,
         lens::Lens,
+        light::Light,
         shader::{flat::Flat, lit::Lit},
         style::Style,
     },
@@ -29,22 +30,16 @@ impl Shader {
             Style::Outlined | Style::Plain => {
                 self.flat.begin(mesh.faces.len(), size_px, lens.optics);
             }
-            Style::Default => self.lit.begin(mesh.faces.len()),
+            Style::Default => {}
         }
     }
 
-    /// Note a face that may be seen, with the results of [`Lens::nearness_plane`].
+    /// Note a face that may be seen, with the second result of [`Lens::nearness_plane`].
     #[inline]
-    pub fn note(
-        &mut self,
-        style: Style,
-        mesh: &SceneMesh,
-        index: usize,
-        (plane, facing): (Vec3, f64),
-    ) {
+    pub fn note(&mut self, style: Style, mesh: &SceneMesh, index: usize, facing: f64) {
         match style {
             Style::Outlined | Style::Plain => self.flat.light(index, &mesh.faces[index], facing),
-            Style::Default => self.lit.note(index, plane, facing),
+            Style::Default => {}
         }
     }
 
@@ -53,6 +48,7 @@ impl Shader {
         &mut self,
         style: Style,
         mesh: &SceneMesh,
+        light: Option<&Light>,
         lens: &Lens,
         canvas: &Canvas,
         rgb: &mut [u8],
@@ -60,7 +56,7 @@ impl Shader {
         match style {
             Style::Outlined => self.flat.shade(canvas, lens.optics, true, rgb),
             Style::Plain => self.flat.shade(canvas, lens.optics, false, rgb),
-            Style::Default => self.lit.shade(mesh, lens, canvas, rgb),
+            Style::Default => self.lit.shade(mesh, light, lens, canvas, rgb),
         }
     }
 }

@@ -1,0 +1,268 @@
+//! Smooth light, at a grid of points on each face.
+
+use crate::{
+    geometry::{Vec2, Vec3, sub},
+    sensors::raster::{
+        canvas::LANES,
+        light::{contact::Contact, sources::Sources, sun::Sun},
+    },
+    world::{
+        mesh::{Face, PartMesh, SceneMesh, dot},
+        scene::{BodyKind, Scene},
+    },
+};
+
+/// Cosine between two faces of a part above which their edge is a rounding.
+const SMOOTH: f64 = 0.69;
+/// Height over the floor up to which things on the floor take light away.
+const CONTACT_M: f64 = 0.7;
+/// Distance from a surface at which the space before it is looked up.
+const AHEAD_M: f64 = 0.12;
+/// Brightness of what shines by itself: screens, and the world behind panes.
+const GLOW: f32 = 1.35;
+
+/// The light on one face: a grid of points over the rectangle around it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::sensors::raster) struct FaceLight {
+    /// Column and row of a world point: `axes . [x, y, z, 1]`.
+    axes: [[f32; 4]; 2],
+    /// Columns and rows, 2 or more.
+    size: [u16; 2],
+    first: u32,
+    /// Whether the sun reaches some point of it.
+    pub is_sunny: bool,
+}
+
+/// The light on all faces. A point has the light without the sun, by channel, and the share of
+/// sunlight that the surface's slope takes up.
+#[derive(Debug, Clone, Default)]
+pub(in crate::sensors::raster) struct Field {
+    pub faces: Vec<FaceLight>,
+    points: Vec<[f32; 4]>,
+}
+
+impl Field {
+    pub fn build(
+        scene: &Scene,
+        mesh: &SceneMesh,
+        sources: &Sources,
+        contact: &Contact,
+        sun: &Sun,
+    ) -> Self {
+        let mut field = Self::default();
+        field.faces.reserve(mesh.faces.len());
+        let baker = Baker { scene, mesh, sources, contact, sun };
+        for part in &mesh.parts {
+            for index in part.faces.clone() {
+                let light = baker.bake(part, index, &mut field.points);
+                field.faces.push(light);
+            }
+        }
+        field
+    }
+
+    /// Return the light at a point of a face, interpolated.
+    #[inline(always)]
+    pub fn at(&self, light: &FaceLight, [x, y, z]: [f32; 3]) -> [f32; 4] {
+        let [columns, rows] = light.size;
+        let place = |[a, b, c, d]: [f32; 4], size: u16| {
+            (a * x + b * y + c * z + d).clamp(0.0, f32::from(size - 1) - 1e-3)
+        };
+        let (s, t) = (place(light.axes[0], columns), place(light.axes[1], rows));
+        let (column, row) = (s as u32, t as u32);
+        let (right, down) = (s - column as f32, t - row as f32);
+        let at = (light.first + row * u32::from(columns) + column) as usize;
+        let upper = &self.points[at..at + 2];
+        let lower = &self.points[at + usize::from(columns)..][..2];
+        let mix = |a: &[f32; 4], b: &[f32; 4], share: f32| -> [f32; 4] {
+            std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+        };
+        mix(&mix(&upper[0], &upper[1], right), &mix(&lower[0], &lower[1], right), down)
+    }
+}
+
+/// All that decides the light on a face.
+struct Baker<'a> {
+    scene: &'a Scene,
+    mesh: &'a SceneMesh,
+    sources: &'a Sources,
+    contact: &'a Contact,
+    sun: &'a Sun,
+}
+
+impl Baker<'_> {
+    fn bake(&self, part: &PartMesh, index: usize, points: &mut Vec<[f32; 4]>) -> FaceLight {
+        let face = &self.mesh.faces[index];
+        let vertices_m = &self.mesh.vertices_m[part.vertices.clone()];
+        let corners = self.mesh.corners_of(face);
+        let (origin_m, axes, size_m) = frame(face, corners, vertices_m);
+        let kind = self.scene.bodies[part.body as usize].kind;
+        let pitch_m = match kind {
+            BodyKind::Floor => 0.1,
+            BodyKind::Wall => 0.3,
+            BodyKind::Ceiling => 0.5,
+            _ => 0.35,
+        };
+        let normals: Vec<Vec3> = corners.iter().map(|&i| self.rounded(part, face, i)).collect();
+        let is_round = normals.iter().any(|normal| dot(*normal, face.normal) < 0.999);
+        let cells =
+            |edge_m: f64| if is_round { 1 } else { ((edge_m / pitch_m) as usize + 1).min(400) };
+        let [columns, rows] = size_m.map(|edge_m| cells(edge_m) + 1);
+        let scale =
+            [(columns - 1) as f64 / size_m[0].max(1e-6), (rows - 1) as f64 / size_m[1].max(1e-6)];
+        let row_of = |axis: usize| {
+            let [x, y, z] = axes[axis].map(|a| a * scale[axis]);
+            let offset = -scale[axis] * dot(axes[axis], origin_m);
+            [x, y, z, offset].map(|term| term as f32)
+        };
+        let first = points.len() as u32;
+        let middle_m = at(origin_m, axes, size_m.map(|edge_m| 0.5 * edge_m));
+        let ahead = |point_m: Vec3| -> Vec2 {
+            [0, 2].map(|axis| point_m[axis] + AHEAD_M * face.normal[axis])
+        };
+        let space = self.sources.space_at(ahead(middle_m));
+        if self.mesh.skins[index].material.kind.glows() {
+            points.extend([[GLOW, GLOW, GLOW, 0.0]; 4]);
+            return FaceLight {
+                axes: [row_of(0), row_of(1)],
+                size: [2, 2],
+                first,
+                is_sunny: false,
+            };
+        }
+        if is_round {
+            let lights = corners.iter().zip(&normals).map(|(&i, &normal)| {
+                let point_m = vertices_m[i as usize];
+                (point_m, self.light(space, point_m, normal, ahead(point_m)))
+            });
+            points.extend(fitted(lights.collect(), origin_m, axes, size_m));
+        } else {
+            for row in 0..rows {
+                for column in 0..columns {
+                    let place = [column as f64 / scale[0], row as f64 / scale[1]];
+                    let point_m = at(origin_m, axes, place);
+                    points.push(self.light(space, point_m, face.normal, ahead(point_m)));
+                }
+            }
+        }
+        let is_sunny = self.is_sunny(&points[first as usize..], origin_m, axes, size_m);
+        let size = [columns as u16, rows as u16];
+        FaceLight { axes: [row_of(0), row_of(1)], size, first, is_sunny }
+    }
+
+    /// Return the normal of a rounded part at a corner of a face: the mean of the faces there that
+    /// differ little in direction.
+    fn rounded(&self, part: &PartMesh, face: &Face, corner: u32) -> Vec3 {
+        if part.faces.len() <= 6 {
+            return face.normal;
+        }
+        let near = self.mesh.faces[part.faces.clone()].iter().filter(|other| {
+            dot(other.normal, face.normal) > SMOOTH && self.mesh.corners_of(other).contains(&corner)
+        });
+        let sum = near
+            .fold([0.0; 3], |sum: Vec3, other| std::array::from_fn(|i| sum[i] + other.normal[i]));
+        let length = dot(sum, sum).sqrt();
+        if length > 1e-9 { sum.map(|x| x / length) } else { face.normal }
+    }
+
+    fn light(&self, space: Option<usize>, point_m: Vec3, normal: Vec3, ahead_m: Vec2) -> [f32; 4] {
+        let [red, green, blue] = self.sources.on(space, point_m, normal);
+        let height = (point_m[1] / CONTACT_M).clamp(0.0, 1.0) as f32;
+        let open = self.contact.openness(ahead_m, height);
+        let towards = self.sun.towards.map(f64::from);
+        let slope = dot(normal, towards).max(0.0) as f32;
+        [red * open, green * open, blue * open, slope]
+    }
+
+    /// Return whether the sun reaches some of many points of a face.
+    fn is_sunny(&self, lit: &[[f32; 4]], origin_m: Vec3, axes: [Vec3; 2], size_m: Vec2) -> bool {
+        if lit.iter().all(|point| point[3] <= 0.0) {
+            return false;
+        }
+        let [columns, rows] = size_m.map(|edge_m| ((edge_m / 0.08) as usize + 2).min(400));
+        let mut lanes = [[0.0; LANES]; 3];
+        for row in 0..rows {
+            for column in (0..columns).step_by(LANES) {
+                for lane in 0..LANES {
+                    let share = |i: usize, n: usize| (i.min(n - 1) as f64 + 0.5) / n as f64;
+                    let place =
+                        [size_m[0] * share(column + lane, columns), size_m[1] * share(row, rows)];
+                    let point_m = at(origin_m, axes, place);
+                    (0..3).for_each(|axis| lanes[axis][lane] = point_m[axis] as f32);
+                }
+                if self.sun.reaches(&lanes).iter().any(|&share| share > 0.0) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+fn at(origin_m: Vec3, axes: [Vec3; 2], [s, t]: Vec2) -> Vec3 {
+    std::array::from_fn(|i| origin_m[i] + axes[0][i] * s + axes[1][i] * t)
+}
+
+/// Return the corner, axes and size of the rectangle around a face: along its longest edge.
+fn frame(face: &Face, corners: &[u32], vertices_m: &[Vec3]) -> (Vec3, [Vec3; 2], Vec2) {
+    let point = |i: u32| vertices_m[i as usize];
+    let next = corners.iter().cycle().skip(1);
+    let edges = corners.iter().zip(next).map(|(&a, &b)| sub(point(b), point(a)));
+    let longest =
+        edges.max_by(|a, b| dot(*a, *a).total_cmp(&dot(*b, *b))).unwrap_or([1.0, 0.0, 0.0]);
+    let length = dot(longest, longest).sqrt();
+    let s = longest.map(|x| x / length);
+    let n = face.normal;
+    let t = [n[1] * s[2] - n[2] * s[1], n[2] * s[0] - n[0] * s[2], n[0] * s[1] - n[1] * s[0]];
+    let axes = [s, t];
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for &corner in corners {
+        for axis in 0..2 {
+            let place = dot(axes[axis], point(corner));
+            low[axis] = low[axis].min(place);
+            high[axis] = high[axis].max(place);
+        }
+    }
+    // The rectangle's first corner, in the face's plane.
+    let lift = face.offset_m;
+    let origin_m = std::array::from_fn(|i| s[i] * low[0] + t[i] * low[1] + n[i] * lift);
+    (origin_m, axes, [high[0] - low[0], high[1] - low[1]])
+}
+
+/// Fit a plane through the light at the corners of a small face; return its four values at the
+/// corners of the rectangle.
+fn fitted(
+    lights: Vec<(Vec3, [f32; 4])>,
+    origin_m: Vec3,
+    axes: [Vec3; 2],
+    size_m: Vec2,
+) -> [[f32; 4]; 4] {
+    let num = lights.len() as f64;
+    let places: Vec<Vec2> = lights
+        .iter()
+        .map(|(point_m, _)| axes.map(|axis| dot(axis, sub(*point_m, origin_m))))
+        .collect();
+    let mean = [0, 1].map(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / num);
+    let spread = |a: usize, b: usize| -> f64 {
+        places.iter().map(|place| (place[a] - mean[a]) * (place[b] - mean[b])).sum()
+    };
+    let (ss, st, tt) = (spread(0, 0), spread(0, 1), spread(1, 1));
+    let determinant = (ss * tt - st * st).max(1e-18);
+    let mut values = [[0.0; 4]; 4];
+    for channel in 0..4 {
+        let of = |i: usize| f64::from(lights[i].1[channel]);
+        let middle = (0..lights.len()).map(of).sum::<f64>() / num;
+        let along = |axis: usize| -> f64 {
+            (0..lights.len()).map(|i| (places[i][axis] - mean[axis]) * (of(i) - middle)).sum()
+        };
+        let (s, t) = (along(0), along(1));
+        let (ds, dt) = ((s * tt - t * st) / determinant, (t * ss - s * st) / determinant);
+        for (corner, value) in values.iter_mut().enumerate() {
+            let place = [(corner % 2) as f64 * size_m[0], (corner / 2) as f64 * size_m[1]];
+            let fit = middle + ds * (place[0] - mean[0]) + dt * (place[1] - mean[1]);
+            value[channel] = fit.max(0.0) as f32;
+        }
+    }
+    values
+}
