@@ -18,6 +18,8 @@ const SMOOTH: f64 = 0.69;
 const CONTACT_M: f64 = 0.7;
 /// Distance from a surface at which the space before it is looked up.
 const AHEAD_M: f64 = 0.12;
+/// Spacing of the places at which the sun is looked for.
+const PROBE_M: f64 = 0.06;
 /// Brightness of what shines by itself: screens, and the world behind panes.
 const GLOW: f32 = 1.35;
 
@@ -29,8 +31,6 @@ pub(in crate::sensors::raster) struct FaceLight {
     /// Columns and rows, 2 or more.
     size: [u16; 2],
     first: u32,
-    /// Whether the sun reaches some point of it.
-    pub is_sunny: bool,
 }
 
 /// The light on all faces. A point has the light without the sun, by channel, and the share of
@@ -123,12 +123,7 @@ impl Baker<'_> {
         let space = self.sources.space_at(ahead(middle_m));
         if self.mesh.skins[index].material.kind.glows() {
             points.extend([[GLOW, GLOW, GLOW, 0.0]; 4]);
-            return FaceLight {
-                axes: [row_of(0), row_of(1)],
-                size: [2, 2],
-                first,
-                is_sunny: false,
-            };
+            return FaceLight { axes: [row_of(0), row_of(1)], size: [2, 2], first };
         }
         if is_round {
             let lights = corners.iter().zip(&normals).map(|(&i, &normal)| {
@@ -145,9 +140,10 @@ impl Baker<'_> {
                 }
             }
         }
-        let is_sunny = self.is_sunny(&points[first as usize..], origin_m, axes, size_m);
-        let size = [columns as u16, rows as u16];
-        FaceLight { axes: [row_of(0), row_of(1)], size, first, is_sunny }
+        let size = [columns, rows];
+        self.keep_sunny(&mut points[first as usize..], size, origin_m, axes, size_m);
+        let size = size.map(|num| num as u16);
+        FaceLight { axes: [row_of(0), row_of(1)], size, first }
     }
 
     /// Return the normal of a rounded part at a corner of a face: the mean of the faces there that
@@ -174,28 +170,48 @@ impl Baker<'_> {
         [red * open, green * open, blue * open, slope]
     }
 
-    /// Return whether the sun reaches some of many points of a face.
-    fn is_sunny(&self, lit: &[[f32; 4]], origin_m: Vec3, axes: [Vec3; 2], size_m: Vec2) -> bool {
+    /// Clear the slope of points around which the sun does not reach the face, so that it is not
+    /// looked up there.
+    fn keep_sunny(
+        &self,
+        lit: &mut [[f32; 4]],
+        [columns, rows]: [usize; 2],
+        origin_m: Vec3,
+        axes: [Vec3; 2],
+        size_m: Vec2,
+    ) {
         if lit.iter().all(|point| point[3] <= 0.0) {
-            return false;
+            return;
         }
-        let [columns, rows] = size_m.map(|edge_m| ((edge_m / 0.08) as usize + 2).min(400));
+        let mut is_sunny = vec![false; lit.len()];
+        let samples = size_m.map(|edge_m| ((edge_m / PROBE_M) as usize + 2).min(600));
         let mut lanes = [[0.0; LANES]; 3];
-        for row in 0..rows {
-            for column in (0..columns).step_by(LANES) {
+        for row in 0..samples[1] {
+            for first in (0..samples[0]).step_by(LANES) {
+                let share = |i: usize, n: usize| (i.min(n - 1) as f64 + 0.5) / n as f64;
+                let t = share(row, samples[1]);
                 for lane in 0..LANES {
-                    let share = |i: usize, n: usize| (i.min(n - 1) as f64 + 0.5) / n as f64;
-                    let place =
-                        [size_m[0] * share(column + lane, columns), size_m[1] * share(row, rows)];
+                    let place = [size_m[0] * share(first + lane, samples[0]), size_m[1] * t];
                     let point_m = at(origin_m, axes, place);
                     (0..3).for_each(|axis| lanes[axis][lane] = point_m[axis] as f32);
                 }
-                if self.sun.reaches(&lanes).iter().any(|&share| share > 0.0) {
-                    return true;
+                for (lane, &reach) in self.sun.reaches(&lanes).iter().enumerate() {
+                    if reach > 0.0 {
+                        let column =
+                            (share(first + lane, samples[0]) * (columns - 1) as f64) as usize;
+                        let row = (t * (rows - 1) as f64) as usize;
+                        // The corners of the cell and of its neighbours.
+                        for row in row.saturating_sub(1)..(row + 3).min(rows) {
+                            let near = column.saturating_sub(1)..(column + 3).min(columns);
+                            near.for_each(|column| is_sunny[row * columns + column] = true);
+                        }
+                    }
                 }
             }
         }
-        false
+        for (point, is_sunny) in lit.iter_mut().zip(is_sunny) {
+            point[3] = if is_sunny { point[3] } else { 0.0 };
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where light comes from: lamps and windows of connected rooms, and the sun.
+//! Sources of light: lamps and windows of connected rooms, and the sun.
 
 use crate::{
     geometry::{Vec2, Vec3, polygon_contains},

@@ -3,6 +3,8 @@
 //! Reshetov, "Morphological Antialiasing", High Performance Graphics 2009, on faces instead of
 //! colours: patterns within a face stay as they are.
 
+use std::ops::Range;
+
 use crate::sensors::raster::canvas::{Canvas, LANES};
 
 /// Change of one pixel's colour.
@@ -13,16 +15,31 @@ type Change = (u32, [i16; 3]);
 pub(super) struct Edges {
     changes: Vec<Change>,
     /// Row in which the current run of each border between two columns began, plus 1; 0 for none.
-    began: Vec<u32>,
+    began: Vec<[u32; LANES]>,
 }
 
-/// Pixels on both sides of a border, as steps of the pixels' index.
+/// Steps of the indices of tags, whose rows are padded, and of pixels.
+#[derive(Clone, Copy)]
+struct Place {
+    tag: usize,
+    pixel: usize,
+}
+
+impl Place {
+    fn plus(self, num: usize, step: Self) -> Self {
+        Self { tag: self.tag + num * step.tag, pixel: self.pixel + num * step.pixel }
+    }
+}
+
+/// A border between two rows or columns.
 #[derive(Clone, Copy)]
 struct Border {
+    /// The first pixel on its first side.
+    origin: Place,
     /// Step along the border.
-    along: usize,
+    along: Place,
     /// Step across the border, from its first side to its second.
-    across: usize,
+    across: Place,
     /// Number of pixels along the border.
     length: usize,
 }
@@ -31,9 +48,14 @@ impl Edges {
     /// Blend the colours at the borders between faces.
     pub fn smooth(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
         self.changes.clear();
-        let picture = Picture { canvas, rgb };
-        self.level(&picture);
-        self.upright(&picture);
+        let picture = Picture {
+            tags: canvas.tags.as_flattened(),
+            rgb,
+            right: Place { tag: 1, pixel: 1 },
+            down: Place { tag: canvas.blocks_per_row() * LANES, pixel: canvas.width_px },
+        };
+        self.level(canvas, &picture);
+        self.upright(canvas, &picture);
         for &(pixel, change) in &self.changes {
             let colour = &mut rgb[3 * pixel as usize..][..3];
             for (channel, change) in colour.iter_mut().zip(change) {
@@ -43,98 +65,105 @@ impl Edges {
     }
 
     /// Find the runs of the borders between two rows.
-    fn level(&mut self, picture: &Picture<'_>) {
-        let canvas = picture.canvas;
+    fn level(&mut self, canvas: &Canvas, picture: &Picture<'_>) {
         let width = canvas.width_px;
-        let border = Border { along: 1, across: width, length: width };
         for row in 1..canvas.height_px {
-            let (above, below) = (picture.tags(row - 1), picture.tags(row));
+            let (first, second) = (canvas.row_blocks(row - 1), canvas.row_blocks(row));
+            let blocks = canvas.tags[first].iter().zip(&canvas.tags[second]);
+            let origin = Place { tag: 0, pixel: 0 }.plus(row - 1, picture.down);
+            let (along, across) = (picture.right, picture.down);
+            let border = Border { origin, along, across, length: width };
             let mut began = None;
-            for first in (0..width).step_by(LANES) {
-                let end = (first + LANES).min(width);
-                if began.is_none() && above[first..end] == below[first..end] {
+            for (block, (above, below)) in blocks.enumerate() {
+                if began.is_none() && is_same(above, below) {
                     continue;
                 }
-                for column in first..end {
-                    let is_edge = above[column] != below[column];
-                    match (began, is_edge) {
+                for lane in 0..LANES.min(width - block * LANES) {
+                    let column = block * LANES + lane;
+                    match (began, above[lane] != below[lane]) {
                         (None, true) => began = Some(column),
                         (Some(start), false) => {
                             began = None;
-                            let origin = (row - 1) * width;
-                            picture.run(border, origin, start..column, &mut self.changes);
+                            picture.run(&border, start..column, &mut self.changes);
                         }
                         _ => {}
                     }
                 }
             }
             if let Some(start) = began {
-                picture.run(border, (row - 1) * width, start..width, &mut self.changes);
+                picture.run(&border, start..width, &mut self.changes);
             }
         }
     }
 
     /// Find the runs of the borders between two columns.
-    fn upright(&mut self, picture: &Picture<'_>) {
-        let canvas = picture.canvas;
+    fn upright(&mut self, canvas: &Canvas, picture: &Picture<'_>) {
         let (width, height) = (canvas.width_px, canvas.height_px);
-        let border = Border { along: width, across: 1, length: height };
         self.began.clear();
-        self.began.resize(width, 0);
-        for row in 0..=height {
-            let tags = if row < height { picture.tags(row) } else { &[] };
-            for column in 1..width {
-                let is_edge = row < height && tags[column - 1] != tags[column];
-                let began = &mut self.began[column];
-                match (*began, is_edge) {
-                    (0, true) => *began = row as u32 + 1,
-                    (0, false) | (_, true) => {}
-                    (start, false) => {
-                        *began = 0;
-                        let rows = start as usize - 1..row;
-                        picture.run(border, column - 1, rows, &mut self.changes);
+        self.began.resize(canvas.blocks_per_row(), [0; LANES]);
+        let border = |column: usize| Border {
+            origin: Place { tag: column - 1, pixel: column - 1 },
+            along: picture.down,
+            across: picture.right,
+            length: height,
+        };
+        for row in 0..height {
+            let mut before = canvas.tags[canvas.row_blocks(row).start][0];
+            let blocks = canvas.tags[canvas.row_blocks(row)].iter().zip(&mut self.began);
+            for (block, (tags, began)) in blocks.enumerate() {
+                let shifted: [u32; LANES] =
+                    std::array::from_fn(|lane| if lane == 0 { before } else { tags[lane - 1] });
+                before = tags[LANES - 1];
+                if is_same(tags, &shifted) && *began == [0; LANES] {
+                    continue;
+                }
+                for lane in 0..LANES.min(width - block * LANES) {
+                    match (began[lane], tags[lane] != shifted[lane]) {
+                        (0, true) => began[lane] = row as u32 + 1,
+                        (0, false) | (_, true) => {}
+                        (start, false) => {
+                            began[lane] = 0;
+                            let border = border(block * LANES + lane);
+                            picture.run(&border, start as usize - 1..row, &mut self.changes);
+                        }
                     }
                 }
+            }
+        }
+        for (column, &start) in self.began.as_flattened().iter().enumerate() {
+            if start > 0 {
+                picture.run(&border(column), start as usize - 1..height, &mut self.changes);
             }
         }
     }
 }
 
+/// Compare blocks without a branch a lane.
+fn is_same(a: &[u32; LANES], b: &[u32; LANES]) -> bool {
+    (0..LANES).fold(0, |different, lane| different | (a[lane] ^ b[lane])) == 0
+}
+
 struct Picture<'a> {
-    canvas: &'a Canvas,
+    tags: &'a [u32],
     rgb: &'a [u8],
+    right: Place,
+    down: Place,
 }
 
 impl Picture<'_> {
-    fn tags(&self, row: usize) -> &[u32] {
-        let blocks = self.canvas.row_blocks(row);
-        &self.canvas.tags[blocks].as_flattened()[..self.canvas.width_px]
-    }
-
-    fn tag(&self, pixel: usize) -> u32 {
-        let (row, column) = (pixel / self.canvas.width_px, pixel % self.canvas.width_px);
-        self.canvas.tags[self.canvas.row_blocks(row).start + column / LANES][column % LANES]
-    }
-
     /// Blend along one run of a border: pixels that differ from those on its other side.
-    fn run(
-        &self,
-        border: Border,
-        origin: usize,
-        run: std::ops::Range<usize>,
-        changes: &mut Vec<Change>,
-    ) {
-        let Border { along, across, length } = border;
+    fn run(&self, border: &Border, run: Range<usize>, changes: &mut Vec<Change>) {
+        let Border { origin, along, across, length } = *border;
         // The side to which the border bends at an end, where both sides have the same face: it
         // goes around the face that ends there.
-        let bend = |inside: usize, outside: Option<usize>| -> i32 {
-            let Some(outside) = outside else { return 0 };
-            let beyond = self.tag(origin + outside * along);
-            let inside = origin + inside * along;
-            i32::from(beyond == self.tag(inside)) - i32::from(beyond == self.tag(inside + across))
+        let bend = |inside: usize, outside: usize| -> i32 {
+            let beyond = self.tags[origin.plus(outside, along).tag];
+            let here = origin.plus(inside, along);
+            i32::from(beyond == self.tags[here.tag])
+                - i32::from(beyond == self.tags[here.plus(1, across).tag])
         };
-        let left = bend(run.start, run.start.checked_sub(1));
-        let right = bend(run.end - 1, (run.end < length).then_some(run.end));
+        let left = if run.start > 0 { bend(run.start, run.start - 1) } else { 0 };
+        let right = if run.end < length { bend(run.end - 1, run.end) } else { 0 };
         let (start, end) = (run.start as f32, run.end as f32);
         let middle = match (left, right) {
             (0, 0) => return,
@@ -142,27 +171,26 @@ impl Picture<'_> {
             (_, 0) => end,
             _ => 0.5 * (start + end),
         };
-        for (side, from, to) in [(left, middle, start), (right, middle, end)] {
+        for (side, tip) in [(left, start), (right, end)] {
             if side == 0 {
                 continue;
             }
-            let (low, high) = (from.min(to), from.max(to));
-            for place in low as usize..high.ceil() as usize {
+            let (low, high) = (middle.min(tip), middle.max(tip));
+            let slope = 0.5 / (high - low);
+            for place in low as usize..(high + 0.5) as usize {
                 let (a, b) = (low.max(place as f32), high.min(place as f32 + 1.0));
-                let share = 0.5 * (0.5 * (a + b) - from).abs() / (high - low) * (b - a);
-                let first = origin + place * along;
+                let share = slope * (0.5 * (a + b) - middle).abs() * (b - a);
+                let first = origin.plus(place, along).pixel;
+                let second = first + across.pixel;
                 // A border that bends to the second side lets the first side's face in there.
-                let (pixel, other) =
-                    if side > 0 { (first + across, first) } else { (first, first + across) };
+                let (pixel, other) = if side > 0 { (second, first) } else { (first, second) };
                 changes.push((pixel as u32, self.blend(pixel, other, share)));
             }
         }
     }
 
     fn blend(&self, pixel: usize, other: usize, share: f32) -> [i16; 3] {
-        std::array::from_fn(|i| {
-            let change = f32::from(self.rgb[3 * other + i]) - f32::from(self.rgb[3 * pixel + i]);
-            (change * share) as i16
-        })
+        let [own, other] = [pixel, other].map(|pixel| &self.rgb[3 * pixel..][..3]);
+        std::array::from_fn(|i| ((f32::from(other[i]) - f32::from(own[i])) * share) as i16)
     }
 }

@@ -30,7 +30,7 @@ const EVEN: f32 = 0.85;
 /// Coefficients `a - b x` of the response to brightness `x`: near 1 in the middle, flat at white.
 const RESPONSE: [f32; 2] = [1.2, 0.36];
 /// Exposure: brightness of a white surface in light of 1.
-const EXPOSURE: f32 = 1.0;
+const EXPOSURE: f32 = 0.88;
 
 /// Working memory.
 #[derive(Debug, Clone, Default)]
@@ -39,7 +39,7 @@ pub(super) struct Lit {
     edges: Edges,
 }
 
-/// What all blocks of an image have in common.
+/// The parts of a view that all blocks share.
 struct Shot<'a> {
     mesh: &'a SceneMesh,
     light: Option<&'a Light>,
@@ -77,9 +77,13 @@ impl Shot<'_> {
         let index = canvas.row_blocks(row).start + block;
         let tags = &canvas.tags[index];
         let (position_m, footprint_m) = self.rays.points(row, block, &canvas.nearness[index]);
+        // Most blocks lie within one face.
+        if tags[0] > 0 && tags.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0 {
+            let patch = Patch { face: tags[0] as usize - 1, position_m, footprint_m };
+            return self.patch(&patch, [0, LANES - 1], shades);
+        }
         let mut colours = [SKY; LANES];
         let mut rest = [true; LANES];
-        // Most blocks lie within one face.
         for first in 0..LANES {
             let tag = tags[first];
             if !rest[first] || tag == 0 {
@@ -134,10 +138,14 @@ impl Shot<'_> {
             let step = (end[channel] - start[channel]) * share;
             std::array::from_fn(|lane| start[channel] + step * (lane as f32 - first as f32))
         };
-        let smooth: [Lanes; 3] = std::array::from_fn(between);
-        if !face.is_sunny {
-            return smooth.map(|channel| channel.map(|light| light.max(0.0).sqrt()));
+        if start[3] + end[3] <= 0.0 {
+            return std::array::from_fn(|channel| {
+                let (start, end) = (start[channel].sqrt(), end[channel].sqrt());
+                let step = (end - start) * share;
+                std::array::from_fn(|lane| start + step * (lane as f32 - first as f32))
+            });
         }
+        let smooth: [Lanes; 3] = std::array::from_fn(between);
         let (reach, slope) = (light.sun.reaches(&patch.position_m), between(3));
         std::array::from_fn(|channel| {
             std::array::from_fn(|lane| {
