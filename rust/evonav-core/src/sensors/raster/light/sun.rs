@@ -77,21 +77,22 @@ impl Sun {
         std::array::from_fn(|lane| self.share(u[lane] - 0.5, v[lane] - 0.5, own[lane] + BIAS_M))
     }
 
-    /// Compare with the four cells around a point, and interpolate the answers.
+    /// Compare with the nine cells around a point; return the mean of the answers over a square of
+    /// two cells around it.
     #[inline(always)]
     fn share(&self, u: f32, v: f32, own: f32) -> f32 {
         let [width, height] = self.size;
-        let (u, v) = (u.clamp(0.0, (width - 2) as f32), v.clamp(0.0, (height - 2) as f32));
-        let (column, row) = (u as i32, v as i32);
-        let (right, down) = (u - column as f32, v - row as f32);
-        let at = (row * width + column) as usize;
-        let pair = |at: usize| -> f32 {
-            let lit = |at: usize| f32::from(u8::from(own >= self.nearness[at]));
-            let (here, next) = (lit(at), lit(at + 1));
-            here + right * (next - here)
+        let (u, v) = (u.clamp(1.0, (width - 3) as f32), v.clamp(1.0, (height - 3) as f32));
+        // The nearest cell, and the place in it.
+        let (column, row) = ((u + 0.5) as i32, (v + 0.5) as i32);
+        let (right, down) = (u + 0.5 - column as f32, v + 0.5 - row as f32);
+        let line = |row: i32| -> f32 {
+            let at = (row * width + column - 1) as usize;
+            let cells = &self.nearness[at..at + 3];
+            let [left, middle, next] = [0, 1, 2].map(|i| f32::from(u8::from(own >= cells[i])));
+            0.5 * ((1.0 - right) * left + middle + right * next)
         };
-        let (upper, lower) = (pair(at), pair(at + width as usize));
-        upper + down * (lower - upper)
+        0.5 * ((1.0 - down) * line(row - 1) + line(row) + down * line(row + 1))
     }
 }
 
