@@ -32,6 +32,13 @@ pub enum Primitive {
         /// Half axes.
         half_m: Vec3,
     },
+    /// A cuboid whose edges and corners are cut off, as those of cushions; only for trim.
+    Pad {
+        /// Half edge lengths of the cuboid.
+        half_m: Vec3,
+        /// Width of the cuts, at most the smallest half edge.
+        cut_m: f64,
+    },
 }
 
 impl Primitive {
@@ -74,7 +81,7 @@ impl Part {
     pub fn aabb(&self) -> Aabb {
         let row = |i: usize| self.rotation[i];
         let reach = match self.primitive {
-            Primitive::Cuboid { half_m } => {
+            Primitive::Cuboid { half_m } | Primitive::Pad { half_m, .. } => {
                 std::array::from_fn(|i| row(i).iter().zip(half_m).map(|(r, h)| (r * h).abs()).sum())
             }
             Primitive::Ellipsoid { half_m } => std::array::from_fn(|i| {

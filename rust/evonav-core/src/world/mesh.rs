@@ -15,6 +15,8 @@ use crate::{
 const ELLIPSOID_MERIDIANS: usize = 12;
 /// Bands of an ellipsoid from pole to pole; even, so that its box is exact.
 const ELLIPSOID_BANDS: usize = 6;
+/// Corners of a pad's outline.
+const PAD_SIDES: usize = 8;
 /// Faces smaller than this (twice the area, in square metres) are left out.
 const LEAST_AREA_M2: f64 = 1e-12;
 
@@ -61,6 +63,9 @@ pub struct SceneMesh {
     /// The material on each face.
     pub(crate) skins: Vec<Skin>,
     pub(crate) parts: Vec<PartMesh>,
+    /// The parts that only colours show; their faces come after all others.
+    pub(crate) trim: Vec<PartMesh>,
+    num_solid_faces: usize,
     num_bodies: usize,
 }
 
@@ -92,7 +97,16 @@ impl SceneMesh {
                 matches!(body.kind, BodyKind::Wall | BodyKind::Floor | BodyKind::Ceiling);
             for (number, part) in body.parts.iter().enumerate() {
                 let tailor = Tailor::new(part, is_structure, number);
-                mesh.push(part, index as u32, &tailor, is_shown);
+                let part = mesh.tessellate(part, index as u32, &tailor, is_shown);
+                mesh.parts.extend(part);
+            }
+        }
+        mesh.num_solid_faces = mesh.faces.len();
+        for (index, body) in scene.bodies.iter().enumerate() {
+            for (number, part) in body.trim.iter().enumerate() {
+                let tailor = Tailor::new(part, false, body.parts.len() + number);
+                let part = mesh.tessellate(part, index as u32, &tailor, |_| true);
+                mesh.trim.extend(part);
             }
         }
         mesh
@@ -103,17 +117,17 @@ impl SceneMesh {
         self.num_bodies
     }
 
-    /// Return the faces, grouped by body in ascending order.
+    /// Return the faces of the solid parts, grouped by body in ascending order.
     pub fn faces(&self) -> &[Face] {
-        &self.faces
+        &self.faces[..self.num_solid_faces]
     }
 
     /// Return the material on each of the [`faces`](Self::faces).
     pub fn skins(&self) -> &[Skin] {
-        &self.skins
+        &self.skins[..self.num_solid_faces]
     }
 
-    /// Return the faces cut into triangles, in their order.
+    /// Return the faces of the solid parts cut into triangles, in their order.
     pub fn triangles(&self) -> impl Iterator<Item = Triangle> + '_ {
         self.parts.iter().flat_map(move |part| {
             let vertices_m = &self.vertices_m[part.vertices.clone()];
@@ -134,13 +148,14 @@ impl SceneMesh {
         &self.corners[first..first + face.num_corners as usize]
     }
 
-    fn push(
+    /// Add the vertices and faces of a part; `None` if it has no face.
+    fn tessellate(
         &mut self,
         part: &Part,
         body: u32,
         tailor: &Tailor<'_>,
         is_shown: impl Fn(Vec3) -> bool,
-    ) {
+    ) -> Option<PartMesh> {
         let (first_vertex, first_face) = (self.vertices_m.len(), self.faces.len());
         let vertices_m = vertices_of(&part.primitive);
         let to_world = |v: &Vec3| add(part.centre_m, rotate(&part.rotation, *v));
@@ -155,14 +170,14 @@ impl SceneMesh {
         });
         if self.faces.len() == first_face {
             self.vertices_m.truncate(first_vertex);
-            return;
+            return None;
         }
-        self.parts.push(PartMesh {
+        Some(PartMesh {
             vertices: first_vertex..self.vertices_m.len(),
             faces: first_face..self.faces.len(),
             body,
             aabb: Aabb::of_points(self.vertices_m[first_vertex..].iter().copied()),
-        });
+        })
     }
 
     /// Add a polygon. Four corners that do not lie in a plane (the sides of a frustum whose ends
@@ -250,7 +265,26 @@ pub(crate) fn vertices_of(primitive: &Primitive) -> Vec<Vec3> {
             let levels: [_; ELLIPSOID_BANDS + 1] = std::array::from_fn(ring);
             rings(ELLIPSOID_MERIDIANS, &levels)
         }
+        Primitive::Pad { half_m: [x, y, z], cut_m } => {
+            let cut_m = cut_m.min(x).min(y).min(z);
+            let levels = [(cut_m, -y), (0.0, cut_m - y), (0.0, y - cut_m), (cut_m, y)];
+            let level = |(inset_m, height_m)| {
+                octagon([x - inset_m, z - inset_m], cut_m).map(|[x, z]| [x, height_m, z])
+            };
+            levels.map(level).into_iter().flatten().collect()
+        }
     }
+}
+
+/// Return the corners of a rectangle about the origin whose own corners are cut off, in the order
+/// of [`rings`].
+fn octagon([x, z]: [f64; 2], cut_m: f64) -> [[f64; 2]; PAD_SIDES] {
+    let [near_x, near_z] = [x, z].map(|half| (half - cut_m).max(0.0));
+    let quarter = [[x, near_z], [near_x, z]];
+    let turned = [[-near_x, z], [-x, near_z]];
+    let back = |[x, z]: [f64; 2]| [-x, -z];
+    let [[a, b], [c, d]] = [quarter, turned];
+    [a, b, c, d, back(a), back(b), back(c), back(d)]
 }
 
 /// Return the solid's corners on elliptic rings `(half axes [x, z], y)`, lowest first, over a
@@ -280,6 +314,7 @@ pub(crate) fn each_polygon(
         Primitive::Cuboid { .. } => return CUBOID.iter().for_each(|polygon| visit(polygon)),
         Primitive::Frustum { sides, .. } => u32::from(sides.max(3)),
         Primitive::Ellipsoid { .. } => ELLIPSOID_MERIDIANS as u32,
+        Primitive::Pad { .. } => PAD_SIDES as u32,
     };
     let last = vertices_m.len() as u32 - num_sides;
     let mut polygon = Vec::new();

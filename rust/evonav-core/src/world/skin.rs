@@ -68,7 +68,9 @@ impl<'a> Tailor<'a> {
         }
         let own = rotate(&transposed(&self.part.rotation), normal);
         match self.part.primitive {
-            Primitive::Cuboid { half_m } => self.flat(layout, own, half_m),
+            Primitive::Cuboid { half_m } | Primitive::Pad { half_m, .. } => {
+                self.flat(layout, own, half_m)
+            }
             Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
                 let half_m = [bottom_m[0].max(top_m[0]), half_height_m, bottom_m[1].max(top_m[1])];
                 if own[1].abs() > END {

@@ -1,9 +1,12 @@
 //! Shapes of all catalogue assets: exact boxes, sane parts, free room where there should be some.
 
-use evonav_core::assets::{
-    Asset, Catalogue,
-    part::{Part, Primitive, aabb_of},
-    shapes::shape_of,
+use evonav_core::{
+    assets::{
+        Asset, Catalogue,
+        part::{Part, Primitive, aabb_of},
+        shapes::{Shape, shape_of, trimmed_shape},
+    },
+    house::Condition,
 };
 use proptest::prelude::*;
 
@@ -15,6 +18,7 @@ fn num_triangles(part: &Part) -> usize {
         Primitive::Cuboid { .. } => 12,
         Primitive::Frustum { sides, .. } => 4 * usize::from(sides) - 4,
         Primitive::Ellipsoid { .. } => 120,
+        Primitive::Pad { .. } => 60,
     }
 }
 
@@ -22,6 +26,7 @@ fn is_sane(parts: &[Part]) -> bool {
     let positive = |edges: &[f64]| edges.iter().all(|edge| edge.is_finite() && *edge > 0.0);
     parts.iter().all(|part| match part.primitive {
         Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => positive(&half_m),
+        Primitive::Pad { half_m, cut_m } => positive(&half_m) && positive(&[cut_m]),
         Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
             positive(&bottom_m) && positive(&top_m) && positive(&[half_height_m]) && sides >= 3
         }
@@ -47,6 +52,27 @@ fn every_asset_fills_its_box_and_nothing_else() {
         costliest = costliest.max((parts.iter().map(num_triangles).sum(), id));
     }
     assert!(costliest.0 <= 700, "{costliest:?}");
+}
+
+#[test]
+fn trim_lies_in_the_box_of_its_asset() {
+    let catalogue = Catalogue::bundled();
+    let mut num_trimmed = 0;
+    for id in catalogue.asset_ids() {
+        let asset = catalogue.get(id).expect("listed");
+        let Shape { parts, trim } = trimmed_shape(asset, Condition::default());
+        assert_eq!(parts, shape_of(asset), "{id}");
+        assert!(parts.iter().all(|part| !matches!(part.primitive, Primitive::Pad { .. })), "{id}");
+        assert!(is_sane(&trim), "{id}");
+        num_trimmed += usize::from(!trim.is_empty());
+        let bounds = aabb_of(&trim);
+        for axis in 0..3 {
+            let half = 0.5 * asset.size_m[axis] + 1e-6;
+            assert!(bounds.max_m[axis] <= half && bounds.min_m[axis] >= -half, "{id} {bounds:?}");
+        }
+        assert!(trim.iter().map(num_triangles).sum::<usize>() <= 1500, "{id}");
+    }
+    assert!(num_trimmed > 150, "{num_trimmed}");
 }
 
 #[test]

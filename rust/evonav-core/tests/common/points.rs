@@ -29,7 +29,9 @@ pub fn parts_of(house: &House, id: &str) -> Vec<Part> {
 /// Half edges of a part's own box.
 pub fn half_of(part: &Part) -> Vec3 {
     match part.primitive {
-        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => half_m,
+        Primitive::Cuboid { half_m }
+        | Primitive::Ellipsoid { half_m }
+        | Primitive::Pad { half_m, .. } => half_m,
         Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
             [bottom_m[0].max(top_m[0]), half_height_m, bottom_m[1].max(top_m[1])]
         }
@@ -58,6 +60,7 @@ pub fn points_in(part: &Part, share: f64) -> Vec<Vec3> {
 fn contains_local(primitive: &Primitive, p: Vec3, inset_m: f64) -> bool {
     match *primitive {
         Primitive::Cuboid { half_m } => (0..3).all(|i| p[i].abs() <= half_m[i] - inset_m),
+        Primitive::Pad { .. } => unreachable!("only trim has pads"),
         Primitive::Ellipsoid { half_m } => {
             let terms = (0..3).map(|i| (p[i] / (half_m[i] - inset_m).max(1e-9)).powi(2));
             terms.sum::<f64>() <= 1.0

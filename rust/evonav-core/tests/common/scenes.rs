@@ -12,6 +12,7 @@ pub fn scene_of(bodies: &[Vec<Part>]) -> Scene {
         category: "Box".to_owned(),
         kind: BodyKind::Object,
         parts: parts.clone(),
+        trim: Vec::new(),
         aabb: aabb_of(parts),
         unopened: Aabb::EMPTY,
         oriented: OrientedBox::of_aabb(&aabb_of(parts)),

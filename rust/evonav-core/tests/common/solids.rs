@@ -14,6 +14,7 @@ pub fn holds(part: &Part, point_m: Vec3) -> bool {
     let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
     match part.primitive {
         Primitive::Cuboid { half_m } => (0..3).all(|i| own[i].abs() <= half_m[i]),
+        Primitive::Pad { .. } => unreachable!("only trim has pads"),
         Primitive::Ellipsoid { half_m } => {
             (0..3).map(|i| (own[i] / half_m[i]).powi(2)).sum::<f64>() <= 1.0
         }

@@ -53,6 +53,7 @@ fn points_on(part: &Part, position_m: Vec3, rotation_deg: Vec3) -> Vec<Vec3> {
             local.extend(Primitive::ring_m(bottom_m, -half_height_m, sides));
             local.extend(Primitive::ring_m(top_m, half_height_m, sides));
         }
+        Primitive::Pad { .. } => unreachable!("only trim has pads"),
         Primitive::Ellipsoid { half_m: [x, y, z] } => {
             for i in 0..32 {
                 for j in 0..=16 {

@@ -225,6 +225,37 @@ proptest! {
         }
     }
 
+    /// Trim is seen in the colours of the default style, and nowhere else.
+    #[test]
+    fn trim_changes_only_colours_of_the_default_style(
+        parts in vec(part(), 0..8),
+        trim in vec(part(), 1..4),
+        view in view(),
+        ray in [-4.0..4.0_f64, 0.0..2.0_f64, -4.0..4.0_f64],
+    ) {
+        let bare = scene_of(&parts);
+        let mut trimmed = scene_of(&parts);
+        let Some(body) = trimmed.bodies.first_mut() else { return Ok(()) };
+        body.trim = trim;
+        let [bare, trimmed] = [bare, trimmed].map(|scene| SceneMesh::build(&scene));
+        prop_assert_eq!(bare.faces(), trimmed.faces());
+        prop_assert!(bare.triangles().eq(trimmed.triangles()));
+        for (name, style) in Style::NAMES {
+            let frames = [&bare, &trimmed].map(|mesh| {
+                let mut frame = FrameBuffer::default();
+                render_view(mesh, &view, Want { rgb: Some(style), instances: true }, &mut frame).unwrap();
+                frame
+            });
+            prop_assert_eq!(&frames[0].depth_m, &frames[1].depth_m);
+            prop_assert_eq!(&frames[0].instances, &frames[1].instances);
+            prop_assert!(style == Style::Default || frames[0].rgb == frames[1].rgb, "{}", name);
+        }
+        let cast = |mesh: &SceneMesh| {
+            RayCaster::build(mesh).cast(mesh, ray, [0.6, 0.0, 0.8], f64::INFINITY)
+        };
+        prop_assert_eq!(cast(&bare), cast(&trimmed));
+    }
+
     /// The hierarchy finds what trying every triangle finds.
     #[test]
     fn rays_hit_what_a_search_over_all_triangles_hits(

@@ -29,7 +29,9 @@ fn contains_naive(part: &Part, point_m: Vec3, grow: f64) -> bool {
                     cos * unit[0] + sin * unit[1] <= (0.5 * step).cos()
                 })
         }
-        Primitive::Ellipsoid { .. } => unreachable!("drawn as a polyhedron of its own"),
+        Primitive::Ellipsoid { .. } | Primitive::Pad { .. } => {
+            unreachable!("drawn as polyhedra of their own")
+        }
     }
 }
 

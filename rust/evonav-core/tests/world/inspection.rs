@@ -27,7 +27,7 @@ fn polytope(part: &Part) -> (Vec<Vec3>, Vec<Vec3>, Vec<Vec3>) {
             Primitive::ring_m(bottom_m, -half_height_m, sides).collect(),
             Primitive::ring_m(top_m, half_height_m, sides).collect(),
         ),
-        Primitive::Ellipsoid { .. } => unreachable!("not asked for"),
+        Primitive::Ellipsoid { .. } | Primitive::Pad { .. } => unreachable!("not asked for"),
     };
     let count = lower.len();
     let (mut normals, mut edges) = (vec![[0.0, 1.0, 0.0]], vec![]);

@@ -28,7 +28,8 @@ fn cuboid(centre_m: Vec3, half_m: Vec3, yaw_rad: f64) -> Part {
 fn body(id: &str, kind: BodyKind, parts: Vec<Part>) -> Body {
     let aabb = Aabb { min_m: [0.0; 3], max_m: [ROOM_M, 2.5, ROOM_M] };
     let oriented = OrientedBox::of_aabb(&aabb);
-    Body { id: id.to_owned(), category: id.to_owned(), kind, parts, aabb, unopened: aabb, oriented }
+    let (id, category, trim) = (id.to_owned(), id.to_owned(), Vec::new());
+    Body { id, category, kind, parts, trim, aabb, unopened: aabb, oriented }
 }
 
 /// A square room with walls 2 cm thick outside its floor, and boxes.

@@ -80,7 +80,7 @@ fn holds_drawn(part: &Part, point_m: Vec3) -> bool {
             };
             (0.0..=1.0).contains(&t) && (0..ring.len()).all(is_left)
         }
-        Primitive::Cuboid { .. } => holds(part, point_m),
+        Primitive::Cuboid { .. } | Primitive::Pad { .. } => holds(part, point_m),
     }
 }
 

@@ -348,7 +348,7 @@ fn support_m(parts: &[Part], [x, z]: Vec2, limit_m: f64) -> Option<f64> {
             Primitive::Frustum { top_m: [w, d], half_height_m, .. } => {
                 ((own[0] / w).powi(2) + (own[2] / d).powi(2) <= 1.0, half_height_m)
             }
-            Primitive::Ellipsoid { .. } => (false, 0.0),
+            Primitive::Ellipsoid { .. } | Primitive::Pad { .. } => (false, 0.0),
         };
         let height_m = part.centre_m[1] + half_m;
         (is_over && height_m <= limit_m).then_some(height_m)

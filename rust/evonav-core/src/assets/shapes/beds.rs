@@ -71,8 +71,19 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
     let linen_white = rgb(245, 243, 238).of(MaterialKind::Pillow);
     for i in 0..pillows {
         let side = inside(piece(x, i, pillows), 0.08 * width);
-        s.cuboid(side, [top - 0.012, top + 0.07], between(length, 0.03, 0.2), linen_white);
+        let along = between(length, 0.03, 0.2);
+        s.cuboid(side, [top - 0.012, top + 0.07], along, linen_white);
+        s.trim(|s| {
+            let plump = [inside(side, -0.015), [top - 0.01, top + 0.085], inside(along, -0.02)];
+            s.pad(plump[0], plump[1], plump[2], 0.035, linen_white);
+        });
     }
+    s.trim(|s| {
+        let duvet = linen.of(MaterialKind::Duvet);
+        let [over, fold] = [[top - 0.05, top + 0.035], [top - 0.02, top + 0.06]];
+        s.pad(x, over, blanket, 0.03, duvet);
+        s.pad(x, fold, between(length, 0.29, 0.42), 0.025, shade(linen, 1.25));
+    });
 }
 
 /// Draw a dog bed: a cushion with a raised rim.

@@ -12,7 +12,9 @@ mod decor;
 mod devices;
 mod food;
 mod kitchen;
+mod motion;
 mod seats;
+mod shape;
 mod sketch;
 mod storage;
 mod tables;
@@ -23,6 +25,7 @@ use crate::{
     house::Condition,
 };
 pub(crate) use colour::{is_pale, lit};
+pub use shape::Shape;
 use sketch::Sketch;
 pub use sketch::{Detail, ShapeTraits};
 
@@ -40,6 +43,11 @@ pub fn shape_of(asset: &Asset) -> Vec<Part> {
 /// # Returns
 /// The same as [`shape_of`] in the default state. Open parts may reach out of the asset's box.
 pub fn shape_in(asset: &Asset, condition: Condition) -> Vec<Part> {
+    trimmed_shape(asset, condition).parts
+}
+
+/// Return the parts and the trim of an asset in a state.
+pub fn trimmed_shape(asset: &Asset, condition: Condition) -> Shape {
     let mut sketch = Sketch::new(asset, condition);
     draw(&mut sketch);
     sketch.finish()

@@ -41,6 +41,9 @@ pub fn chair(s: &mut Sketch<'_>) {
     let leg = (0.08 * w.min(d)).clamp(0.02, 0.045);
     s.legs([0.0, seat - 0.03], leg, 0.01, wood);
     s.cuboid(x, [seat - 0.04, seat], z, cushion);
+    s.trim(|s| {
+        s.pad(inside(x, 0.01), [seat - 0.01, seat + 0.025], inside(z, 0.01), 0.015, cushion)
+    });
     let [left, right] = ends(x, leg, 0.0);
     s.cuboid(left, [seat, h], back, wood);
     s.cuboid(right, [seat, h], back, wood);
@@ -115,9 +118,15 @@ pub fn sofa(s: &mut Sketch<'_>) {
     for i in 0..count {
         let cushion = inside(piece(inner, i, count), 0.006);
         s.cuboid(cushion, [seat - pad, seat], [back[1], front], soft);
+        s.trim(|s| s.pad(cushion, [seat - pad, seat + 0.02], [back[1], front + 0.02], 0.03, soft));
         if is_sofa {
             let lean = [back[1], back[1] + 0.12 * d];
-            s.cuboid(inside(cushion, 0.01), [seat, seat + 0.75 * (h - seat)], lean, soft);
+            let tall = [seat, seat + 0.75 * (h - seat)];
+            s.cuboid(inside(cushion, 0.01), tall, lean, soft);
+            s.trim(|s| {
+                let plump = [lean[0], lean[1] + 0.03];
+                s.pad(cushion, [seat, tall[1] + 0.02], plump, 0.04, soft);
+            });
         }
     }
 }

@@ -1,15 +1,22 @@
 //! A drawing aid: parts are given by their start and end inside an asset's box.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
+pub use crate::assets::shapes::motion::{Along, Motion};
 use crate::{
     assets::{
         Asset,
         material::Material,
         part::{Part, Primitive, aabb_of},
-        shapes::colour::{self, Paint},
+        shapes::{
+            colour::{self, Paint},
+            motion::move_part,
+            shape::Shape,
+        },
     },
-    geometry::{IDENTITY, Mat3, Vec3, add, compose, euler_rotation_deg, rotate, sub},
+    geometry::{IDENTITY, Mat3, Vec3},
     house::Condition,
 };
 
@@ -36,26 +43,10 @@ pub struct Detail {
     pub count: usize,
 }
 
-/// Axis of a round part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Along {
-    X,
-    Y,
-    Z,
-}
-
-/// The motion of parts as an object opens.
-#[derive(Debug, Clone, Copy)]
-pub enum Motion {
-    /// A turn about an axis through a point of the box (x, height, z).
-    Hinge { pivot_m: Vec3, axis: Along, angle_rad: f64 },
-    /// A shift.
-    Slide { by_m: Vec3 },
-}
-
 /// Parts that move, and the state in which they are drawn.
 struct Moving {
-    parts: std::ops::Range<usize>,
+    parts: Range<usize>,
+    trim: Range<usize>,
     motion: Motion,
     is_drawn_open: bool,
 }
@@ -65,7 +56,7 @@ pub struct Sketch<'a> {
     asset: &'a Asset,
     condition: Condition,
     size_m: Vec3,
-    parts: Vec<Part>,
+    shape: Shape,
     moving: Vec<Moving>,
     traits: ShapeTraits,
 }
@@ -78,7 +69,7 @@ impl<'a> Sketch<'a> {
             asset,
             condition,
             size_m,
-            parts: Vec::new(),
+            shape: Shape::default(),
             moving: Vec::new(),
             traits: ShapeTraits::default(),
         }
@@ -106,9 +97,18 @@ impl<'a> Sketch<'a> {
     }
 
     fn record(&mut self, motion: Motion, is_drawn_open: bool, draw: impl FnOnce(&mut Self)) {
-        let first = self.parts.len();
+        let [first, first_trim] = [self.shape.parts.len(), self.shape.trim.len()];
         draw(self);
-        self.moving.push(Moving { parts: first..self.parts.len(), motion, is_drawn_open });
+        let Shape { parts, trim } = &self.shape;
+        let (parts, trim) = (first..parts.len(), first_trim..trim.len());
+        self.moving.push(Moving { parts, trim, motion, is_drawn_open });
+    }
+
+    /// Record what `draw` draws as trim: see [`Shape::trim`]. It is clamped to the asset's box, too.
+    pub fn trim(&mut self, draw: impl FnOnce(&mut Self)) {
+        self.shape.swap();
+        draw(self);
+        self.shape.swap();
     }
 
     pub fn asset(&self) -> &'a Asset {
@@ -199,6 +199,13 @@ impl<'a> Sketch<'a> {
         self.push(Primitive::Cuboid { half_m }, spans, IDENTITY, paint);
     }
 
+    /// Draw a cuboid with cut edges, for trim.
+    pub fn pad(&mut self, x: Span, y: Span, z: Span, cut_m: f64, paint: Paint) {
+        let spans = self.clamped([x, y, z]);
+        let half_m = spans.map(|[low, high]| 0.5 * (high - low));
+        self.push(Primitive::Pad { half_m, cut_m }, spans, IDENTITY, paint);
+    }
+
     /// Draw one cuboid that fills the box.
     pub fn block(&mut self, paint: Paint) {
         let [x, y, z] = self.spans();
@@ -275,7 +282,7 @@ impl<'a> Sketch<'a> {
         let centre_m = [x, y - 0.5 * self.size_m[1], z];
         let colour = colour::lit(paint.colour);
         let material = Material::named(paint.kind, &self.asset.id);
-        self.parts.push(Part { primitive, centre_m, rotation, colour, material });
+        self.shape.parts.push(Part { primitive, centre_m, rotation, colour, material });
     }
 
     /// Record the form.
@@ -297,43 +304,31 @@ impl<'a> Sketch<'a> {
 
     /// Finish the shape: stretch the drawn parts slightly so that they fill the box, then move them
     /// to their places in the asset's state.
-    pub fn finish(mut self) -> Vec<Part> {
-        if self.parts.is_empty() {
+    pub fn finish(mut self) -> Shape {
+        if self.shape.parts.is_empty() {
             self.block(colour::rgb(160, 150, 140));
         }
-        let drawn = aabb_of(&self.parts);
+        let Shape { mut parts, mut trim } = self.shape;
+        let drawn = aabb_of(&parts);
         let (middle, size) = (drawn.centre_m(), drawn.size_m());
         let is_full = |i: usize| (size[i] - self.size_m[i]).abs() < 1e-9 && middle[i].abs() < 1e-9;
         if !(0..3).all(is_full) {
             let scale: Vec3 = std::array::from_fn(|i| self.size_m[i] / size[i]);
-            for part in &mut self.parts {
+            for part in parts.iter_mut().chain(&mut trim) {
                 stretch(part, middle, scale);
             }
         }
         if let Some(openness) = self.condition.openness {
-            for Moving { parts, motion, is_drawn_open } in &self.moving {
-                let share = if *is_drawn_open { 1.0 - openness } else { openness };
-                let parts = self.parts.get_mut(parts.clone()).into_iter().flatten();
-                parts.for_each(|part| move_part(part, motion, share, 0.5 * self.size_m[1]));
+            for moving in self.moving {
+                let share = if moving.is_drawn_open { 1.0 - openness } else { openness };
+                let parts = parts.get_mut(moving.parts).into_iter().flatten();
+                let trim = trim.get_mut(moving.trim).into_iter().flatten();
+                for part in parts.chain(trim) {
+                    move_part(part, &moving.motion, share, 0.5 * self.size_m[1]);
+                }
             }
         }
-        self.parts
-    }
-}
-
-/// Move a part by a share of a motion; `origin_m` is the height of the object frame's origin.
-fn move_part(part: &mut Part, motion: &Motion, share: f64, origin_m: f64) {
-    match *motion {
-        Motion::Slide { by_m } => part.centre_m = add(part.centre_m, by_m.map(|by| share * by)),
-        Motion::Hinge { pivot_m: [x, y, z], axis, angle_rad } if share != 0.0 => {
-            let pivot_m = [x, y - origin_m, z];
-            let mut angles_deg = [0.0; 3];
-            angles_deg[axis as usize] = (share * angle_rad).to_degrees();
-            let turn = euler_rotation_deg(angles_deg);
-            part.centre_m = add(pivot_m, rotate(&turn, sub(part.centre_m, pivot_m)));
-            part.rotation = compose(&turn, &part.rotation);
-        }
-        Motion::Hinge { .. } => {}
+        Shape { parts, trim }
     }
 }
 
@@ -369,7 +364,9 @@ fn stretch(part: &mut Part, middle: Vec3, scale: Vec3) {
     let own = |j: usize| (0..3).map(|i| part.rotation[i][j].powi(2) * scale[i]).sum::<f64>();
     let [x, y, z] = [own(0), own(1), own(2)];
     match &mut part.primitive {
-        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => {
+        Primitive::Cuboid { half_m }
+        | Primitive::Ellipsoid { half_m }
+        | Primitive::Pad { half_m, .. } => {
             *half_m = [half_m[0] * x, half_m[1] * y, half_m[2] * z];
         }
         Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {

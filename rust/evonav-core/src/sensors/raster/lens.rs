@@ -8,7 +8,7 @@ use crate::{
         camera::{Camera, View},
         raster::canvas::LANES,
     },
-    world::mesh::{Face, SceneMesh, dot},
+    world::mesh::{Face, PartMesh, dot},
 };
 
 /// Working memory: parts in view, vertices of the current part and corners of the current face.
@@ -136,10 +136,10 @@ impl Lens {
     }
 
     /// Collect the parts in view, nearest first.
-    pub fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
+    pub fn collect_visible(&self, parts: &[PartMesh], visible: &mut Vec<(f64, u32)>) {
         visible.clear();
         visible.extend(
-            mesh.parts
+            parts
                 .iter()
                 .enumerate()
                 .filter(|(_, part)| self.may_see(&part.aabb))

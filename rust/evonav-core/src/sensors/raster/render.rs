@@ -102,13 +102,30 @@ pub fn render_lit(
     if let Some(style) = want.rgb {
         out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
-    lens.collect_visible(mesh, &mut out.scratch.visible);
-    for index in 0..out.scratch.visible.len() {
-        let part = &mesh.parts[out.scratch.visible[index].1 as usize];
-        draw_part(mesh, part, &lens, want, out);
+    draw_parts(mesh, &mesh.parts, &lens, want, out);
+    resolve(mesh, &lens, want, out);
+    if let Some(style) = want.rgb {
+        if style == Style::Default {
+            draw_parts(mesh, &mesh.trim, &lens, want, out);
+        }
+        out.shader.shade(style, mesh, light, &lens, &out.canvas, &mut out.rgb);
     }
-    resolve(mesh, light, &lens, want, out);
     Ok(())
+}
+
+/// Draw the parts in view, nearest first.
+fn draw_parts(
+    mesh: &SceneMesh,
+    parts: &[PartMesh],
+    lens: &Lens,
+    want: Want,
+    out: &mut FrameBuffer,
+) {
+    lens.collect_visible(parts, &mut out.scratch.visible);
+    for index in 0..out.scratch.visible.len() {
+        let part = &parts[out.scratch.visible[index].1 as usize];
+        draw_part(mesh, part, lens, want, out);
+    }
 }
 
 pub(super) fn draw_part(
@@ -165,15 +182,9 @@ fn clip_near(
     }
 }
 
-/// Turn the canvas into images.
-fn resolve(
-    mesh: &SceneMesh,
-    light: Option<&Light>,
-    lens: &Lens,
-    want: Want,
-    out: &mut FrameBuffer,
-) {
-    let FrameBuffer { depth_m, instances, rgb, canvas, shader, .. } = out;
+/// Turn the canvas of the solid parts into images of depth and instances.
+fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
+    let FrameBuffer { depth_m, instances, rgb, canvas, .. } = out;
     let num_pixels = canvas.width_px * canvas.height_px;
     depth_m.resize(num_pixels, 0.0);
     let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
@@ -198,9 +209,6 @@ fn resolve(
         Want { instances: false, .. } => {}
     }
     rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
-    if let Some(style) = want.rgb {
-        shader.shade(style, mesh, light, lens, canvas, rgb);
-    }
 }
 
 /// Copy rows of padded blocks to rows of exactly the image's width.

@@ -54,7 +54,7 @@ pub fn visible_px(
     let blocks = columns.start / LANES..columns.end.div_ceil(LANES);
     let size_px = [camera.width_px, camera.height_px];
     frame.canvas.clear_within(size_px, lens.far_nearness(), rows.clone(), blocks.clone());
-    lens.collect_visible(mesh, &mut frame.scratch.visible);
+    lens.collect_visible(&mesh.parts, &mut frame.scratch.visible);
     for index in 0..frame.scratch.visible.len() {
         let part = &mesh.parts[frame.scratch.visible[index].1 as usize];
         draw_part(mesh, part, &lens, Want { rgb: None, instances: true }, frame);

@@ -41,7 +41,7 @@ impl Solid {
     pub(super) fn of(part: &Part) -> Self {
         let turned = |corner: Vec3| vector(rotate(&part.rotation, corner));
         let (shape, normals, edges) = match part.primitive {
-            Primitive::Cuboid { half_m: [x, y, z] } => {
+            Primitive::Cuboid { half_m: [x, y, z] } | Primitive::Pad { half_m: [x, y, z], .. } => {
                 let axes =
                     [turned([1.0, 0.0, 0.0]), turned([0.0, 1.0, 0.0]), turned([0.0, 0.0, 1.0])];
                 let signs = (0..8)

@@ -2,7 +2,11 @@
 
 use crate::{
     Error,
-    assets::{Catalogue, UnknownAssets, placement_rule::Place, shapes::shape_in},
+    assets::{
+        Catalogue, UnknownAssets,
+        placement_rule::Place,
+        shapes::{Shape, trimmed_shape},
+    },
     geometry::{
         Aabb, add, bounds_2d_m, euler_rotation_deg, outline::overlap_m, rotate, sub, yaw_rotation,
     },
@@ -13,7 +17,7 @@ use crate::{
             Item, PlacedItem, Placement,
             contact::{TOUCH_M, bottom_m, box_of, collide},
             free_floor::{self, FloorPatch},
-            item::{solids_of, world_parts},
+            item::solids_of,
             rounding::{ROUND_M, round_to, turned_deg},
         },
         scene::{BodyKind, Scene},
@@ -55,13 +59,13 @@ impl Layout {
         let mut items = Vec::with_capacity(house.objects.len());
         for (index, object) in house.objects.iter().enumerate() {
             let asset = catalogue.asset_of(house, object, unknown)?;
-            let parts = shape_in(&asset, object.condition());
+            let shape = trimmed_shape(&asset, object.condition());
             let placement = Placement {
                 position_m: object.position_m,
                 rotation_deg: object.rotation_deg,
                 parent: object.parent,
             };
-            let solids = solids_of(&parts, &placement);
+            let solids = solids_of(&shape.parts, &placement);
             let rule = catalogue.placement(&asset.category);
             let is_hung = rule.is_some_and(|rule| rule.is_placed(Place::Wall));
             let is_on_floor =
@@ -71,7 +75,7 @@ impl Layout {
             let sunk_m = body.map_or(0.0, |body| bounds.min_m[1] - body.aabb.min_m[1]);
             let in_file = (placement.parent, placement.position_m[1]);
             let mut item =
-                Item { asset, parts, placement, solids, bounds, in_file, sunk_m, is_on_floor };
+                Item { asset, shape, placement, solids, bounds, in_file, sunk_m, is_on_floor };
             item.settle();
             items.push(item);
         }
@@ -202,10 +206,12 @@ impl Layout {
         item.settle();
         if let Some(body) = self.scene.bodies.get_mut(self.scene.first_object + index) {
             let settled = item.settled(&placement);
-            body.parts = world_parts(&item.parts, &settled);
+            let rotation = euler_rotation_deg(placement.rotation_deg);
+            Shape { parts: body.parts, trim: body.trim } =
+                item.shape.placed(settled.position_m, &rotation);
             body.aabb = item.bounds;
             body.oriented.centre_m = settled.position_m;
-            body.oriented.rotation = euler_rotation_deg(placement.rotation_deg);
+            body.oriented.rotation = rotation;
         }
     }
 

@@ -1,7 +1,7 @@
 //! One object of a layout: its place and its outlines there.
 
 use crate::{
-    assets::{Asset, part::Part},
+    assets::{Asset, part::Part, shapes::Shape},
     geometry::{Aabb, Vec3, euler_rotation_deg},
     world::{
         footprint::{Footprint, footprint},
@@ -26,7 +26,7 @@ pub struct Item {
     /// Asset of the object.
     pub asset: Asset,
     /// Shape of the object, object frame.
-    pub(super) parts: Vec<Part>,
+    pub(super) shape: Shape,
     /// Present place.
     pub placement: Placement,
     /// Outlines of its parts on the ground plane, with their heights.
@@ -44,7 +44,7 @@ pub struct Item {
 impl Item {
     /// Return the outlines of its parts if it were at `placement`.
     pub fn solids_at(&self, placement: &Placement) -> Vec<Footprint> {
-        solids_of(&self.parts, &self.settled(placement))
+        solids_of(&self.shape.parts, &self.settled(placement))
     }
 
     /// Return the place where it comes to rest: an object that is carried along lies as far below
@@ -87,16 +87,9 @@ pub struct PlacedItem {
     pub solids: Vec<Footprint>,
 }
 
-/// Return the parts of a shape at a place in the world.
-pub(super) fn world_parts(parts: &[Part], placement: &Placement) -> Vec<Part> {
-    let rotation = euler_rotation_deg(placement.rotation_deg);
-    parts.iter().map(|part| part.placed(placement.position_m, &rotation)).collect()
-}
-
 /// Return the outlines of a shape at a place in the world.
 pub(super) fn solids_of(parts: &[Part], placement: &Placement) -> Vec<Footprint> {
-    world_parts(parts, placement)
-        .iter()
-        .filter_map(|part| footprint(part, f64::NEG_INFINITY, f64::INFINITY))
-        .collect()
+    let rotation = euler_rotation_deg(placement.rotation_deg);
+    let in_world = parts.iter().map(|part| part.placed(placement.position_m, &rotation));
+    in_world.filter_map(|part| footprint(&part, f64::NEG_INFINITY, f64::INFINITY)).collect()
 }

@@ -7,7 +7,7 @@ use crate::{
         Asset, Catalogue, UnknownAssets,
         material::{Finish, Material},
         part::{Part, aabb_of},
-        shapes::{lit, shape_in, shape_of},
+        shapes::{Shape, lit, shape_of, trimmed_shape},
     },
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
@@ -76,6 +76,8 @@ pub struct Body {
     pub kind: BodyKind,
     /// Convex parts, world frame; none for open-plan walls.
     pub parts: Vec<Part>,
+    /// Parts that only colours show, world frame: see [`Shape::trim`].
+    pub trim: Vec<Part>,
     /// Box around the parts; [`Aabb::EMPTY`] if there are none.
     pub aabb: Aabb,
     /// Box around the parts as they are drawn by default, so that an object's measured size does
@@ -91,21 +93,21 @@ impl Body {
         let aabb = aabb_of(&parts);
         let oriented = OrientedBox::of_aabb(&aabb);
         let (id, category) = (id.to_owned(), category.to_owned());
-        Self { id, category, kind, parts, aabb, unopened: aabb, oriented }
+        Self { id, category, kind, parts, trim: Vec::new(), aabb, unopened: aabb, oriented }
     }
 
     /// Build the body of an object. `parent` is the object that it stands on, if any, and whether
     /// that one's asset is known.
     fn object(object: &Object, asset: &Asset, parent: Option<(&Self, bool)>) -> Self {
         let rotation = euler_rotation_deg(object.rotation_deg);
-        let place = |part: &Part| part.placed(object.position_m, &rotation);
-        let mut parts: Vec<Part> = shape_in(asset, object.condition()).iter().map(place).collect();
+        let shape = trimmed_shape(asset, object.condition());
+        let Shape { mut parts, mut trim } = shape.placed(object.position_m, &rotation);
         let mut centre_m = object.position_m;
         let mut aabb = aabb_of(&parts);
         if let Some((parent, is_known)) = parent.filter(|_| !object.is_kinematic) {
             let fall_m = fall_m(&parent.parts, &aabb, is_known);
-            for height_m in parts.iter_mut().map(|part| &mut part.centre_m[1]) {
-                *height_m -= fall_m;
+            for part in parts.iter_mut().chain(&mut trim) {
+                part.centre_m[1] -= fall_m;
             }
             centre_m[1] -= fall_m;
             aabb = aabb_of(&parts);
@@ -124,6 +126,7 @@ impl Body {
             category: asset.category.clone(),
             kind: BodyKind::Object,
             parts,
+            trim,
             aabb,
             unopened,
             oriented: OrientedBox {

@@ -51,7 +51,9 @@ fn top_m(part: &Part, point_m: Vec2) -> Option<f64> {
     let offset = [point_m[0] - part.centre_m[0], 0.0, point_m[1] - part.centre_m[2]];
     let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
     let (is_over, half_m) = match part.primitive {
-        Primitive::Cuboid { half_m: [w, h, d] } => (own[0].abs() <= w && own[2].abs() <= d, h),
+        Primitive::Cuboid { half_m: [w, h, d] } | Primitive::Pad { half_m: [w, h, d], .. } => {
+            (own[0].abs() <= w && own[2].abs() <= d, h)
+        }
         Primitive::Frustum { top_m: [w, d], half_height_m, .. } => {
             ((own[0] / w).powi(2) + (own[2] / d).powi(2) <= 1.0, half_height_m)
         }
