@@ -139,7 +139,7 @@ pub fn duvet(u: f32, v: f32, seed: u32) -> Texel {
     let shadow = 1.0 - 0.3 * (1.0 - ramp(turned, turned + 0.03, v));
     let printed = bedding(fract(2.0 * u), fract(2.5 * v), seed);
     let quilted = line(fract(4.0 * u) - 0.5, 0.03).max(line(fract(5.0 * v) - 0.5, 0.03));
-    let quilt = if seed % 2 == 0 { 1.0 - 0.1 * quilted } else { 1.0 };
+    let quilt = if seed.is_multiple_of(2) { 1.0 - 0.1 * quilted } else { 1.0 };
     [0, 1, 2, 3].map(|i| printed[i] * light * shadow * quilt)
 }
 

@@ -107,7 +107,7 @@ pub fn keyboard(u: f32, v: f32, _seed: u32) -> Texel {
 /// Return the cover of a book: a title, a name and a block or bands, lighter or darker than it.
 pub fn cover(u: f32, v: f32, seed: u32) -> Texel {
     let spine = 1.0 - 0.25 * line(u - 0.06, 0.03);
-    let is_light = hash(seed, 2, 2) % 2 == 0;
+    let is_light = hash(seed, 2, 2).is_multiple_of(2);
     let print = if is_light { [1.7, 1.7, 1.6] } else { [0.45, 0.45, 0.5] };
     let text = |top: f32, height: f32, width: f32| {
         let inside = (u - 0.53).abs() < 0.5 * width && v > top && v < top + height;
@@ -167,6 +167,6 @@ pub fn clock_face(u: f32, v: f32, seed: u32) -> Texel {
         .map(|(c, s): (f32, f32)| line(x * s - y * c, 0.03).max(line(x * c + y * s, 0.03)))
         .fold(0.0, f32::max)
         * (ramp(0.36, 0.38, radius) - ramp(0.44, 0.46, radius));
-    let face = if seed % 2 == 0 { rgb(240, 240, 234) } else { rgb(225, 230, 235) };
+    let face = if seed.is_multiple_of(2) { rgb(240, 240, 234) } else { rgb(225, 230, 235) };
     pixel(blend(face, rgb(30, 30, 34), hands.max(marks).max(line(radius - 0.48, 0.03))))
 }

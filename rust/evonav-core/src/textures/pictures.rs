@@ -67,7 +67,7 @@ fn landscape(u: f32, v: f32, seed: u32) -> Colour {
     let trunk = 0.2 + 0.6 * random(seed, 3, 1);
     let [x, y] = [(u - trunk) / 0.16, (v - 0.5) / 0.2];
     let crown = x * x + y * y + 0.8 * (fractal(u, v, [9, 9], 3, seed) - 0.5);
-    if crown < 0.8 && hash(seed, 4, 8) % 2 == 0 {
+    if crown < 0.8 && hash(seed, 4, 8).is_multiple_of(2) {
         return rgb(62, 84, 42).map(|c| c * (1.35 - 0.5 * (x + y)));
     }
     colour
@@ -155,7 +155,7 @@ fn abstraction(u: f32, v: f32, seed: u32) -> Colour {
         [rgb(224, 214, 190), rgb(92, 128, 120), rgb(206, 130, 92), rgb(58, 74, 84)],
     ];
     let palette = palettes[(hash(seed, 5, 8) % 3) as usize];
-    if hash(seed, 6, 8) % 2 == 0 {
+    if hash(seed, 6, 8).is_multiple_of(2) {
         // Rectangles of two levels.
         let [cu, cv] = [1, 2].map(|k| 0.25 + 0.5 * random(seed, k, 3));
         let [x, y] = [u32::from(u > cu), u32::from(v > cv)];
@@ -178,7 +178,7 @@ pub fn outdoors(u: f32, v: f32, seed: u32) -> Texel {
     }
     let column = (6.0 * u) as u32;
     let roof = 0.56 + 0.16 * random(column, 1, seed);
-    if seed % 3 == 0 && v > roof && v < 0.78 {
+    if seed.is_multiple_of(3) && v > roof && v < 0.78 {
         let walls = blend(rgb(214, 200, 178), rgb(176, 128, 104), random(column, 2, seed));
         let pane = fract(18.0 * u).min(1.0 - fract(18.0 * u)) > 0.25 && fract(14.0 * v) > 0.5;
         colour = if pane { rgb(106, 122, 138) } else { walls };

@@ -135,7 +135,7 @@ impl Level {
         let [x0, y0] = [x >> 8 & mask, y >> 8 & mask];
         let [x1, y1] = [(x0 + 1) & mask, (y0 + 1) & mask];
         let at = |x: u32, y: u32| self.texels[(y << self.log2_size | x) as usize];
-        let right = fx * fy >> 8;
+        let right = (fx * fy) >> 8;
         let (left, top) = (fy - right, fx - right);
         let rest = 256 - fx - left;
         at(x0, y0) * rest + at(x1, y0) * top + at(x0, y1) * left + at(x1, y1) * right
