@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.numbers import NONE, percent
 from evonav.report.tables.table import Table
@@ -25,7 +25,7 @@ class BehaviourCounts:
     num_stages: int = 0
 
 
-def behaviour_of(run: Run) -> dict[str, BehaviourCounts]:
+def behaviour_of(run: RecordedRun) -> dict[str, BehaviourCounts]:
     """Return counters and stop reasons of every agent.
 
     Raises:
@@ -81,7 +81,7 @@ def end_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
     )
 
 
-def cause_share_table(run: Run, stratum: str) -> Table:
+def cause_share_table(run: RecordedRun, stratum: str) -> Table:
     """Tabulate the share of a stratum's scored stages by cause of failure.
 
     Args:
@@ -111,7 +111,7 @@ def stratum_of(record: StageRecord) -> str:
     return "relocated" if record.target.is_relocated else "not_relocated"
 
 
-def success_by_group(run: Run, group_of: Mapping[str, str]) -> dict[str, dict[str, tuple[int, int]]]:
+def success_by_group(run: RecordedRun, group_of: Mapping[str, str]) -> dict[str, dict[str, tuple[int, int]]]:
     """Return successes and scored stages by group of tasks and agent.
 
     Args:

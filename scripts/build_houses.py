@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import EvonavError
-from evonav.house import House, HouseObject, load_houses
+from evonav.house import House, HouseObject, stream_houses
 from evonav.world.embedded import EmbeddedSimulator
 
 OUT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "houses.jsonl.gz"
@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
     """Writes the bundled houses."""
     simulator = EmbeddedSimulator()
     lines, num_objects = [], 0
-    for house in (house for source in SOURCES for house in load_houses(folder / source)):
+    for house in (house for source in SOURCES for house in stream_houses(folder / source)):
         try:
             simulator.reset(house.to_json())
             ids = fallen_ids(simulator, house)

@@ -22,7 +22,7 @@ from evonav.perception.shorthand import read_word
 from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
-from evonav.report.run import Run, load_run
+from evonav.report.run import RecordedRun, load_run
 from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
@@ -72,7 +72,7 @@ def name_of(word: str) -> str:
     return word.partition(":")[2].replace(",features=true", " + features").removesuffix("-like")
 
 
-def parts(runs: Mapping[str, Run]) -> dict[str, str]:
+def parts(runs: Mapping[str, RecordedRun]) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plots."""
     pictures = []
     for measure in ("sr", "spl"):
@@ -86,7 +86,7 @@ def parts(runs: Mapping[str, Run]) -> dict[str, str]:
     }
 
 
-def rate_table(runs: Mapping[str, Run], measure: str) -> Table:
+def rate_table(runs: Mapping[str, RecordedRun], measure: str) -> Table:
     """SR or SPL of every agent under every perception."""
     rows = []
     for agent in _agents(runs):
@@ -97,7 +97,7 @@ def rate_table(runs: Mapping[str, Run], measure: str) -> Table:
     )
 
 
-def claim_table(runs: Mapping[str, Run]) -> Table:
+def claim_table(runs: Mapping[str, RecordedRun]) -> Table:
     """Differences in SR between agents under every perception, with the paper's two settings beside them."""
     rows = []
     for title, a, b, keep in CLAIMS:
@@ -112,7 +112,7 @@ def claim_table(runs: Mapping[str, Run]) -> Table:
     )
 
 
-def cost_table(runs: Mapping[str, Run]) -> Table:
+def cost_table(runs: Mapping[str, RecordedRun]) -> Table:
     """What evolution costs an agent that sees perfectly, and what errors of perception cost it."""
     (first, best), *others = runs.items()
     rows = []
@@ -137,7 +137,7 @@ def cost_table(runs: Mapping[str, Run]) -> Table:
     return Table("What evolution costs, and what perception costs", columns, tuple(rows), (note,))
 
 
-def _between(run_a: Run, a: str, run_b: Run, b: str, keep: Keep) -> PairedEffect | None:
+def _between(run_a: RecordedRun, a: str, run_b: RecordedRun, b: str, keep: Keep) -> PairedEffect | None:
     """Success of `b` in one run less that of `a` in another, over the stages that both scored."""
     ours, theirs = (
         {key[1:]: one.record for key, one in run.outcomes.items() if key[0] == name and one.record.is_scored}
@@ -167,12 +167,12 @@ def _paper_difference(a: PaperResult, b: PaperResult, title: str) -> str:
     return f"{100 * (b.num_all - a.num_all) / 365:+.1f}"
 
 
-def _agents(runs: Mapping[str, Run]) -> list[str]:
+def _agents(runs: Mapping[str, RecordedRun]) -> list[str]:
     found = {agent for run in runs.values() for agent in run.agents}
     return [agent for agent in PAPER_ORDER if agent in found]
 
 
-def _summary(run: Run, agent: str) -> AgentSummary | None:
+def _summary(run: RecordedRun, agent: str) -> AgentSummary | None:
     return next((summary for summary in run.summaries if summary.agent == agent), None)
 
 
@@ -183,13 +183,13 @@ def _rate(summary: AgentSummary | None, measure: str) -> tuple[float, Interval |
     return None if value is None else (value, ends)
 
 
-def _words(runs: Mapping[str, Run], measure: str) -> str:
+def _words(runs: Mapping[str, RecordedRun], measure: str) -> str:
     run = next(iter(runs.values()))
     num_stages = sum(run.num_stages.values())
     return f"{measure.upper()} %, {len(run.num_stages)} houses, {num_stages} stages; bootstrap over houses."
 
 
-def _plot(runs: Mapping[str, Run], measure: str) -> CurvePlot:
+def _plot(runs: Mapping[str, RecordedRun], measure: str) -> CurvePlot:
     lines = []
     runs = {word: run for word, run in runs.items() if word.startswith("noisy:")}
     for agent in _agents(runs):

@@ -24,7 +24,7 @@ from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
-from evonav.report.run import Run, load_run
+from evonav.report.run import RecordedRun, load_run
 from evonav.report.tables.numbers import NONE, rate
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import Table
@@ -145,7 +145,7 @@ def _mark(name: str) -> str:
     return f"<!-- results: {name} -->"
 
 
-def setting_table(run: Run) -> Table:
+def setting_table(run: RecordedRun) -> Table:
     """Houses and stages by where the tasks come from."""
     rows = []
     groups: dict[str, list[tuple[int, int]]] = {}
@@ -180,7 +180,7 @@ def setting_table(run: Run) -> Table:
     return Table("Houses", columns, tuple(rows), (note,))
 
 
-def room_table(run: Run) -> Table:
+def room_table(run: RecordedRun) -> Table:
     """SR by size of the house."""
     group_of = {}
     for task in run.tasks():
@@ -193,7 +193,7 @@ def room_table(run: Run) -> Table:
     return Table("By size of the house", ("Agent", *names), rows, (note,))
 
 
-def sensitivity_table(sweep: dict[float, Run], agents: Sequence[str]) -> Table:
+def sensitivity_table(sweep: dict[float, RecordedRun], agents: Sequence[str]) -> Table:
     """SR by share of wrong decisions."""
     rows = []
     for agent in agents:
@@ -210,7 +210,7 @@ def sensitivity_table(sweep: dict[float, Run], agents: Sequence[str]) -> Table:
     return Table("Decisions that go wrong", columns, tuple(rows), (note,))
 
 
-def _plot(sweep: dict[float, Run], agents: Sequence[str]) -> CurvePlot:
+def _plot(sweep: dict[float, RecordedRun], agents: Sequence[str]) -> CurvePlot:
     lines = []
     for agent in agents:
         points = []

@@ -17,7 +17,7 @@ import numpy as np
 from evonav._core import assets
 from evonav.errors import HouseError
 from evonav.generation.statistics.room_mix import reweight
-from evonav.house import House, load_houses
+from evonav.house import House, stream_houses
 from evonav.statistics import weighted_quantiles
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
@@ -214,7 +214,7 @@ def row(homes: Sequence[Home], weights: Sequence[float], reading: Reading, num_t
 def houses_of(path: Path) -> Iterator[House]:
     """Houses up to the first that cannot be read."""
     try:
-        yield from load_houses(path)
+        yield from stream_houses(path)
     except HouseError as error:
         print(f"skipped the rest of {path}: {error}")
 

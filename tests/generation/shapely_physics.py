@@ -23,7 +23,7 @@ from shapely.geometry.base import BaseGeometry
 
 from evonav.errors import EvonavError
 from evonav.generation import GenerationParameters, generate_task
-from evonav.house import House, load_houses
+from evonav.house import House, stream_houses
 from evonav.tasks import Task, load_tasks
 
 AGENT_RADIUS_M, AGENT_HEIGHT_M = 0.2, 1.8
@@ -341,7 +341,7 @@ def _tasks(
         if Path(path).is_dir():
             yield from load_tasks(path, limit)
             continue
-        for house in load_houses(path, limit):
+        for house in stream_houses(path, limit):
             try:
                 yield generate_task(house, seed=seed, config=parameters, allow_unknown_assets=True)
             except EvonavError:

@@ -12,7 +12,7 @@ from recorded_data import data_path, needs_data
 from shapely_physics import Plan, problems_of
 
 from evonav.generation import GenerationParameters, TaskRejectedError, generate_task
-from evonav.house import bundled_houses, load_houses
+from evonav.house import bundled_houses, stream_houses
 from evonav.tasks import Task, load_tasks
 
 REAL_SETS = {
@@ -62,7 +62,7 @@ def test_bundled_houses_stay_possible(mode: int) -> None:
 def test_real_houses_stay_possible(name: str) -> None:
     found = []
     num_tasks = 0
-    houses = load_houses(data_path(name))
+    houses = stream_houses(data_path(name))
     for i, house in enumerate(houses):
         if num_tasks == REAL_SETS[name]:
             break

@@ -7,7 +7,7 @@ import pytest
 
 from evonav.errors import HouseError, StoreError, TaskError
 from evonav.generation.dataset import generate_dataset
-from evonav.house import bundled_houses, load_houses
+from evonav.house import bundled_houses, stream_houses
 from evonav.house.asset_sizes import read_asset_sizes
 from evonav.house.files import HouseTexts
 from evonav.tasks import load_task
@@ -21,7 +21,7 @@ SIZES = {HEX: {"category": "dining table", "size_m": [1.2, 0.7, 0.8], "receptacl
 @pytest.fixture(scope="module")
 def holodeck():
     """A small house as Holodeck writes it: Objaverse ids, a free room name, no start."""
-    (house,) = load_houses("bundled:86")
+    (house,) = stream_houses("bundled:86")
     document = json.loads(house.to_json())
     document["objects"][0] |= {"assetId": HEX, "objectType": "ObjaTable"}
     document["rooms"][0]["roomType"] = "home office"
@@ -142,10 +142,10 @@ def test_tasks_hold_the_sizes_and_the_folder_knows_them(holodeck, file_of, tmp_p
 
 
 def test_one_bundled_house_is_named_by_its_number():
-    (house,) = load_houses("bundled:3")
+    (house,) = stream_houses("bundled:3")
     assert house.name == "bundled:3"
-    assert [one.name for one in load_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
+    assert [one.name for one in stream_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
     with pytest.raises(HouseError, match="bundled has fewer houses"):
-        list(load_houses("bundled:1000"))
+        list(stream_houses("bundled:1000"))
     with pytest.raises(HouseError, match="where N is a number from 1"):
-        load_houses("bundled:first")
+        stream_houses("bundled:first")

@@ -11,7 +11,7 @@ import pytest
 from recorded_data import data_path, needs_data
 
 from evonav.errors import HouseError, InvalidArgumentError
-from evonav.house import House, bundled_houses, load_houses
+from evonav.house import House, bundled_houses, stream_houses
 
 RECORDED = [
     "ram81-procthor-100k-history",
@@ -43,21 +43,21 @@ def test_all_file_formats_give_the_same_houses(tmp_path: Path, houses: list[Hous
     text = "\n\n".join(documents) if "jsonl" in suffix else f" [{documents[0]},\n {documents[1]}\n, {documents[2]}]\n"
     path = tmp_path / f"houses{suffix}"
     path.write_bytes(gzip.compress(text.encode()) if suffix.endswith("gz") else text.encode())
-    loaded = list(load_houses(path))
+    loaded = list(stream_houses(path))
     assert [house.to_json() for house in loaded] == documents
     line = {".jsonl": ":5", ".jsonl.gz": ":5"}.get(suffix, ":3[2]")
     assert loaded[2].name == f"{path}{line}"
-    assert len(list(load_houses(path, limit=2))) == 2
+    assert len(list(stream_houses(path, limit=2))) == 2
 
 
 def test_one_document_and_directories(tmp_path: Path, houses: list[House]) -> None:
     for name, house in zip(("b.json", "a.jsonl", "c.txt"), houses, strict=True):
         (tmp_path / name).write_text(house.to_json())
-    loaded = list(load_houses(tmp_path))
+    loaded = list(stream_houses(tmp_path))
     assert [house.name for house in loaded] == [f"{tmp_path / 'a.jsonl'}:1", f"{tmp_path / 'b.json'}:1"]
     assert loaded[1].to_json() == houses[0].to_json()
     (tmp_path / "empty.json").write_text("[ ]")
-    assert list(load_houses(tmp_path / "empty.json")) == []
+    assert list(stream_houses(tmp_path / "empty.json")) == []
 
 
 @pytest.mark.parametrize(
@@ -84,16 +84,16 @@ def test_unreadable_files_are_house_errors(tmp_path: Path, name: str, content: b
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(HouseError) as refusal:
-        list(load_houses(path))
+        list(stream_houses(path))
     assert said in str(refusal.value)
     assert name in str(refusal.value)
 
 
 def test_empty_directory_and_negative_limit(tmp_path: Path) -> None:
     with pytest.raises(HouseError, match=r"no \.json"):
-        list(load_houses(tmp_path))
+        list(stream_houses(tmp_path))
     with pytest.raises(InvalidArgumentError, match="limit"):
-        load_houses(tmp_path, limit=-1)
+        stream_houses(tmp_path, limit=-1)
 
 
 def test_errors_name_file_line_object_and_field(tmp_path: Path, houses: list[House]) -> None:
@@ -101,7 +101,7 @@ def test_errors_name_file_line_object_and_field(tmp_path: Path, houses: list[Hou
     document["objects"][2]["position"]["y"] = "high"
     path = tmp_path / "houses.jsonl"
     path.write_text(houses[0].to_json() + "\n" + json.dumps(document) + "\n")
-    stream = load_houses(path)
+    stream = stream_houses(path)
     assert next(stream).name.endswith(":1")
     with pytest.raises(HouseError) as refusal:
         next(stream)
@@ -145,7 +145,7 @@ def test_recorded_houses_survive_reading_and_writing(source: str) -> None:
 
 
 def check_reading_and_writing(source: Path) -> None:
-    houses = list(load_houses(source))
+    houses = list(stream_houses(source))
     assert houses
     for house in houses[:: max(1, len(houses) // 50)]:
         path, _, place = house.name.rpartition(":")
@@ -164,7 +164,7 @@ def test_a_house_without_the_wall_of_a_door_is_refused(tmp_path: Path, houses: l
     path = tmp_path / "house.json"
     path.write_text(json.dumps(document))
     with pytest.raises(HouseError, match="wall1"):
-        list(load_houses(path))
+        list(stream_houses(path))
 
 
 @needs_data("zhiyuan-gao-procthor-houses/partial_houses")
@@ -174,11 +174,11 @@ def test_incomplete_houses_are_read_or_refused() -> None:
     for path in sorted(data_path("zhiyuan-gao-procthor-houses/partial_houses").iterdir()):
         if path.name in without_outer_walls:
             with pytest.raises(HouseError, match="wall1"):
-                list(load_houses(path))
+                list(stream_houses(path))
         else:
-            assert len(list(load_houses(path))) == 1
+            assert len(list(stream_houses(path))) == 1
 
 
 def test_the_word_bundled_stands_for_the_bundled_houses() -> None:
-    assert [house.name for house in load_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
-    assert next(load_houses("bundled")) == next(bundled_houses())
+    assert [house.name for house in stream_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
+    assert next(stream_houses("bundled")) == next(bundled_houses())

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import HouseError, InvalidArgumentError
-from evonav.house import bundled_houses, load_houses, procthor10k_fetch
+from evonav.house import bundled_houses, procthor10k_fetch, stream_houses
 from evonav.house.procthor10k import (
     PUBLISHED,
     REVISION,
@@ -117,7 +117,7 @@ def test_fetch_stores_the_published_bytes_and_a_second_call_only_verifies(remote
 def test_a_split_is_read_wherever_houses_are(remote, tmp_path) -> None:
     fetch_procthor10k(COMMIT, ["val"])
     name = f"procthor-10k:val@{COMMIT}"
-    loaded = list(load_houses(name))
+    loaded = list(stream_houses(name))
     assert [house.to_json() for house in loaded] == remote.texts["val"]
     assert loaded[1].name == f"{name}:2"
     listed = CliRunner().invoke(app, ["houses", name, "--limit", "1"])
@@ -130,7 +130,7 @@ def test_a_split_is_read_wherever_houses_are(remote, tmp_path) -> None:
     assert json.loads(header.read_text())["dataset"] == "procthor-10k"
     assert json.loads(header.read_text())["split"] == "val"
     with pytest.raises(DatasetMissingError, match="procthor-10k:test is not in"):
-        load_houses(f"procthor-10k:test@{COMMIT}")
+        stream_houses(f"procthor-10k:test@{COMMIT}")
 
 
 def test_splits_fetched_one_after_the_other_add_up(remote) -> None:
@@ -260,7 +260,7 @@ def test_names_of_splits(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "procthor-10k").mkdir()
     (tmp_path / "procthor-10k/a.json").write_text(next(bundled_houses(1)).to_json())
-    assert len(list(load_houses("procthor-10k"))) == 1
+    assert len(list(stream_houses("procthor-10k"))) == 1
 
 
 def test_where_the_cache_is(monkeypatch) -> None:

@@ -7,7 +7,7 @@ import pytest
 from recorded_data import data_path, needs_data
 
 from evonav.errors import HouseError
-from evonav.house import House, bundled_houses, load_houses
+from evonav.house import House, bundled_houses, stream_houses
 from evonav.world.embedded import EmbeddedSimulator
 
 FOLDER = "roseh-procthor-100k-history"
@@ -43,4 +43,4 @@ def test_houses_with_unknown_assets_load_with_category_defaults() -> None:
 @pytest.mark.parametrize("split", ["train", "val"])
 @needs_data(FOLDER)
 def test_recorded_houses_load_with_category_defaults_and_their_start_is_free(split: str) -> None:
-    check_category_defaults(load_houses(data_path(f"{FOLDER}/objaverse-{split}-100.jsonl.gz")), 100)
+    check_category_defaults(stream_houses(data_path(f"{FOLDER}/objaverse-{split}-100.jsonl.gz")), 100)

@@ -7,14 +7,14 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.generation.house_check import check_house
-from evonav.house import load_houses
+from evonav.house import stream_houses
 
 HEX = "0123456789abcdef0123456789abcdef"
 
 
 @pytest.fixture(scope="module")
 def document():
-    (house,) = load_houses("bundled:86")
+    (house,) = stream_houses("bundled:86")
     return json.loads(house.to_json())
 
 

@@ -18,7 +18,7 @@ import pytest
 
 import evonav.thor
 from evonav.generation import TaskRejectedError, generate_task
-from evonav.house import House, load_houses
+from evonav.house import House, stream_houses
 from evonav.world.embedded import EmbeddedSimulator
 
 Json = dict[str, Any]
@@ -59,7 +59,7 @@ def lines(out: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def houses(lines: list[str], out: Path) -> list[House]:
-    return list(load_houses(out / "houses.jsonl.gz"))
+    return list(stream_houses(out / "houses.jsonl.gz"))
 
 
 def test_every_room_is_walked_into_and_every_asset_is_known(houses: list[House]) -> None:

@@ -16,7 +16,7 @@ from evonav.report.compare.selection import agents_of
 from evonav.report.compare.wording import comparison_table
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
 from evonav.report.pages.run_page import write_report
-from evonav.report.run import Run as RecordedRun
+from evonav.report.run import RecordedRun
 from evonav.report.run import load_run as read_run
 from evonav.report.tables.table import Table, headline
 

@@ -55,7 +55,7 @@ def generate_controlled(
     """Make the arms of a controlled analysis; called again on the same folder, make what is missing.
 
     Args:
-        source: Houses as for `evonav.house.load_houses`, or a folder of tasks, whose first houses are taken.
+        source: Houses as for `evonav.house.stream_houses`, or a folder of tasks, whose first houses are taken.
         out: Gets `tasks/<arm>`, `journal.jsonl` and, when all is done, `controlled.json`.
         options: Must be the folder's own when it already holds tasks.
         limit: Only the first houses; must be the folder's own, too.

@@ -88,7 +88,7 @@ def generate_dataset(
     """Generate a task from every house that gives one; a repeated call on the same folder resumes the run.
 
     Args:
-        houses: A path as for `evonav.house.load_houses`, or the opened houses.
+        houses: A path as for `evonav.house.stream_houses`, or the opened houses.
         out: Folder for the tasks, `journal.jsonl` and, at the end, `dataset.json`.
         options: Options of the tasks; they must be the folder's own if it already holds tasks. Default: the paper's
             parameters, and the dataset and split of the houses.

@@ -1,7 +1,7 @@
 """ProcTHOR houses, read from files or bundled."""
 
 from evonav._core import House, HouseObject, Opening, Room, Wall
-from evonav.house.files import bundled_houses, load_houses
+from evonav.house.files import bundled_houses, stream_houses
 
 __all__ = [
     "House",
@@ -10,5 +10,5 @@ __all__ = [
     "Room",
     "Wall",
     "bundled_houses",
-    "load_houses",
+    "stream_houses",
 ]

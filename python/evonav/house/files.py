@@ -23,7 +23,7 @@ _NUMBERED = re.compile(r"(.+):([1-9]\d*)")
 SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 
 
-def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
+def stream_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
     """Yield the houses of a file or a directory, in order.
 
     Args:
@@ -49,7 +49,7 @@ class HouseText(NamedTuple):
     """A house as text, not parsed yet."""
 
     name: str
-    """The name that `load_houses` gives the house."""
+    """The name that `stream_houses` gives the house."""
     text: str
 
 
@@ -73,7 +73,7 @@ class HouseTexts:
         """Find the files.
 
         Args:
-            path: A path, as for `load_houses`.
+            path: A path, as for `stream_houses`.
             completion: Completes each house as it is read.
 
         Raises:
@@ -177,7 +177,7 @@ def bundled_houses(limit: int | None = None) -> Iterator[House]:
     Yields:
         Each house, in a fixed order; its `name` is `bundled:line`.
     """
-    yield from load_houses(BUNDLED, limit)
+    yield from stream_houses(BUNDLED, limit)
 
 
 def _text_of(path: Path, raw: IO[bytes]) -> IO[str]:

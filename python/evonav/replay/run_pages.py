@@ -10,12 +10,12 @@ from evonav.replay.replay import RunReplay
 from evonav.report.maps.stage_map import VIEW_DIR
 from evonav.report.pages.highlights import best_highlight, highlights_first
 from evonav.report.pages.replays import ListedPage, listed_pages
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 from evonav.tasks.bundled import bundled_tasks
 
 
 def write_pages(
-    run: Run,
+    run: RecordedRun,
     episodes: Sequence[tuple[str, str]],
     *,
     stages: Sequence[int] = (),
@@ -59,12 +59,12 @@ def write_pages(
     return pages, write_index(pages, out_dir, run.run_dir.resolve().name)
 
 
-def highlight_task(run: Run, agents: Sequence[str]) -> str:
+def highlight_task(run: RecordedRun, agents: Sequence[str]) -> str:
     """Return the task that shows best what these agents do: one in which memory misleads the first, not the last."""
     return best_highlight(run, sorted(agents, key=lambda name: name not in ("fu", "stage-reset")))[0]
 
 
-def unwritten_highlights(run: Run, num: int | None) -> list[tuple[str, str]]:
+def unwritten_highlights(run: RecordedRun, num: int | None) -> list[tuple[str, str]]:
     """Return the highlights (agent and task id) that have no page of the run's present records.
 
     Args:

@@ -2,6 +2,6 @@
 
 from evonav.report.maps.strip import write_strip
 from evonav.report.pages.run_page import write_report
-from evonav.report.run import Run, load_run
+from evonav.report.run import RecordedRun, load_run
 
-__all__ = ["Run", "load_run", "write_report", "write_strip"]
+__all__ = ["RecordedRun", "load_run", "write_report", "write_strip"]

@@ -47,7 +47,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Run:
+class RecordedRun:
     """A run's header and recorded stages; what is computed from them is computed on first use."""
 
     run_dir: Path
@@ -157,7 +157,7 @@ class Run:
                 yield Task(task_id, num_stages, records, maps)
 
 
-def load_run(run_dir: Path) -> Run:
+def load_run(run_dir: Path) -> RecordedRun:
     """Read a run, finished or not.
 
     Raises:
@@ -176,7 +176,7 @@ def load_run(run_dir: Path) -> Run:
                 outcomes[key] = RecordedStage(rows[key], record)
         # Tasks that the header does not name have as many stages as their records say.
         num_stages = {one.record.task_id: one.record.num_stages for one in outcomes.values()} | (planned or {})
-        return Run(
+        return RecordedRun(
             run_dir=run_dir,
             agents=agents,
             num_stages=dict(sorted(num_stages.items())),

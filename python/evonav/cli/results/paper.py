@@ -11,7 +11,7 @@ from evonav.cli.options.shared import MarkdownFile, RunFolder
 
 if TYPE_CHECKING:
     from evonav.report.paper.tables import Perception
-    from evonav.report.run import Run
+    from evonav.report.run import RecordedRun
 
 
 class Half(str, Enum):
@@ -34,7 +34,7 @@ def paper(
     prediction: Annotated[
         Path | None,
         typer.Option(
-            metavar="RUN", help="Run with predicted perception, which fills the lower half of the LaTeX tables."
+            metavar="RUN", help="RecordedRun with predicted perception, which fills the lower half of the LaTeX tables."
         ),
     ] = None,
 ) -> None:
@@ -53,7 +53,7 @@ def paper(
         raise StoreError(f"{run}: no stage is scored yet; `evonav evaluate` with the same options resumes the run")
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
     show_tables(tables)
-    runs: dict[Perception, Run] = {perception.value: loaded}
+    runs: dict[Perception, RecordedRun] = {perception.value: loaded}
     if latex is not None and prediction is not None:
         runs["prediction"] = load_run(prediction)
     write_texts((md, lambda: markdown_tables(table for table in tables if table.rows)), label="tables")

@@ -22,7 +22,7 @@ from evonav.cli.results.view import replay_pages
 from evonav.cli.run.sweep import write_sweep_summary
 
 if TYPE_CHECKING:
-    from evonav.report.run import Run
+    from evonav.report.run import RecordedRun
 
 NUM_REPLAYS = 2
 
@@ -138,7 +138,7 @@ def _count(replays: str) -> int | None:
     return int(replays)
 
 
-def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | None) -> None:
+def _replay(run: "RecordedRun", num: int | None, tasks: Path | None, exchanges: Path | None) -> None:
     """Replay the highlights that have no page of the current records."""
     from evonav.errors import EvonavError
     from evonav.replay.run_pages import unwritten_highlights

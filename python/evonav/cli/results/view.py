@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from evonav.report.pages.replays import ListedPage
-    from evonav.report.run import Run
+    from evonav.report.run import RecordedRun
 
 
 def view(
@@ -83,7 +83,7 @@ def make_pages(
 
 
 def replay_pages(
-    found: "Run",
+    found: "RecordedRun",
     episodes: "Sequence[tuple[str, str]]",
     *,
     stages: "Sequence[int]" = (),

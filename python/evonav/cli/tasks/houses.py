@@ -41,10 +41,10 @@ def list_houses(
 ) -> None:
     """List houses with their rooms, floor areas and objects."""
     from evonav.generation.house_view import area_of_m2
-    from evonav.house import load_houses
+    from evonav.house import stream_houses
 
     typer.echo("rooms   area m2  objects  house")
-    for house in load_houses(path or BUNDLED, limit):
+    for house in stream_houses(path or BUNDLED, limit):
         area_m2 = sum(area_of_m2(room.polygon_m) for room in house.rooms)
         typer.echo(f"{len(house.rooms):5}  {area_m2:8.1f}  {len(house.objects):7}  {house.name}")
 

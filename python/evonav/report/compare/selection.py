@@ -10,7 +10,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import FILE_NAME
 from evonav.json_diff import json_differences
-from evonav.report.run import Run, load_run
+from evonav.report.run import RecordedRun, load_run
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class ComparedAgent:
 
     name: str
     """Name in tables: the agent, with its run where several runs are compared."""
-    run: Run
+    run: RecordedRun
     agent: str
     place: tuple[int, int] = (0, 0)
     """Place among the runs and agents that the arguments name; agents of a run that none names share a place."""
@@ -72,7 +72,7 @@ def _runs_of(folder: Path) -> list[Path]:
     return cells or [folder]
 
 
-def agents_of(run: Run, agents: Sequence[str] = ()) -> list[ComparedAgent]:
+def agents_of(run: RecordedRun, agents: Sequence[str] = ()) -> list[ComparedAgent]:
     """Return some agents of a run, by default all.
 
     Raises:

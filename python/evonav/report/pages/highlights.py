@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
-from evonav.report.run import RecordedStage, Run
+from evonav.report.run import RecordedRun, RecordedStage
 from evonav.report.tables.causes import FailureCause
 
 NUM_STAGES = 3
 """Number of stages to show, ending with the highlighted one."""
 
 
-def best_highlight(run: Run, agents: Sequence[str]) -> tuple[str, list[int]]:
+def best_highlight(run: RecordedRun, agents: Sequence[str]) -> tuple[str, list[int]]:
     """Return the episode that shows the benchmark best, and the stages to show.
 
     Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
@@ -41,7 +41,7 @@ def best_highlight(run: Run, agents: Sequence[str]) -> tuple[str, list[int]]:
     return best[1], best[2]
 
 
-def highlights_first(run: Run) -> list[tuple[str, str]]:
+def highlights_first(run: RecordedRun) -> list[tuple[str, str]]:
     """Return agent and task of every recorded episode, the highlights first.
 
     A pair shows most: in one stage, an agent that a stale entry misled, and one that succeeded. Of several such agents
@@ -81,12 +81,12 @@ def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
     return score + (record.transition.kind != "static"), pair
 
 
-def _num_rounds(run: Run, agent: str, task_id: str) -> int:
+def _num_rounds(run: RecordedRun, agent: str, task_id: str) -> int:
     keys = ((agent, task_id, stage) for stage in range(1, run.num_stages[task_id] + 1))
     return sum(run.outcomes[key].record.num_rounds for key in keys if key in run.outcomes)
 
 
-def _score(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
+def _score(run: RecordedRun, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
     last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
     hero = last[-1]
     has_success = hero.record.state is EndState.SUCCESS

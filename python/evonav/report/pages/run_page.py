@@ -21,7 +21,7 @@ from evonav.report.pages.template import packed, page_environment, policy, text_
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import run_plots
 from evonav.report.plots.style import plot_css
-from evonav.report.run import RecordedStage, Run, Task, load_run
+from evonav.report.run import RecordedRun, RecordedStage, Task, load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
@@ -74,7 +74,7 @@ def write_report(
     return path
 
 
-def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[dict[str, Any]]:
+def _replays(run: RecordedRun, out_dir: Path, max_bytes: int) -> list[dict[str, Any]]:
     """Return the pages of `evonav view` that show this run's records, the highlights first.
 
     Each has its `page`, its packed `content` (`None` where it is a file beside the report), and its `stages`: number,
@@ -102,7 +102,7 @@ def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[dict[str, Any]]:
 
 
 def _tasks(
-    run: Run, replays: list[dict[str, Any]], map_dir: Path | None
+    run: RecordedRun, replays: list[dict[str, Any]], map_dir: Path | None
 ) -> Iterator[tuple[dict[str, Any], Markup, bool]]:
     """Yield every task's view and section, and whether the section is packed."""
     is_packed = run.num_recorded > MAX_OPEN_STAGES
@@ -120,13 +120,13 @@ def _tasks(
         yield view, packed(section) if is_packed else section, is_packed
 
 
-def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
+def _write_maps(run: RecordedRun, task: Task, map_dir: Path) -> None:
     for record in task.records.values():
         drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
         write_atomically(map_dir / map_name(record), drawn)
 
 
-def _template_values(run: Run, found: Sequence[tables.Table], *, has_replays: bool) -> dict[str, Any]:
+def _template_values(run: RecordedRun, found: Sequence[tables.Table], *, has_replays: bool) -> dict[str, Any]:
     overview = [
         {
             "anchor": slug(task_id),

@@ -11,11 +11,11 @@ from evonav.drawing.svg import clean, join, slug
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.trajectory import change, course, rounds
-from evonav.report.run import Run, Task
+from evonav.report.run import RecordedRun, Task
 from evonav.report.tables.causes import sentence
 
 
-def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
+def task_view(run: RecordedRun, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
     """Draw a task: the house once, what moves once a stage, every agent's stages over them.
 
     Returns the values of the template: its `goals` are stage, a record that states the goal, what changed before and
@@ -110,7 +110,7 @@ def _facts(record: StageRecord) -> str:
     return " · ".join(parts)
 
 
-def filter_data(run: Run, task_id: str) -> dict[str, str]:
+def filter_data(run: RecordedRun, task_id: str) -> dict[str, str]:
     """Return the `data-*` attributes of a task that the page's filters use."""
     keys = [(agent, task_id, stage) for agent in run.agents for stage in range(1, run.num_stages[task_id] + 1)]
     outcomes = {key: run.outcomes[key] for key in keys if key in run.outcomes}

@@ -7,7 +7,7 @@ from functools import partial
 from evonav.counted import counted
 from evonav.evaluation.metrics.navigation import Rates
 from evonav.report.paper.tables import NUM_STAGES, PAPER, PaperResult, Perception
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import rate
 from evonav.report.tables.table import latex_text
 
@@ -36,7 +36,7 @@ class _Row:
     num_paper: int
 
 
-def paper_latex(runs: Mapping[Perception, Run]) -> str:
+def paper_latex(runs: Mapping[Perception, RecordedRun]) -> str:
     """Return both tables as `table` environments; every number with n and interval in a comment.
 
     Args:
@@ -161,7 +161,7 @@ def _comments(setting: Perception, row: _Row, order: Sequence[str]) -> list[str]
 
 
 def _row(
-    run: Run | None, paper: Mapping[str, PaperResult], name: str, split: str = "all", *, measure: str = "sr"
+    run: RecordedRun | None, paper: Mapping[str, PaperResult], name: str, split: str = "all", *, measure: str = "sr"
 ) -> _Row:
     ours = {} if run is None else {summary.agent: summary.rates(split) for summary in run.summaries}
     theirs = {agent: known.sr(split) if measure == "sr" else known.spl for agent, known in paper.items()}
@@ -172,7 +172,7 @@ def _value(found: Rates, measure: str) -> float | None:
     return found.sr if measure == "sr" else found.spl
 
 
-def _run_size(run: Run) -> str:
+def _run_size(run: RecordedRun) -> str:
     """Describe the size of a run, and whether it is complete."""
     num_stages = sum(run.num_stages.values())
     part = ", incomplete" if any(summary.is_incomplete for summary in run.summaries) else ""

@@ -11,7 +11,7 @@ from typing import Literal
 
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
@@ -64,7 +64,7 @@ _PAPER_NOTE = "Paper: Wilson's 95% interval of its counts, as if its stages were
 _OURS_NOTE = f"Ours: {INTERVALS}"
 
 
-def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
+def paper_tables(run: RecordedRun, perception: Perception = "gt") -> list[Table]:
     """Return Tables 1 and 2, stage 1, the order of agents, and differences: the paper's beside the run's.
 
     Args:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
 from evonav.report.compare.selection import agents_of
 from evonav.report.plots.specs import Gap, GapPlot, Plot
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 
 PLOTTED = (
     ("stratum", "success"),
@@ -27,7 +27,7 @@ _CAPTIONS = {
 }
 
 
-def run_breakdowns(run: Run, wanted: Sequence[tuple[str, str]] = TABLED) -> list[Breakdown]:
+def run_breakdowns(run: RecordedRun, wanted: Sequence[tuple[str, str]] = TABLED) -> list[Breakdown]:
     """Return breakdowns of a run, without those that have no group.
 
     Raises:
@@ -38,7 +38,7 @@ def run_breakdowns(run: Run, wanted: Sequence[tuple[str, str]] = TABLED) -> list
     return [one for one in found if one.groups]
 
 
-def run_plots(run: Run) -> list[tuple[Plot, str]]:
+def run_plots(run: RecordedRun) -> list[tuple[Plot, str]]:
     """Return the plots of a run with their captions, in reading order; none of a run without a scored stage.
 
     Raises:

@@ -9,14 +9,14 @@ from typing import Any
 
 from evonav.evaluation.records.schema import EndState
 from evonav.perception.shorthand import word_of
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 
 MAX_LISTED = 12
 """Stages named of each kind of failure."""
 _DEFAULT_PARTS = {"decision": "text_match", "simulator": "embedded_simulator"}
 
 
-def failure_groups(run: Run) -> list[dict[str, Any]]:
+def failure_groups(run: RecordedRun) -> list[dict[str, Any]]:
     """Group errored stages by error, the most frequent first.
 
     Each group has its `kind` and `message`, the `traceback` of its first stage that has one, its `agents` and
@@ -42,7 +42,7 @@ def failure_groups(run: Run) -> list[dict[str, Any]]:
     ]
 
 
-def reproduction(run: Run) -> list[str]:
+def reproduction(run: RecordedRun) -> list[str]:
     """Return the commands that repeat the run: those that were given, or where none is stored, one from its config."""
     given = [session["command"] for session in _sessions(run) if session.get("command")]
     if given:
@@ -59,7 +59,7 @@ def reproduction(run: Run) -> list[str]:
     return [shlex.join([*command, "--out", "out/again"])]
 
 
-def perception_of(run: Run) -> str:
+def perception_of(run: RecordedRun) -> str:
     """Return the perception of the run, as `--perception` names it; empty where the run does not record it."""
     backend = run.config.get("backend")
     parts = backend if isinstance(backend, dict) else {}
@@ -67,7 +67,7 @@ def perception_of(run: Run) -> str:
     return word_of(make, options) if isinstance(make, str) and isinstance(options, dict) else ""
 
 
-def run_facts(run: Run) -> list[tuple[str, str]]:
+def run_facts(run: RecordedRun) -> list[tuple[str, str]]:
     """Name and value of what makes the run reproducible, and of what its figures hang on."""
     facts = [(key, _json(value)) for key, value in sorted(run.config.items())]
     facts += [("perception", perception)] if (perception := perception_of(run)) else []
@@ -87,13 +87,13 @@ def run_facts(run: Run) -> list[tuple[str, str]]:
     return facts
 
 
-def task_digests(run: Run) -> Mapping[str, str]:
+def task_digests(run: RecordedRun) -> Mapping[str, str]:
     """SHA-256 of each task's files, where the run notes it."""
     digests = run.notes.get("task_digests")
     return digests if isinstance(digests, dict) else {}
 
 
-def _sessions(run: Run) -> list[dict[str, Any]]:
+def _sessions(run: RecordedRun) -> list[dict[str, Any]]:
     sessions = run.notes.get("sessions")
     return [session for session in sessions if isinstance(session, dict)] if isinstance(sessions, list) else []
 

@@ -9,13 +9,13 @@ from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
-from evonav.report.run import Run
+from evonav.report.run import RecordedRun
 from evonav.report.tables import table as tables
 from evonav.report.tables.numbers import NONE, percent, points, rate
 from evonav.statistics import MIN_CLUSTERS
 
 
-def run_tables(run: Run) -> list[tables.Table]:
+def run_tables(run: RecordedRun) -> list[tables.Table]:
     """Return all tables of a run, in reading order."""
     records = run.records_by_agent()
     return [
@@ -31,7 +31,7 @@ def run_tables(run: Run) -> list[tables.Table]:
     ]
 
 
-def effort_table(run: Run) -> tables.Table:
+def effort_table(run: RecordedRun) -> tables.Table:
     """Build the table of what success cost, and what believing stale entries cost: means per scored stage."""
     columns = ("Agent", "SoftSPL %", "rounds", "path m", "path to stale entries m", "stale entries", "stopped itself")
     rows = []
@@ -54,7 +54,7 @@ def effort_table(run: Run) -> tables.Table:
     return tables.Table("Effort and staleness", columns, tuple(rows), (note,))
 
 
-def failure_table(run: Run) -> tables.Table:
+def failure_table(run: RecordedRun) -> tables.Table:
     """Build the table of failures of agents and models, and of stages that were scored after one; no row without."""
     columns = ("Agent", "errored stages", "failed decisions", "in stages", "scored after a failure", "without memory")
     rows = []
@@ -82,7 +82,7 @@ def failure_table(run: Run) -> tables.Table:
     return tables.Table("What failed", columns, tuple(rows), (note,))
 
 
-def statements(run: Run) -> list[str]:
+def statements(run: RecordedRun) -> list[str]:
     """Describe what the run shows, in sentences that claim no more than the intervals allow."""
     scored = [summary for summary in run.summaries if summary.sr is not None]
     if not scored:
