@@ -152,7 +152,7 @@ fn cells(u: f32, v: f32, count: u32, seed: u32) -> [f32; 3] {
 
 pub fn shards(u: f32, v: f32, seed: u32) -> Texel {
     let [first, second, tone] = cells(u, v, 8, seed);
-    grey(mix(0.9 + 0.2 * tone, 0.7, line(second - first, 0.16)))
+    grey(mix(0.94 + 0.12 * tone, 0.8, line(second - first, 0.16)))
 }
 
 pub fn brick(u: f32, v: f32, seed: u32) -> Texel {

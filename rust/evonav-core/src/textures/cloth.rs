@@ -1,7 +1,7 @@
 //! Draw the textures of cloth, leather, paper, leaves and of what is made of them.
 
 use crate::textures::{
-    building::{grey, marble},
+    building::grey,
     noise::{fract, fractal, hash, line, mix, noise, ramp, random, wave},
     texture::Texel,
 };
@@ -92,7 +92,7 @@ pub fn bedding(u: f32, v: f32, seed: u32) -> Texel {
         }
         3 => leaves(u, v, seed)[1] - 0.6,
         4 => line(fract(4.0 * (u + v)) - 0.5, 0.12).max(line(fract(4.0 * (u - v)) - 0.5, 0.12)),
-        _ => 0.3 * marble(u, v, seed)[0],
+        _ => 0.0,
     };
     // Prints are lighter and less colourful than the cloth.
     let strength = if seed & 8 == 0 { 0.34 } else { -0.26 };
@@ -112,7 +112,10 @@ fn bulge(u: f32, v: f32) -> f32 {
 fn folds(u: f32, v: f32, seed: u32) -> f32 {
     let bend = fractal(u, v, [3, 3], 3, seed);
     let slant = random(seed, 1, 9) - 0.5;
-    wave(2.2 * (u + slant * v) + 2.4 * bend) * (0.4 + fractal(u, v, [2, 2], 2, seed + 5))
+    let crease = wave(2.0 * (u + slant * v) + 1.3 * bend);
+    let fine = wave(5.0 * (v + slant * u) + 2.0 * bend);
+    let strength = ramp(0.3, 0.8, fractal(u, v, [2, 2], 2, seed + 5));
+    0.6 * crease * strength + 0.4 * fine * (1.0 - strength)
 }
 
 pub fn cushion(u: f32, v: f32, seed: u32) -> Texel {
@@ -123,12 +126,12 @@ pub fn cushion(u: f32, v: f32, seed: u32) -> Texel {
 }
 
 pub fn pillow(u: f32, v: f32, seed: u32) -> Texel {
-    grey(bulge(u, v) * (1.0 + 0.07 * folds(u, v, seed)))
+    grey(bulge(u, v) * (1.0 + 0.05 * folds(u, v, seed)))
 }
 
 pub fn duvet(u: f32, v: f32, seed: u32) -> Texel {
     let turned = 0.15;
-    let shade = 1.0 + 0.07 * folds(u, v, seed) + 0.04 * folds(v, u, seed + 3);
+    let shade = 1.0 + 0.05 * folds(u, v, seed) + 0.03 * folds(v, u, seed + 3);
     let edge = ramp(0.0, 0.04, u.min(1.0 - u).min(1.0 - v));
     let light = shade * (0.86 + 0.14 * edge);
     if v < turned {
