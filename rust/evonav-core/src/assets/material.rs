@@ -14,7 +14,7 @@ impl Material {
     pub fn named(kind: MaterialKind, name: &str) -> Self {
         let hash = |h: u32, byte: u8| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193);
         let sum = name.bytes().fold(0x811c_9dc5, hash);
-        Self { kind, variant: (sum ^ sum >> 8 ^ sum >> 16) as u8 }
+        Self { kind, variant: ((sum ^ sum >> 16) as usize % kind.num_variants()) as u8 }
     }
 }
 

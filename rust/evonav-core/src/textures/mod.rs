@@ -24,11 +24,21 @@ static TEXTURES: [[OnceLock<Texture>; MAX_VARIANTS]; MaterialKind::ALL.len()] =
 /// Return the texture of a material; `None` for materials without one.
 pub fn texture_of(material: Material) -> Option<&'static Texture> {
     let kind = material.kind.drawn_as();
-    if kind.layout() == Layout::Plain {
-        return None;
-    }
-    let variant = usize::from(material.variant) % kind.num_variants().min(MAX_VARIANTS);
-    Some(TEXTURES[kind as usize][variant].get_or_init(|| draw(kind, variant as u32)))
+    let (variant, count) = (usize::from(material.variant), kind.num_variants());
+    // A division takes longer than the rest, and names of materials choose small numbers.
+    let variant = if variant < count { variant } else { variant % count };
+    let slot = &TEXTURES[kind as usize][variant];
+    slot.get().or_else(|| drawn(slot, kind, variant))
+}
+
+#[cold]
+fn drawn(
+    slot: &'static OnceLock<Texture>,
+    kind: MaterialKind,
+    variant: usize,
+) -> Option<&'static Texture> {
+    let has_texture = kind.layout() != Layout::Plain;
+    has_texture.then(|| slot.get_or_init(|| draw(kind, variant as u32)))
 }
 
 /// A function that gives a texture's colours at `[u, v]`, for a seed.

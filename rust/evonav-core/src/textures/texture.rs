@@ -168,5 +168,5 @@ fn unpack(packed: u64) -> Texel {
 /// Return the channels of a packed sum of [`Level::sample`].
 #[inline(always)]
 pub fn channels_of(sum: u64) -> Texel {
-    std::array::from_fn(|i| (sum >> (16 * i) & 0xffff) as f32 * (1.0 / 256.0))
+    std::array::from_fn(|i| f32::from((sum >> (16 * i)) as u16) * (1.0 / 256.0))
 }

@@ -33,7 +33,7 @@ impl Skin {
 
     /// Return whether the face has no texture.
     pub fn is_plain(&self) -> bool {
-        self.axes == [[0.0; 3]; 2]
+        self.axes[0] == [0.0; 3]
     }
 
     /// Return the texture's coordinates at a point, in repeats of the texture; v is downwards.
