@@ -14,7 +14,7 @@ from typing import Any
 
 from evonav.agents.agent import Agent
 from evonav.agents.hosting.error_text import describe
-from evonav.agents.registry import agent_factory, needed_arguments, new_agent
+from evonav.agents.registry import agent_factory, import_name, needed_arguments, new_agent
 from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.contract.situations import check_situations
@@ -233,7 +233,7 @@ def _is_importable(name: str, factory: Callable[..., Agent]) -> bool:
     module, _, attribute = name.rpartition(":")
     if module.endswith(".py"):
         return "." not in attribute and Path(module).is_file()
-    return getattr(sys.modules.get(module), attribute, None) is factory
+    return import_name(factory) is not None
 
 
 def _changing_tasks(backend: Backend, directory: Path) -> tuple[EpisodeSpec, EpisodeSpec]:
