@@ -19,7 +19,7 @@ const CONTACT_M: f64 = 0.7;
 /// Distance from a surface at which the space before it is looked up.
 const AHEAD_M: f64 = 0.12;
 /// Spacing of the places at which the sun is looked for.
-const PROBE_M: f64 = 0.06;
+const PROBE_M: f64 = 0.09;
 /// Brightness of what shines by itself: screens, and the world behind panes.
 const GLOW: f32 = 1.35;
 
@@ -141,7 +141,10 @@ impl Baker<'_> {
             }
         }
         let size = [columns, rows];
-        self.keep_sunny(&mut points[first as usize..], size, origin_m, axes, size_m);
+        // Out of doors, the sun is looked up everywhere.
+        if space.is_some() {
+            self.keep_sunny(&mut points[first as usize..], size, origin_m, axes, size_m);
+        }
         let size = size.map(|num| num as u16);
         FaceLight { axes: [row_of(0), row_of(1)], size, first }
     }

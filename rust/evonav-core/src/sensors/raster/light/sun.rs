@@ -57,8 +57,8 @@ impl Sun {
                 canvas.fill(&scratch.polygon_px, plane, 1);
             }
         }
-        let nearness =
-            (0..height_px).flat_map(|row| canvas.row(row)[..width_px].to_vec()).collect();
+        let mut nearness = Vec::with_capacity(width_px * height_px);
+        (0..height_px).for_each(|row| nearness.extend_from_slice(&canvas.row(row)[..width_px]));
         Self {
             towards: towards.map(|x| x as f32),
             map: lens.map_rows(),
