@@ -52,7 +52,7 @@ impl Field {
         let mut field = Self::default();
         field.faces.reserve(mesh.faces.len());
         let baker = Baker { scene, mesh, sources, contact, sun };
-        for part in &mesh.parts {
+        for part in mesh.parts.iter().chain(&mesh.trim) {
             for index in part.faces.clone() {
                 let light = baker.bake(part, index, &mut field.points);
                 field.faces.push(light);
