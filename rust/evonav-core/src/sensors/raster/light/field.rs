@@ -49,13 +49,12 @@ impl Field {
         contact: &Contact,
         sun: &Sun,
     ) -> Self {
-        let mut field = Self::default();
-        field.faces.reserve(mesh.faces.len());
+        let mut field =
+            Self { faces: vec![FaceLight::default(); mesh.faces.len()], points: Vec::new() };
         let baker = Baker { scene, mesh, sources, contact, sun };
         for part in mesh.parts.iter().chain(&mesh.trim) {
             for index in part.faces.clone() {
-                let light = baker.bake(part, index, &mut field.points);
-                field.faces.push(light);
+                field.faces[index] = baker.bake(part, index, &mut field.points);
             }
         }
         field
