@@ -187,16 +187,16 @@ impl Baker<'_> {
         }
         let mut is_sunny = vec![false; lit.len()];
         let samples = size_m.map(|edge_m| ((edge_m / PROBE_M) as usize + 2).min(600));
-        let mut lanes = [[0.0; LANES]; 3];
         for row in 0..samples[1] {
             for first in (0..samples[0]).step_by(LANES) {
                 let share = |i: usize, n: usize| (i.min(n - 1) as f64 + 0.5) / n as f64;
                 let t = share(row, samples[1]);
-                for lane in 0..LANES {
-                    let place = [size_m[0] * share(first + lane, samples[0]), size_m[1] * t];
-                    let point_m = at(origin_m, axes, place);
-                    (0..3).for_each(|axis| lanes[axis][lane] = point_m[axis] as f32);
-                }
+                let points_m: [Vec3; LANES] = std::array::from_fn(|lane| {
+                    let along = size_m[0] * share(first + lane, samples[0]);
+                    at(origin_m, axes, [along, size_m[1] * t])
+                });
+                let lanes: [[f32; LANES]; 3] =
+                    std::array::from_fn(|axis| points_m.map(|point_m| point_m[axis] as f32));
                 for (lane, &reach) in self.sun.reaches(&lanes).iter().enumerate() {
                     if reach > 0.0 {
                         let column =
