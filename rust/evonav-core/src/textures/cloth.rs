@@ -55,10 +55,10 @@ pub fn leaves(u: f32, v: f32, seed: u32) -> Texel {
     let [x, y] = [u * count as f32, v * count as f32];
     for dy in 0..3 {
         for dx in 0..3 {
-            let [ix, iy] = [x as u32 + dx, y as u32 + dy];
-            let [cx, cy] = [(ix + count - 1) % count, (iy + count - 1) % count];
+            let [column, row] = [x as u32 + dx, y as u32 + dy];
+            let [cx, cy] = [(column + count - 1) % count, (row + count - 1) % count];
             let at = |k: u32| random(cx, cy, seed + k);
-            let [px, py] = [x - ix as f32 + 1.0 - at(1), y - iy as f32 + 1.0 - at(2)];
+            let [px, py] = [x - column as f32 + 1.0 - at(1), y - row as f32 + 1.0 - at(2)];
             let [sin, cos] = [wave(at(3)), wave(at(3) + 0.25)];
             let [along, across] = [px * cos + py * sin, py * cos - px * sin];
             let width = 0.36 * (1.0 - along * along * 1.6).max(0.0);
