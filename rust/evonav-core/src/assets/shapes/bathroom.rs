@@ -30,6 +30,13 @@ pub fn toilet(s: &mut Sketch<'_>) {
         12,
         rgb(120, 150, 165).of(MaterialKind::Glass),
     );
+    s.trim(|s| {
+        // The tank with its lid and button, the rim of the seat and the foot.
+        s.pad(x, [rim, h - 0.03], between(z, 0.0, 0.265), 0.02, white);
+        s.pad(x, [h - 0.035, h], between(z, 0.0, 0.285), 0.012, shade(white, 0.97));
+        let foot = [between(x, 0.22, 0.78), between(z, 0.1, 0.8)];
+        s.column(foot[0], [0.0, 0.05], foot[1], 0.9, 16, white);
+    });
     let pivot_m = [0.0, rim + 0.004, between(z, 0.28, 0.32)[1]];
     s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
         let lid = between(z, 0.28, 0.32);
@@ -87,6 +94,12 @@ pub fn sink(s: &mut Sketch<'_>) {
     if rim >= h {
         s.cuboid(inside(x, side), [0.0, basin], inside(z, side), white);
     }
+    let floor = bottom[1];
+    s.trim(|s| {
+        let hole = (0.06 * w.min(d)).min(0.03);
+        s.pole([0.0, 0.0], hole, [floor, floor + 0.003], 12, STEEL);
+        s.pole([0.0, 0.0], 0.6 * hole, [floor, floor + 0.004], 12, DARK);
+    });
 }
 
 /// Draw a faucet: a base, a riser, a spout towards the front, and two handles if the box is wide.

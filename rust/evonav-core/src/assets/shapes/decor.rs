@@ -3,7 +3,7 @@
 use crate::assets::{
     material::MaterialKind,
     shapes::{
-        colour::{DARK, STEEL, WOODS, rgb, shade},
+        colour::{DARK, Paint, STEEL, WOODS, rgb, shade},
         sketch::{ALL, Along, Sketch, between, ends, inside},
     },
 };
@@ -44,6 +44,26 @@ pub fn plant(s: &mut Sketch<'_>) {
     s.blob(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
     let upper = [1.1 * pot_top, crown + 0.1 * h];
     s.blob(between(x, 0.4, 1.0), upper, between(z, 0.0, 0.6), shade(leaf, 1.15));
+    s.trim(|s| foliage(s, crown, leaf));
+}
+
+/// Draw leaves that point out of a crown of foliage, in a spiral from its lower to its upper end.
+fn foliage(s: &mut Sketch<'_>, crown: f64, leaf: Paint) {
+    /// Angle between leaves that follow each other, as on most plants.
+    const GOLDEN_DEG: f64 = 137.508;
+    let [w, h, d] = s.size();
+    let (count, length) = s.choose(&[(36, 0.28), (48, 0.2), (26, 0.36)], (36, 0.28));
+    let size = [length, s.choose(&[0.45, 0.6, 0.3], 0.45) * length].map(|edge| edge * w.min(d));
+    for i in 0..count {
+        let height = (f64::from(i) + 0.5) / f64::from(count);
+        let turn_deg = f64::from(i) * GOLDEN_DEG;
+        let (sin, cos) = turn_deg.to_radians().sin_cos();
+        // The crown is widest at its middle.
+        let reach = 0.3 * (1.0 - (2.0 * height - 1.0).powi(2)).sqrt();
+        let root = [reach * w * cos, crown + (0.5 * height - 0.28) * h, reach * d * sin];
+        let tone = [0.85, 1.0, 1.2][i as usize % 3];
+        s.leaf(root, turn_deg, 75.0 * height - 15.0, size, shade(leaf, tone));
+    }
 }
 
 /// Draw a painting: frame and canvas with a horizon.

@@ -115,6 +115,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
             let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
             let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
             s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
+            s.trim(|s| s.pad(x, y, [z[1] - 0.1, z[1] - 0.052], 0.008, door));
         });
     }
 }

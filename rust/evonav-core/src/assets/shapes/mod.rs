@@ -25,9 +25,8 @@ use crate::{
     house::Condition,
 };
 pub(crate) use colour::{is_pale, lit};
-pub use shape::Shape;
+pub use shape::{Detail, Shape, ShapeTraits};
 use sketch::Sketch;
-pub use sketch::{Detail, ShapeTraits};
 
 /// Return the parts of an asset, in the object frame.
 ///

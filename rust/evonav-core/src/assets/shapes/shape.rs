@@ -1,4 +1,6 @@
-//! The parts of an asset.
+//! The parts of an asset and the words for them.
+
+use serde::Serialize;
 
 use crate::{
     assets::part::Part,
@@ -27,4 +29,22 @@ impl Shape {
         let place = |parts: &[Part]| parts.iter().map(|p| p.placed(origin_m, rotation)).collect();
         Self { parts: place(&self.parts), trim: place(&self.trim) }
     }
+}
+
+/// Traits by which a drawn shape can be described.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct ShapeTraits {
+    /// Form: `round`, `L-shaped` or `U-shaped`, if its category has other forms too.
+    pub form: Option<&'static str>,
+    /// Parts by which it can be recognised, the most striking first.
+    pub details: Vec<Detail>,
+}
+
+/// A part that has a common name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Detail {
+    /// Name in the singular, with adjectives, for example `open shelf`.
+    pub noun: &'static str,
+    /// Number of such parts.
+    pub count: usize,
 }

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use serde::Serialize;
-
 pub use crate::assets::shapes::motion::{Along, Motion};
 use crate::{
     assets::{
@@ -13,10 +11,10 @@ use crate::{
         shapes::{
             colour::{self, Paint},
             motion::move_part,
-            shape::Shape,
+            shape::{Detail, Shape, ShapeTraits},
         },
     },
-    geometry::{IDENTITY, Mat3, Vec3},
+    geometry::{IDENTITY, Mat3, Vec3, add, euler_rotation_deg, rotate},
     house::Condition,
 };
 
@@ -24,24 +22,6 @@ use crate::{
 pub type Span = [f64; 2];
 /// The whole box along one axis, in fractions of it.
 pub const ALL: Span = [0.0, 1.0];
-
-/// Traits by which a drawn shape can be described.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct ShapeTraits {
-    /// Form: `round`, `L-shaped` or `U-shaped`, if its category has other forms too.
-    pub form: Option<&'static str>,
-    /// Parts by which it can be recognised, the most striking first.
-    pub details: Vec<Detail>,
-}
-
-/// A part that has a common name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Detail {
-    /// Name in the singular, with adjectives, for example `open shelf`.
-    pub noun: &'static str,
-    /// Number of such parts.
-    pub count: usize,
-}
 
 /// Parts that move, and the state in which they are drawn.
 struct Moving {
@@ -204,6 +184,43 @@ impl<'a> Sketch<'a> {
         let spans = self.clamped([x, y, z]);
         let half_m = spans.map(|[low, high]| 0.5 * (high - low));
         self.push(Primitive::Pad { half_m, cut_m }, spans, IDENTITY, paint);
+    }
+
+    /// Draw a leaf, a thin six-sided plate, for trim. A leaf that would leave the box is left out.
+    ///
+    /// # Arguments
+    /// * `root_m` - where it begins; y from the floor.
+    /// * `turn_deg` - its direction, from +x towards +z.
+    /// * `rise_deg` - its slope, 90 is upwards.
+    /// * `size_m` - length and width.
+    pub fn leaf(
+        &mut self,
+        root_m: Vec3,
+        turn_deg: f64,
+        rise_deg: f64,
+        size_m: [f64; 2],
+        paint: Paint,
+    ) {
+        let half_m = size_m.map(|edge| 0.5 * edge);
+        let rotation = euler_rotation_deg([0.0, -turn_deg, rise_deg]);
+        let along = rotate(&rotation, [half_m[0], 0.0, 0.0]);
+        let root_m = [root_m[0], root_m[1] - 0.5 * self.size_m[1], root_m[2]];
+        let part = Part {
+            primitive: Primitive::Frustum {
+                bottom_m: half_m,
+                top_m: half_m,
+                half_height_m: 0.0015,
+                sides: 6,
+            },
+            centre_m: add(root_m, along),
+            rotation,
+            colour: colour::lit(paint.colour),
+            material: Material::named(paint.kind, &self.asset.id),
+        };
+        let (bounds, half) = (part.aabb(), self.size_m.map(|edge| 0.48 * edge));
+        if (0..3).all(|i| bounds.max_m[i] <= half[i] && bounds.min_m[i] >= -half[i]) {
+            self.shape.parts.push(part);
+        }
     }
 
     /// Draw one cuboid that fills the box.
