@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 import shutil
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -107,6 +108,7 @@ def place(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
         (here / name).symlink_to(ROOT / name)
     monkeypatch.chdir(here)
     monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.delitem(sys.modules, "my_agent", raising=False)  # the agent of another page
     return here
 
 
