@@ -16,7 +16,11 @@ def test_a_limit_requires_and_replays_only_the_first_tasks(tmp_path: Path) -> No
         evaluate(["ftu"], task_files(folder, 2), tmp_path / "two", num_workers=0)
     pack(tmp_path / "two", tmp_path / "two.zip")
     words = ["verify", str(tmp_path / "two.zip"), "--workers", "0", "--limit"]
-    for limit, code, told in (("1", 0, "verified 1 of 2 tasks"), ("2", 0, "accepted"), ("3", 1, "is missing")):
+    for limit, code, told in (
+        ("1", 0, "verified 1 of 2 tasks"),
+        ("2", 0, "accepted"),
+        ("3", 1, "only the first 2 of 3 are there: --limit 2"),
+    ):
         shown = CliRunner().invoke(app, [*words, limit], env={"COLUMNS": "200"})
         assert (shown.exit_code, told in shown.stdout) == (code, True), shown.stdout
     assert "verified" not in CliRunner().invoke(app, [*words, "2"]).stdout

@@ -112,6 +112,18 @@ def test_a_class_of_a_script_is_found_by_its_file(tmp_path):
     assert "it never did anything else" in printed
 
 
+def test_a_script_that_checks_its_agent_when_imported_is_told_so(tmp_path):
+    """Its agent's process imports the script, which would check the agent in a process of its own, and so on."""
+    script = tmp_path / "a_script_without_a_guard.py"
+    script.write_text(
+        "import evonav\n\nclass Mine(evonav.Agent):\n    def act(self, observation):\n        return evonav.Stop()\n\n"
+        "print(evonav.check_agent(Mine))\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=True)
+    assert "importing it calls `evonav.check_agent`" in done.stdout
+    assert 'put that call under `if __name__ == "__main__":`' in done.stdout
+
+
 def test_the_command_prints_a_table_and_fails_with_the_agent():
     good = CliRunner().invoke(app, ["check-agent", "contract_breakers:Turning"])
     assert good.exit_code == 0

@@ -58,7 +58,7 @@ def test_what_is_missing_is_wrong_and_its_remedy_is_named(document, tmp_path):
     assert text.endswith("1 of 1 house wrong\n")
     code, text = run("show", path)
     assert code == 1
-    assert "gives a task: no, see below" in text or "gives a task: no" in text
+    assert "gives a task: no: the house is wrong" in text
     sizes = tmp_path / "sizes.json"
     sizes.write_text(json.dumps({HEX: {"category": "DiningTable", "size_m": [1.5, 0.7, 1.0]}}))
     code, text = run("check", path, "--assets", sizes, "--start", "auto")

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from evonav.agents.agent import Agent
+from evonav.agents.hosting.serving import refuse_in_agent_process
 from evonav.api.agents import NamedAgents, named_agents
 from evonav.api.loading import TaskSource, task_list
 from evonav.api.progress import progress_bar
@@ -87,6 +88,7 @@ def evaluate(
         >>> run.agents
         ('GiveUp',)
     """
+    refuse_in_agent_process("evonav.evaluate")
     named = named_agents(agents)
     settings = read_settings(RunSettings, "", {**options, "workers": _num_workers(workers, named)}, "evaluate")
     decisions = read_settings(DecisionSettings, "kind", decision, "decision")

@@ -41,7 +41,7 @@ def house_view(found: HouseCheck, *, allow_unknown_assets: bool = False) -> Hous
         found=found,
         summary=summary_of(house),
         rooms=tuple(_rooms(house)),
-        task=task_outcome(house, allow_unknown_assets=allow_unknown_assets) if is_built else "no, see below",
+        task=task_outcome(house, allow_unknown_assets=allow_unknown_assets) if is_built else "no: the house is wrong",
         odd=_odd(odd),
         picture=house_picture(house),
     )

@@ -204,7 +204,12 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
             yield f"{task.task_id} is not among the tasks to verify with"
         elif (there.digest, there.num_stages) != (task.digest, task.num_stages):
             yield f"{task.task_id} is another task than the one of this name"
-    for name in sorted(set(required) - {task.task_id for task in header.tasks}):
+    packed = {task.task_id for task in header.tasks}
+    missing = set(required) - packed
+    if missing and packed == set(required[: len(packed)]):
+        yield f"only the first {len(packed)} of {len(required)} are there: --limit {len(packed)} verifies those"
+        return
+    for name in sorted(missing):
         yield f"{name} is missing"
 
 

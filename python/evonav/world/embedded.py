@@ -201,7 +201,7 @@ class EmbeddedSimulator:
         return self._world.visible_bodies(view, agent_m=agent_m, max_distance_m=max_distance_m)
 
     def reachable_positions(self) -> NDArray[np.float64]:
-        """Return the `(N, 3)` positions of the square grid through the agent that it can reach there."""
+        """Return the positions of the square grid through the agent that it can reach: `(N, 3)`, x, y, z in metres."""
         return self.config.on_floor(self._world.reachable_positions(_on_ground(self._pose), self.config.grid_m))
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:

@@ -171,7 +171,7 @@ class Simulator(Protocol):
         ...
 
     def reachable_positions(self) -> NDArray[np.float64]:
-        """Return the `(N, 3)` positions of the grid that the agent can reach from its place."""
+        """Return the positions of the grid that the agent can reach from its place: `(N, 3)`, x, y, z in metres."""
         ...
 
     def nearest_reachable_position(self, position_m: tuple[float, float, float]) -> tuple[float, float, float]:

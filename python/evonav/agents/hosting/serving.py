@@ -28,10 +28,22 @@ from evonav.agents.hosting.error_text import clean, describe, traceback_of
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
-from evonav.errors import DecisionError
+from evonav.errors import DecisionError, InvalidArgumentError
 
 LENGTH = struct.Struct("<Q")
 """Format of the size of the message that follows."""
+
+_is_serving = False
+
+
+def refuse_in_agent_process(call: str) -> None:
+    """Refuse a call in an agent's process, where it would import the agent's file and so call itself without end.
+
+    Raises:
+        InvalidArgumentError: This process is an agent's.
+    """
+    if _is_serving:
+        raise InvalidArgumentError(f'importing it calls `{call}`: put that call under `if __name__ == "__main__":`')
 
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
@@ -42,6 +54,8 @@ def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
         life_fd: Pipe that is closed when the evaluator ends, however it ends.
         block_fd: The shared memory.
     """
+    global _is_serving
+    _is_serving = True
     for descriptor in (socket_fd, life_fd, block_fd):
         os.set_inheritable(descriptor, False)
     sys.argv[1:] = []

@@ -14,6 +14,7 @@ from typing import Any
 
 from evonav.agents.agent import Agent
 from evonav.agents.hosting.error_text import describe
+from evonav.agents.hosting.serving import refuse_in_agent_process
 from evonav.agents.registry import agent_factory, import_name, needed_arguments, new_agent
 from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
 from evonav.evaluation.contract.probe import Probe
@@ -80,6 +81,7 @@ def check_agent(
         >>> report.is_ok
         True
     """
+    refuse_in_agent_process("evonav.check_agent")
     name, factory = _named(agent)
     examination = _Examination(name, factory, backend or Backend(), seed, timeout_s)
     return AgentReport(name, tuple(examination.checks()))

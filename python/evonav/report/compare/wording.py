@@ -97,7 +97,7 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
             cells = effect_cells(effect, scale_of(field))
             rows.append((f"{one.b} minus {one.a}", *shown, *cells, says(one, field)))
     names = (comparisons[0].b, comparisons[0].a) if len(comparisons) == 1 else ("first", "second")
-    columns = ("", *names, "difference [95% CI]", p_heading(len(comparisons)), "")
+    columns = ("", *names, "difference [95% CI]", p_heading(len(comparisons)), "verdict")
     sizes = sorted({one.all.n for one in comparisons})
     return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
 
