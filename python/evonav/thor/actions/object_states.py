@@ -1,6 +1,6 @@
-"""Change the state of objects. Records show all states, images only those of doors.
+"""Change the state of objects. Records show all states.
 
-The shape of furniture is one solid block, so an open fridge is drawn closed.
+Images show doors open, and objects whose shape has a door or a lid, such as fridges, laptops and boxes.
 """
 
 from collections.abc import Callable, Collection, Mapping

@@ -138,6 +138,55 @@ def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Ca
     return register
 
 
+# Actions of AI2-THOR that the engine lacks: their refusal differs from that of a misspelling.
+_AI2THOR_ONLY = frozenset(
+    {
+        "BakeNavMesh",
+        "BreakObject",
+        "ChangeSkyboxColor",
+        "CreateObjectPrefab",
+        "CreateRuntimeAsset",
+        "DirectionalPush",
+        "DropHandObject",
+        "FlyAhead",
+        "FlyDown",
+        "FlyTo",
+        "FlyUp",
+        "LaunchDroneObject",
+        "MoveAgent",
+        "MoveArm",
+        "MoveArmBase",
+        "MoveArmRelative",
+        "MoveHeldObject",
+        "MoveHeldObjectAhead",
+        "MoveHeldObjectBack",
+        "MoveHeldObjectDown",
+        "MoveHeldObjectLeft",
+        "MoveHeldObjectRight",
+        "MoveHeldObjectUp",
+        "PickupObject",
+        "PullObject",
+        "PushObject",
+        "PutObject",
+        "RandomizeColors",
+        "RandomizeLighting",
+        "RandomizeMaterials",
+        "ReleaseObject",
+        "ResetColors",
+        "ResetMaterials",
+        "RotateAgent",
+        "RotateHeldObject",
+        "RotateWristRelative",
+        "SetHandSphereRadius",
+        "SetSkybox",
+        "SliceObject",
+        "ThrowObject",
+        "TouchThenApplyForce",
+        "UseUpObject",
+    }
+)
+
+
 def action_names() -> tuple[str, ...]:
     """Return the names of all actions, sorted."""
     return tuple(sorted(_served()))
@@ -146,6 +195,11 @@ def action_names() -> tuple[str, ...]:
 def parameter_types(name: str) -> Mapping[str, Any]:
     """Return the types of an action's parameters, by name."""
     return MappingProxyType(_served()[name].types)
+
+
+def _not_served(name: object) -> str:
+    reason = " (AI2-THOR has it, evonav's engine does not)" if name in _AI2THOR_ONLY else ""
+    return f"Invalid action: {brief(name)}{reason}"
 
 
 def call(engine: object, message: Mapping[str, Any]) -> object:
@@ -165,7 +219,7 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     found = _served().get(name) if isinstance(name, str) else None
     if found is None:
         problem = message.get("problem") if name is None else None
-        raise ActionError(str(problem or f"Invalid action: {brief(name)}"), ErrorCode.INVALID_ACTION)
+        raise ActionError(str(problem or _not_served(name)), ErrorCode.INVALID_ACTION)
     common = _ENVELOPE if found.is_open else _COMMON  # an open action may read what Initialize also sets
     types = found.types
     arguments = {key: value for key, value in message.items() if key in types or key not in common}
