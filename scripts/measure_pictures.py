@@ -53,7 +53,7 @@ class Recall:
     """How many objects of a type the detector found."""
 
     confidences: tuple[float, ...]
-    """Of each object, the confidence with which it was found; 0: it was missed."""
+    """The confidence with which each object was found; 0 for an object that was missed."""
 
     def found(self, min_confidence: float = MIN_CONFIDENCE) -> int:
         """Return how many were found with a confidence."""
