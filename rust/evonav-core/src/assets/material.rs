@@ -12,10 +12,14 @@ pub struct Material {
 impl Material {
     /// Return the material of a kind whose variant is chosen by the checksum of a name.
     pub fn named(kind: MaterialKind, name: &str) -> Self {
-        let hash = |h: u32, byte: u8| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193);
-        let sum = name.bytes().fold(0x811c_9dc5, hash);
+        let sum = hash_of_name(name);
         Self { kind, variant: ((sum ^ sum >> 16) as usize % kind.num_variants()) as u8 }
     }
+}
+
+/// Hash a name by FNV-1a, so that an asset's choices do not change between runs or platforms.
+pub fn hash_of_name(name: &str) -> u32 {
+    name.bytes().fold(0x811c_9dc5, |h, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 /// The look of a surface.

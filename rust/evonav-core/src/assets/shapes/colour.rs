@@ -63,11 +63,6 @@ pub const STEEL: Paint = rgb(185, 188, 192).of(MaterialKind::Metal);
 pub const DARK: Paint = rgb(45, 45, 48);
 pub const CERAMIC: Paint = rgb(240, 240, 238).of(MaterialKind::Ceramic);
 
-/// Hash a name by FNV-1a, so that an asset's choices do not change between runs or platforms.
-pub fn hash(text: &str) -> u32 {
-    text.bytes().fold(0x811c_9dc5, |h, byte| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193))
-}
-
 /// Return the colour number `index` of an asset, or `otherwise` where there is none. The material
 /// is that of `otherwise`, unless the asset is made of something else.
 pub fn tint(asset: &Asset, index: usize, otherwise: Paint) -> Paint {

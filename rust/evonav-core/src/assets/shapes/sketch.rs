@@ -6,7 +6,7 @@ pub use crate::assets::shapes::motion::{Along, Motion};
 use crate::{
     assets::{
         Asset,
-        material::Material,
+        material::{Material, hash_of_name},
         part::{Part, Primitive, aabb_of},
         shapes::{
             colour::{self, Paint},
@@ -127,7 +127,7 @@ impl<'a> Sketch<'a> {
 
     /// Choose one of `choices`, always the same for the same asset.
     pub fn choose<T: Copy>(&self, choices: &[T], otherwise: T) -> T {
-        let index = colour::hash(&self.asset.id) as usize % choices.len().max(1);
+        let index = hash_of_name(&self.asset.id) as usize % choices.len().max(1);
         choices.get(index).copied().unwrap_or(otherwise)
     }
 

@@ -19,7 +19,7 @@ const LAMP_SHARE: f32 = 0.36;
 const CORNER_SHADE: f32 = 0.38;
 const LINE_SHADE: f32 = 0.30;
 /// Brightness of black surfaces; without it their corners would be invisible.
-const BLACK: f32 = 22.0;
+pub(super) const BLACK: f32 = 22.0;
 /// Colour behind windows and missing walls, before the lamp's share is subtracted.
 const SKY: [f32; 3] =
     [204.0 / (1.0 - LAMP_SHARE), 222.0 / (1.0 - LAMP_SHARE), 236.0 / (1.0 - LAMP_SHARE)];

@@ -1,13 +1,11 @@
 //! The colour of surfaces before they are lit.
 
 use crate::{
-    sensors::raster::{canvas::LANES, lens::Rays},
+    sensors::raster::{canvas::LANES, lens::Rays, shader::flat::BLACK},
     textures::{NEUTRAL, Texture, channels_of, texture_of},
     world::{mesh::SceneMesh, skin::Skin},
 };
 
-/// Brightness of black surfaces; without it their form would be invisible.
-const BLACK: f32 = 22.0;
 /// Share of a pixel's longer side on the surface that is averaged. A surface seen from the side
 /// would lose all detail if it were 1, and shimmer if it were small.
 const AVERAGED: f32 = 0.5;
