@@ -3,6 +3,9 @@
 /// Value of a channel that leaves a surface's colour as it is.
 pub const NEUTRAL: f32 = 128.0;
 
+/// Share of a pattern's contrast that is kept, so that large surfaces are as calm as AI2-THOR's.
+const CONTRAST: f32 = 0.72;
+
 /// Colours that repeat in both directions, from a square of texels.
 ///
 /// A texel holds four numbers of 16 bits, of which 8 are used: factors of red, green and blue, and
@@ -48,7 +51,10 @@ impl Texture {
         for texel in &mut texels {
             *texel = std::array::from_fn(|i| match (is_picture, i) {
                 (true, 0..3) => 255.0 * texel[i].clamp(0.0, 1.0),
-                _ => (NEUTRAL * texel[i] / mean[i].max(1e-3)).clamp(0.0, 255.0),
+                _ => {
+                    let factor = texel[i] / mean[i].max(1e-3);
+                    (NEUTRAL * (1.0 + CONTRAST * (factor - 1.0))).clamp(0.0, 255.0)
+                }
             });
         }
         Self::of_texels(log2_size, texels)

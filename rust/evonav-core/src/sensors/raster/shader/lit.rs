@@ -24,11 +24,13 @@ const SKY: [u8; 3] = [204, 222, 236];
 /// Sunlight, times the lamps' and the sky's.
 const SUN: [f32; 3] = [1.25, 1.18, 1.05];
 /// Darkness of corners, most of which is in the light.
-const SHADES: Shades = Shades { corner: 0.15, line: None };
+const SHADES: Shades = Shades { corner: 0.24, line: None };
 /// Light in views without a house around them.
 const EVEN: f32 = 0.85;
-/// Coefficients `a - b x` of the response to brightness `x`: near 1 in the middle, flat at white.
-const RESPONSE: [f32; 2] = [1.2, 0.36];
+/// The response `x (a + b x - c x^2)` to brightness `x`: more contrast in the middle than at both ends.
+const RESPONSE: [f32; 3] = [0.80, 0.55, 0.40];
+/// Brightness at which the response is greatest.
+const BRIGHTEST: f32 = 1.39;
 /// Exposure: brightness of a white surface in light of 1.
 const EXPOSURE: f32 = 0.88;
 
@@ -115,10 +117,10 @@ impl Shot<'_> {
         let surface = patch.colours(self.mesh, &self.rays);
         let channels: [[u32; LANES]; 3] = std::array::from_fn(|channel| {
             std::array::from_fn(|lane| {
-                let [a, b] = RESPONSE;
+                let [a, b, c] = RESPONSE;
                 let x = surface[channel][lane] * light[channel][lane] * shades[lane];
-                let x = (x * (EXPOSURE / 255.0)).min(0.5 * a / b);
-                to_byte(255.0 * x * (a - b * x))
+                let x = (x * (EXPOSURE / 255.0)).min(BRIGHTEST);
+                to_byte(255.0 * x * (a + x * (b - c * x)))
             })
         });
         std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8))
