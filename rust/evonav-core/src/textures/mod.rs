@@ -11,7 +11,7 @@ mod texture;
 
 use std::sync::OnceLock;
 
-pub use texture::{Level, NEUTRAL, Texel, Texture, channels_of};
+pub use texture::{Level, NEUTRAL, Texel, Texture};
 
 use crate::assets::material::{Layout, Material, MaterialKind};
 

@@ -8,19 +8,39 @@ const CONTRAST: f32 = 0.72;
 
 /// Colours that repeat in both directions, from a square of texels.
 ///
-/// A texel holds four numbers of 16 bits, of which 8 are used: factors of red, green and blue, and
-/// of the gloss. [`NEUTRAL`] means 1, so that a surface keeps its colour on average.
+/// A texel holds four numbers: factors of red, green and blue, and of the gloss. [`NEUTRAL`] means
+/// 1, so that a surface keeps its colour on average.
+///
+/// Near surfaces are looked up in the texels themselves, mixed. Further ones are looked up in
+/// copies that are blurred by the width of a pixel, at two widths for every halving: their nearest
+/// texel is already a mixture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Texture {
-    levels: Vec<Level>,
+    finest: Level,
+    copies: Vec<Copied>,
 }
 
-/// One copy of a texture: a square of `1 << log2_size` texels a side, row by row.
+/// A square of `1 << log2_size` texels a side, row by row, each with four numbers of 16 bits, of
+/// which 8 are used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Level {
     log2_size: u32,
     texels: Vec<u64>,
 }
+
+/// A blurred copy of a texture, four bytes a texel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Copied {
+    log2_size: u32,
+    texels: Vec<[u8; 4]>,
+}
+
+/// Number of places that are looked up together.
+const LANES: usize = 8;
+/// Binary logarithm of the square of the least width, in texels, that is looked up in a copy.
+const FIRST_COPY: i32 = 2;
+/// Weights, in sixteenths, of a blur whose square is one texel.
+const BLUR: [f32; 5] = [1.0, 4.0, 6.0, 4.0, 1.0];
 
 /// A texel's channels apart, as factors times [`NEUTRAL`].
 pub type Texel = [f32; 4];
@@ -61,10 +81,15 @@ impl Texture {
     }
 
     fn of_texels(log2_size: u32, mut texels: Vec<Texel>) -> Self {
-        let mut levels = Vec::new();
+        let finest = Level { log2_size, texels: texels.iter().map(pack).collect() };
+        let mut copies = Vec::new();
         for log2_size in (0..=log2_size).rev() {
-            levels.push(Level { log2_size, texels: texels.iter().map(pack).collect() });
             let size = 1_usize << log2_size;
+            let once = blurred(&texels, size);
+            for blurred in [&once, &blurred(&once, size)] {
+                let texels = blurred.iter().map(|texel| texel.map(to_byte)).collect();
+                copies.push(Copied { log2_size, texels });
+            }
             let half = size / 2;
             texels = (0..half * half)
                 .map(|index| {
@@ -73,51 +98,83 @@ impl Texture {
                 })
                 .collect();
         }
-        Self { levels }
+        Self { finest, copies }
     }
 
-    /// Return the copies of the texture, from the finest to a single texel.
-    pub fn levels(&self) -> &[Level] {
-        &self.levels
+    /// Return the texels.
+    pub fn finest(&self) -> &Level {
+        &self.finest
     }
 
     /// Return the number of texels a side.
     pub fn size(&self) -> usize {
-        1 << (self.levels.len() - 1)
+        self.finest.size()
     }
 
-    /// Return the texture's mean around `[u, v]`, in repeats of the texture, as packed channels
-    /// times 256; see [`channels_of`].
+    /// Return the texture's mean around each `[u, v]`, in repeats of the texture: for each place,
+    /// 256 times its four channels.
     ///
     /// # Arguments
     /// * `width2` - square of the width of what is averaged, in texels.
     #[inline(always)]
-    pub fn sample(&self, u: f32, v: f32, width2: f32) -> u64 {
-        // The bits of a number are close to its logarithm, with 23 bits after the point. Half of it
-        // is the logarithm of the width.
-        let level = (width2.clamp(1.0, 1e9).to_bits() - 1.0_f32.to_bits()) >> 1;
-        let (whole, rest) = ((level >> 23) as usize, level >> 15 & 255);
-        let last = self.levels.len() - 1;
-        let [fine, coarse] = [whole, whole + 1].map(|level| &self.levels[level.min(last)]);
-        // Only in the middle between two copies are both looked up.
-        match rest {
-            0..64 => fine.sample(u, v),
-            192.. => coarse.sample(u, v),
-            _ => mixed(fine.sample(u, v), coarse.sample(u, v), u64::from(2 * (rest - 64))),
+    pub fn sample(&self, u: &[f32; LANES], v: &[f32; LANES], width2: f32) -> [u16; 4 * LANES] {
+        match self.copy_for(width2) {
+            None => self.finest.sample(u, v),
+            Some(copy) => copy.sample(u, v),
         }
+    }
+
+    /// Return the copy that is blurred by about a width.
+    #[inline(always)]
+    fn copy_for(&self, width2: f32) -> Option<&Copied> {
+        // The bits of a number are close to its logarithm, with 23 bits after the point.
+        let bits = width2.clamp(1.0, 1e9).to_bits() + (1 << 22);
+        let halvings = (bits >> 23) as i32 - 127 - FIRST_COPY;
+        let last = self.copies.len() - 1;
+        usize::try_from(halvings).ok().map(|index| &self.copies[index.min(last)])
     }
 }
 
-/// Return the mixture of two packed sums; `share` is 256 times that of the second.
-#[inline(always)]
-fn mixed(first: u64, second: u64, share: u64) -> u64 {
-    let [first, second] = [first, second].map(|sum| (sum + HALVES) >> 8 & BYTES);
-    first * (256 - share) + second * share
+/// Blur a square of texels that repeats in both directions.
+fn blurred(texels: &[Texel], size: usize) -> Vec<Texel> {
+    let along = |texels: &[Texel], step: usize| -> Vec<Texel> {
+        let place = |index: usize, shift: usize| {
+            let at = index / step % size;
+            index - at * step + (at + size * 2 + shift - 2) % size * step
+        };
+        let mean = |index: usize| {
+            let sum =
+                |i: usize| (0..5).map(|k| BLUR[k] * texels[place(index, k)][i]).sum::<f32>() / 16.0;
+            std::array::from_fn(sum)
+        };
+        (0..texels.len()).map(mean).collect()
+    };
+    along(&along(texels, 1), size)
 }
 
-/// Half of 256 in each channel, for rounding, and the bits of whole channels.
-const HALVES: u64 = 0x0080_0080_0080_0080;
-const BYTES: u64 = 0x00ff_00ff_00ff_00ff;
+impl Copied {
+    /// Return 256 times the channels of the nearest texels.
+    #[inline(always)]
+    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [u16; 4 * LANES] {
+        let size = 1_u32 << self.log2_size;
+        let (scale, mask) = (size as f32, size - 1);
+        let mut index = [0; LANES];
+        for lane in 0..LANES {
+            let x = fixed(u[lane] * scale - 0.5) & mask;
+            let y = fixed(v[lane] * scale - 0.5) & mask;
+            index[lane] = y << self.log2_size | x;
+        }
+        let mut texels = [[0; 4]; LANES];
+        for (texel, index) in texels.iter_mut().zip(index) {
+            *texel = self.texels[index as usize];
+        }
+        let mut sums = [0; 4 * LANES];
+        for (sum, byte) in sums.iter_mut().zip(texels.as_flattened()) {
+            *sum = u16::from(*byte) << 8;
+        }
+        sums
+    }
+}
 
 impl Level {
     /// Return the number of texels a side.
@@ -130,16 +187,32 @@ impl Level {
         unpack(self.texels[y * self.size() + x])
     }
 
-    /// Return the mixture of the four texels around `[u, v]`, in repeats of the texture, as packed
-    /// sums of 256 times the channels.
+    /// Return 256 times the channels of the mixtures of the four texels around each place.
     #[inline(always)]
-    pub fn sample(&self, u: f32, v: f32) -> u64 {
+    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [u16; 4 * LANES] {
         let mask = (1_u32 << self.log2_size) - 1;
         let scale = (256_u32 << self.log2_size) as f32;
-        let [x, y] = [fixed(u * scale), fixed(v * scale)].map(|c| c.wrapping_sub(128));
-        let [fx, fy] = [u64::from(x & 255), u64::from(y & 255)];
-        let [x0, y0] = [x >> 8 & mask, y >> 8 & mask];
-        let [x1, y1] = [(x0 + 1) & mask, (y0 + 1) & mask];
+        let (mut x, mut y) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            x[lane] = fixed(u[lane] * scale).wrapping_sub(128);
+            y[lane] = fixed(v[lane] * scale).wrapping_sub(128);
+        }
+        let mut sums = [0; 4 * LANES];
+        for lane in 0..LANES {
+            let sum = self.mixture(x[lane], y[lane], mask);
+            for (i, sums) in sums[4 * lane..][..4].iter_mut().enumerate() {
+                *sums = (sum >> (16 * i)) as u16;
+            }
+        }
+        sums
+    }
+
+    /// Return the mixture around a place, in 256ths of texels, as packed sums.
+    #[inline(always)]
+    fn mixture(&self, x: u32, y: u32, mask: u32) -> u64 {
+        let (fx, fy) = (u64::from(x & 255), u64::from(y & 255));
+        let (x0, y0) = (x >> 8 & mask, y >> 8 & mask);
+        let (x1, y1) = ((x0 + 1) & mask, (y0 + 1) & mask);
         let at = |x: u32, y: u32| self.texels[(y << self.log2_size | x) as usize];
         let right = (fx * fy) >> 8;
         let (left, top) = (fy - right, fx - right);
@@ -162,17 +235,15 @@ fn mean_of(texels: &[Texel]) -> Texel {
     sum.map(|channel| (channel / texels.len() as f64) as f32)
 }
 
+fn to_byte(channel: f32) -> u8 {
+    (channel + 0.5).clamp(0.0, 255.0) as u8
+}
+
 fn pack(texel: &Texel) -> u64 {
-    let byte = |i: usize| u64::from((texel[i] + 0.5).clamp(0.0, 255.0) as u8);
+    let byte = |i: usize| u64::from(to_byte(texel[i]));
     byte(0) | byte(1) << 16 | byte(2) << 32 | byte(3) << 48
 }
 
 fn unpack(packed: u64) -> Texel {
     std::array::from_fn(|i| (packed >> (16 * i) & 0xffff) as f32)
-}
-
-/// Return the channels of a packed sum of [`Level::sample`].
-#[inline(always)]
-pub fn channels_of(sum: u64) -> Texel {
-    std::array::from_fn(|i| f32::from((sum >> (16 * i)) as u16) * (1.0 / 256.0))
 }

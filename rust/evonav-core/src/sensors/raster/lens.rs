@@ -217,6 +217,33 @@ impl Lens {
         ]
     }
 
+    /// Return a linear function of the world points of a plane, `along . p + offset`, as a function
+    /// of the image point: `row . [u, v, 1]`, in perspective views times the nearness there.
+    ///
+    /// # Arguments
+    /// * `plane` - nearness of the plane, from [`Self::nearness_plane`].
+    pub fn on_plane(&self, plane: Vec3, along: Vec3, offset: f64) -> [f32; 3] {
+        let [right, down, forward] = self.axes.map(|axis| dot(axis, along));
+        let (Optics::Perspective { focal_px: scale }
+        | Optics::Orthographic { pixels_per_m: scale }) = self.optics;
+        let (du, dv) = (right / scale, down / scale);
+        let at_eye = dot(along, self.eye_m) + offset;
+        // The value is `at_eye`, and more for the ray.
+        let centre = du * self.centre_px[0] + dv * self.centre_px[1];
+        let (ray, weight) = match self.optics {
+            Optics::Perspective { .. } => ([du, dv, forward - centre], at_eye),
+            Optics::Orthographic { .. } => {
+                ([du, dv, at_eye + forward * self.horizon_m() - centre], -forward)
+            }
+        };
+        std::array::from_fn(|i| (ray[i] + weight * plane[i]) as f32)
+    }
+
+    /// Return the value of a linear function of world points at the camera.
+    pub fn at_eye(&self, along: Vec3, offset: f64) -> f64 {
+        dot(along, self.eye_m) + offset
+    }
+
     /// Return the relation between pixels and world points.
     pub fn rays(&self) -> Rays {
         let [right, down, forward] = self.axes;
@@ -239,7 +266,7 @@ impl Lens {
     }
 }
 
-/// World points of pixels, from their nearness.
+/// World points of pixels, from their depth.
 pub(super) struct Rays {
     eye_m: [f32; 3],
     forward: [f32; 3],
@@ -247,42 +274,56 @@ pub(super) struct Rays {
     /// views): `slopes . [u, v, 1]`.
     slopes: [[f32; 3]; 3],
     /// Width of a pixel at depth 1, or at any depth.
-    pixel: f32,
+    pub pixel: f32,
     /// The result of [`Lens::horizon_m`] for orthographic views.
-    horizon_m: Option<f32>,
+    pub horizon_m: Option<f32>,
 }
 
 impl Rays {
-    /// Return the place of the camera.
-    pub fn eye_m(&self) -> [f32; 3] {
-        self.eye_m
+    /// Return the point that a pixel shows.
+    #[inline(always)]
+    pub fn point(&self, [column, row]: [usize; 2], depth_m: f32) -> [f32; 3] {
+        let ray = self.ray(column as f32 + 0.5, row as f32 + 0.5);
+        let mut point_m = self.eye_m;
+        for axis in 0..3 {
+            point_m[axis] += match self.horizon_m {
+                None => ray[axis] * depth_m,
+                Some(_) => ray[axis] + self.forward[axis] * depth_m,
+            };
+        }
+        point_m
     }
 
-    /// Return the world points of a block of pixels, and the width of each pixel there, across the
-    /// ray.
     #[inline(always)]
-    pub fn points(
-        &self,
-        row: usize,
-        block: usize,
-        nearness: &[f32; LANES],
-    ) -> ([[f32; LANES]; 3], [f32; LANES]) {
-        let v = row as f32 + 0.5;
-        let u: [f32; LANES] = std::array::from_fn(|lane| (block * LANES + lane) as f32 + 0.5);
-        let ray = self.slopes.map(|[du, dv, at]| u.map(|u| du * u + (dv * v + at)));
-        if let Some(horizon_m) = self.horizon_m {
-            let points_m = std::array::from_fn(|axis| {
-                std::array::from_fn(|lane| {
-                    let depth_m = horizon_m - nearness[lane];
-                    self.eye_m[axis] + ray[axis][lane] + self.forward[axis] * depth_m
-                })
-            });
-            return (points_m, [self.pixel; LANES]);
+    fn ray(&self, u: f32, v: f32) -> [f32; 3] {
+        let mut ray = [0.0; 3];
+        for (ray, [du, dv, at]) in ray.iter_mut().zip(self.slopes) {
+            *ray = du * u + (dv * v + at);
         }
-        let depth_m = nearness.map(|w| 1.0 / w);
-        let points_m = std::array::from_fn(|axis| {
-            std::array::from_fn(|lane| self.eye_m[axis] + ray[axis][lane] * depth_m[lane])
-        });
-        (points_m, depth_m.map(|depth| depth * self.pixel))
+        ray
+    }
+
+    /// Return the square of the distance of what a pixel shows, relative to its depth; 1 in
+    /// orthographic views.
+    #[inline(always)]
+    pub fn length2(&self, [column, row]: [usize; 2]) -> f32 {
+        if self.horizon_m.is_some() {
+            return 1.0;
+        }
+        let [x, y, z] = self.ray(column as f32 + 0.5, row as f32 + 0.5);
+        x * x + y * y + z * z
+    }
+
+    /// Return the points that a run of pixels shows.
+    #[inline(always)]
+    pub fn points(&self, start: [usize; 2], depth_m: &[f32; LANES]) -> [[f32; LANES]; 3] {
+        let mut points_m = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let point_m = self.point([start[0] + lane, start[1]], depth_m[lane]);
+            for axis in 0..3 {
+                points_m[axis][lane] = point_m[axis];
+            }
+        }
+        points_m
     }
 }

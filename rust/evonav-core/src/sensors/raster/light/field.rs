@@ -73,10 +73,13 @@ impl Field {
         let at = (light.first + row * u32::from(columns) + column) as usize;
         let upper = &self.points[at..at + 2];
         let lower = &self.points[at + usize::from(columns)..][..2];
-        let mix = |a: &[f32; 4], b: &[f32; 4], share: f32| -> [f32; 4] {
-            std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
-        };
-        mix(&mix(&upper[0], &upper[1], right), &mix(&lower[0], &lower[1], right), down)
+        let mut light = [0.0; 4];
+        for (i, light) in light.iter_mut().enumerate() {
+            let above = upper[0][i] + right * (upper[1][i] - upper[0][i]);
+            let below = lower[0][i] + right * (lower[1][i] - lower[0][i]);
+            *light = above + down * (below - above);
+        }
+        light
     }
 }
 

@@ -71,10 +71,18 @@ impl Sun {
     #[inline(always)]
     pub fn reaches(&self, points_m: &[[f32; LANES]; 3]) -> [f32; LANES] {
         let [x, y, z] = points_m;
-        let [u, v, own] = self.map.map(|[a, b, c, d]| -> [f32; LANES] {
-            std::array::from_fn(|lane| a * x[lane] + b * y[lane] + c * z[lane] + d)
-        });
-        std::array::from_fn(|lane| self.share(u[lane] - 0.5, v[lane] - 0.5, own[lane] + BIAS_M))
+        let mut cells = [[0.0; LANES]; 3];
+        for (cells, [a, b, c, d]) in cells.iter_mut().zip(self.map) {
+            for lane in 0..LANES {
+                cells[lane] = a * x[lane] + b * y[lane] + c * z[lane] + d;
+            }
+        }
+        let [u, v, own] = cells;
+        let mut reach = [0.0; LANES];
+        for lane in 0..LANES {
+            reach[lane] = self.share(u[lane] - 0.5, v[lane] - 0.5, own[lane] + BIAS_M);
+        }
+        reach
     }
 
     /// Compare with the nine cells around a point; return the mean of the answers over a square of
@@ -89,8 +97,8 @@ impl Sun {
         let line = |row: i32| -> f32 {
             let at = (row * width + column - 1) as usize;
             let cells = &self.nearness[at..at + 3];
-            let [left, middle, next] = [0, 1, 2].map(|i| f32::from(u8::from(own >= cells[i])));
-            0.5 * ((1.0 - right) * left + middle + right * next)
+            let seen = |i: usize| f32::from(u8::from(own >= cells[i]));
+            0.5 * ((1.0 - right) * seen(0) + seen(1) + right * seen(2))
         };
         0.5 * ((1.0 - down) * line(row - 1) + line(row) + down * line(row + 1))
     }

@@ -111,8 +111,8 @@ impl Edges {
             let mut before = canvas.tags[canvas.row_blocks(row).start][0];
             let blocks = canvas.tags[canvas.row_blocks(row)].iter().zip(&mut self.began);
             for (block, (tags, began)) in blocks.enumerate() {
-                let shifted: [u32; LANES] =
-                    std::array::from_fn(|lane| if lane == 0 { before } else { tags[lane - 1] });
+                let mut shifted = [before; LANES];
+                shifted[1..].copy_from_slice(&tags[..LANES - 1]);
                 before = tags[LANES - 1];
                 if is_same(tags, &shifted) && *began == [0; LANES] {
                     continue;

@@ -1,7 +1,9 @@
 //! Lit surfaces.
 //!
-//! Every block of pixels is computed once for each face in it: the points on the face, the colour
-//! of its surface there, and the light that falls on them.
+//! Rows are cut into runs of pixels of one face. The light is computed at every few pixels of a run
+//! and interpolated, the sun's shadows at each.
+
+use std::ops::Range;
 
 use crate::{
     sensors::raster::{
@@ -11,8 +13,7 @@ use crate::{
         shader::{
             bends::{Bends, Shades},
             edges::Edges,
-            flat::to_byte,
-            surface::{Lanes, Patch},
+            surface::{Surface, Wide, high},
         },
     },
     world::mesh::SceneMesh,
@@ -34,18 +35,32 @@ const BRIGHTEST: f32 = 1.39;
 /// Exposure: brightness of a white surface in light of 1.
 const EXPOSURE: f32 = 0.88;
 
-/// Working memory.
+/// Light of 1 as a number of 16 bits; light is below 8.
+const LIGHT: f32 = 8192.0;
+/// Brightness as a number of 16 bits, a grey level.
+const BRIGHT: f32 = 32.0;
+
+/// Surfaces that were seen, and working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Lit {
     bends: Bends,
     edges: Edges,
+    /// Surfaces by face, and the number of the picture for which they were prepared.
+    surfaces: Vec<(u64, Surface)>,
+    picture: u64,
+    /// Depth of a row's pixels, and what is left of their light in corners, [`u16::MAX`] times.
+    depth_m: Vec<f32>,
+    open: Vec<u16>,
+    /// Colours of a row, and of the block after it.
+    colours: Vec<u8>,
 }
 
-/// The parts of a view that all blocks share.
+/// The parts of a view that all runs share.
 struct Shot<'a> {
-    mesh: &'a SceneMesh,
     light: Option<&'a Light>,
     rays: Rays,
+    depth_m: &'a [f32],
+    open: &'a [u16],
 }
 
 impl Lit {
@@ -57,103 +72,210 @@ impl Lit {
         canvas: &Canvas,
         rgb: &mut [u8],
     ) {
-        let shot = Shot { mesh, light, rays: lens.rays() };
+        let rays = lens.rays();
+        self.picture += 1;
+        self.surfaces.resize(mesh.faces.len(), Default::default());
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             self.bends.darken(canvas, row, lens.optics, SHADES);
-            let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
-            for (block, shades) in self.bends.light.as_chunks().0.iter().enumerate() {
-                let colours = shot.block(canvas, [row, block], shades);
-                match whole.get_mut(block) {
-                    Some(pixels) => pixels.copy_from_slice(colours.as_flattened()),
-                    None => rest.copy_from_slice(&colours.as_flattened()[..rest.len()]),
+            self.prepare(canvas, row, rays.horizon_m);
+            let Self { surfaces, depth_m, open, colours, .. } = self;
+            let shot = Shot { light, rays: lens.rays(), depth_m, open };
+            let tags = &canvas.tags[canvas.row_blocks(row)].as_flattened()[..canvas.width_px];
+            let mut start = 0;
+            while start < tags.len() {
+                let tag = tags[start];
+                let end = start + run_length(&tags[start..]);
+                if let Some(index) = (tag as usize).checked_sub(1) {
+                    let (picture, surface) = &mut surfaces[index];
+                    if *picture != self.picture {
+                        (*picture, *surface) =
+                            (self.picture, Surface::of(mesh, index, lens, shot.rays.pixel));
+                    }
+                    shot.run(index, surface, row, start..end, colours);
+                } else {
+                    colours[3 * start..3 * end].as_chunks_mut().0.fill(SKY);
                 }
+                start = end;
             }
+            pixels.copy_from_slice(&colours[..3 * canvas.width_px]);
         }
         self.edges.smooth(canvas, rgb);
     }
+
+    /// Set the depth and the openness of a row; lanes after its end have any.
+    fn prepare(&mut self, canvas: &Canvas, row: usize, horizon_m: Option<f32>) {
+        let nearness = canvas.row(row);
+        let length = nearness.len() + LANES;
+        self.depth_m.resize(length, 1.0);
+        self.open.resize(length, u16::MAX);
+        self.colours.resize(3 * length + 1, 0);
+        match horizon_m {
+            None => {
+                for (depth_m, w) in self.depth_m.iter_mut().zip(nearness) {
+                    *depth_m = 1.0 / w;
+                }
+            }
+            Some(horizon_m) => {
+                for (depth_m, w) in self.depth_m.iter_mut().zip(nearness) {
+                    *depth_m = horizon_m - w;
+                }
+            }
+        }
+        for (open, light) in self.open.iter_mut().zip(&self.bends.light) {
+            *open = whole(light * 65535.0);
+        }
+    }
+}
+
+/// Return the number of equal tags at the start.
+#[inline(always)]
+fn run_length(tags: &[u32]) -> usize {
+    let (blocks, _) = tags.as_chunks::<LANES>();
+    let is_equal = |block: &&[u32; LANES]| {
+        block.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0
+    };
+    let whole = blocks.iter().take_while(is_equal).count() * LANES;
+    whole + tags[whole..].iter().take_while(|&&tag| tag == tags[0]).count()
+}
+
+/// Return the whole number nearest to one from 0 to 65535. The mantissa of a sum with 2^23 is used,
+/// which unlike a conversion needs no treatment of numbers out of range.
+#[inline(always)]
+fn whole(value: f32) -> u16 {
+    (value + 8_388_608.0).to_bits() as u16
 }
 
 impl Shot<'_> {
-    /// Return the colours of a block.
-    fn block(&self, canvas: &Canvas, [row, block]: [usize; 2], shades: &Lanes) -> [[u8; 3]; LANES] {
-        let index = canvas.row_blocks(row).start + block;
-        let tags = &canvas.tags[index];
-        let (position_m, footprint_m) = self.rays.points(row, block, &canvas.nearness[index]);
-        // Most blocks lie within one face.
-        if tags[0] > 0 && tags.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0 {
-            let patch = Patch { face: tags[0] as usize - 1, position_m, footprint_m };
-            return self.patch(&patch, [0, LANES - 1], shades);
+    /// Compute the colours of a run of pixels of one face, and some after it.
+    fn run(
+        &self,
+        index: usize,
+        surface: &Surface,
+        row: usize,
+        run: Range<usize>,
+        colours: &mut [u8],
+    ) {
+        let mut start = self.light_at(index, [run.start, row]);
+        for first in run.clone().step_by(LANES) {
+            let last = (first + LANES).min(run.end - 1);
+            let end = if last == first { start } else { self.light_at(index, [last, row]) };
+            let share = SHARES[last - first];
+            let light = self.light_between([first, row], [&start, &end], share);
+            let depth_m = lanes(self.depth_m, first);
+            let scale = if self.rays.horizon_m.is_some() { &[1.0; LANES] } else { depth_m };
+            let middle = (last - first) / 2;
+            let length2 = self.rays.length2([first + middle, row]);
+            let surface = surface.colours([first, row], scale, scale[middle], length2);
+            let found = respond(&surface, &light, lanes(self.open, first));
+            let colours = &mut colours[3 * first..][..3 * LANES + 1];
+            for (lane, found) in found.as_chunks::<4>().0.iter().enumerate() {
+                // The fourth byte is overwritten by the next pixel.
+                let [red, green, blue, rest] = &mut colours[3 * lane..][..4] else {
+                    unreachable!()
+                };
+                [*red, *green, *blue, *rest] = *found;
+            }
+            start = end;
         }
-        let mut colours = [SKY; LANES];
-        let mut rest = [true; LANES];
-        for first in 0..LANES {
-            let tag = tags[first];
-            if !rest[first] || tag == 0 {
-                continue;
-            }
-            let mut last = first;
-            for lane in first..LANES {
-                if tags[lane] == tag {
-                    last = lane;
-                    rest[lane] = false;
-                }
-            }
-            let patch = Patch { face: tag as usize - 1, position_m, footprint_m };
-            let found = self.patch(&patch, [first, last], shades);
-            for lane in first..=last {
-                if tags[lane] == tag {
-                    colours[lane] = found[lane];
-                }
-            }
-        }
-        colours
     }
 
-    /// Return the colours of a block as if one face covered it; `ends` are its first and last pixel
-    /// that the face does cover.
+    /// Return the light on a pixel of a face without the sun, by channel, and the share of
+    /// sunlight that the surface's slope takes up.
     #[inline(always)]
-    fn patch(&self, patch: &Patch, ends: [usize; 2], shades: &Lanes) -> [[u8; 3]; LANES] {
-        let light = self.light_on(patch, ends);
-        let surface = patch.colours(self.mesh, &self.rays);
-        let channels: [[u32; LANES]; 3] = std::array::from_fn(|channel| {
-            std::array::from_fn(|lane| {
-                let [a, b, c] = RESPONSE;
-                let x = surface[channel][lane] * light[channel][lane] * shades[lane];
-                let x = (x * (EXPOSURE / 255.0)).min(BRIGHTEST);
-                to_byte(255.0 * x * (a + x * (b - c * x)))
-            })
-        });
-        std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8))
+    fn light_at(&self, index: usize, [column, row]: [usize; 2]) -> [f32; 4] {
+        let Some(light) = self.light else { return [EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0] };
+        let point_m = self.rays.point([column, row], self.depth_m[column]);
+        light.field.at(&light.field.faces[index], point_m)
     }
 
-    /// Return the light on a block: the square root of its strength, since colours are too.
+    /// Return the light on a block, interpolated between two places: the square root of its
+    /// strength, since colours are too.
+    ///
+    /// # Arguments
+    /// * `share` - one over the number of pixels between the places.
     #[inline(always)]
-    fn light_on(&self, patch: &Patch, [first, last]: [usize; 2]) -> [Lanes; 3] {
-        let Some(light) = self.light else {
-            return [[EVEN; LANES]; 3];
+    fn light_between(&self, pixel: [usize; 2], ends: [&[f32; 4]; 2], share: f32) -> Wide {
+        let smooth = ramp([rooted(ends[0], 0.0), rooted(ends[1], 0.0)], share);
+        let Some(light) = self.light.filter(|_| ends[0][3] + ends[1][3] > 0.0) else {
+            return smooth;
         };
-        let face = &light.field.faces[patch.face];
-        let at = |lane: usize| light.field.at(face, patch.position_m.map(|axis| axis[lane]));
-        let (start, end) = (at(first), at(last));
-        let share = 1.0 / (last - first).max(1) as f32;
-        let between = |channel: usize| -> Lanes {
-            let step = (end[channel] - start[channel]) * share;
-            std::array::from_fn(|lane| start[channel] + step * (lane as f32 - first as f32))
-        };
-        if start[3] + end[3] <= 0.0 {
-            return std::array::from_fn(|channel| {
-                let (start, end) = (start[channel].sqrt(), end[channel].sqrt());
-                let step = (end - start) * share;
-                std::array::from_fn(|lane| start + step * (lane as f32 - first as f32))
-            });
+        let points_m = self.rays.points(pixel, lanes(self.depth_m, pixel[0]));
+        let reach = light.sun.reaches(&points_m);
+        if reach == [0.0; LANES] {
+            return smooth;
         }
-        let smooth: [Lanes; 3] = std::array::from_fn(between);
-        let (reach, slope) = (light.sun.reaches(&patch.position_m), between(3));
-        std::array::from_fn(|channel| {
-            std::array::from_fn(|lane| {
-                let sun = SUN[channel] * reach[lane] * slope[lane];
-                (smooth[channel][lane] + sun).max(0.0).sqrt()
-            })
-        })
+        let sunny = ramp([rooted(ends[0], ends[0][3]), rooted(ends[1], ends[1][3])], share);
+        if reach == [1.0; LANES] {
+            return sunny;
+        }
+        let mut mixed = [0; 4 * LANES];
+        for (i, mixed) in mixed.iter_mut().enumerate() {
+            let reach = whole(reach[i / 4] * 65535.0);
+            *mixed = smooth[i] + high(sunny[i].saturating_sub(smooth[i]), reach);
+        }
+        mixed
     }
+}
+
+/// One over the number of pixels between two places; 0 if they are the same.
+const SHARES: [f32; LANES + 1] =
+    [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 0.25, 0.2, 1.0 / 6.0, 1.0 / 7.0, 0.125];
+
+/// Return a block of a row, from any pixel on.
+#[inline(always)]
+fn lanes<T>(row: &[T], first: usize) -> &[T; LANES] {
+    row[first..].first_chunk().expect("rows are padded by a block")
+}
+
+/// Return the square root of light and of a share of sunlight, times the exposure, as numbers of
+/// 16 bits.
+#[inline(always)]
+fn rooted(light: &[f32; 4], slope: f32) -> [f32; 4] {
+    let [red, green, blue] = SUN;
+    let sun = [red, green, blue, 0.0];
+    let mut rooted = [0.0; 4];
+    for i in 0..4 {
+        let root = (light[i] + sun[i] * slope).max(0.0).sqrt();
+        rooted[i] = (root * (EXPOSURE * LIGHT)).min(65535.0);
+    }
+    rooted
+}
+
+/// Interpolate between two places.
+#[inline(always)]
+fn ramp([start, end]: [[f32; 4]; 2], share: f32) -> Wide {
+    let (mut first, mut step) = ([0_u16; 4], [0_u16; 4]);
+    for i in 0..4 {
+        first[i] = whole(start[i]);
+        // A negative step is one modulo 2^16.
+        step[i] = ((end[i] - start[i]) * share + 12_582_912.0).to_bits() as u16;
+    }
+    let mut light = [0; 4 * LANES];
+    for (i, light) in light.iter_mut().enumerate() {
+        *light = first[i % 4].wrapping_add(step[i % 4].wrapping_mul(i as u16 / 4));
+    }
+    light
+}
+
+/// Return the colours of a lit surface as a camera responds to them.
+#[inline(always)]
+fn respond(surface: &Wide, light: &Wide, open: &[u16; LANES]) -> [u8; 4 * LANES] {
+    const MOST: u16 = (BRIGHTEST * 255.0 * BRIGHT) as u16;
+    const WHITE: u16 = (255.0 * BRIGHT) as u16;
+    /// The response to brightness of 1 as a number of 16 bits, and factors that make brightness
+    /// and the result of squaring it such a number.
+    const ONE: f32 = 8192.0;
+    const LINEAR: u16 = (RESPONSE[1] * ONE / (255.0 * BRIGHT) * 65536.0) as u16;
+    const SQUARE: u16 =
+        (RESPONSE[2] * ONE * 4096.0 / (255.0 * BRIGHT * 255.0 * BRIGHT) * 65536.0) as u16;
+    let mut colours = [0; 4 * LANES];
+    for i in 0..4 * LANES {
+        let light = high(light[i], open[i / 4]);
+        let bright = high(2 * surface[i], light).min(MOST);
+        let square = high(4 * bright, 4 * bright);
+        let response = (RESPONSE[0] * ONE) as u16 + high(bright, LINEAR) - high(square, SQUARE);
+        let level = high(4 * bright, 2 * response).min(WHITE);
+        colours[i] = ((level + 16) >> 5) as u8;
+    }
+    colours
 }

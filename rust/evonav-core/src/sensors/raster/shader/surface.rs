@@ -1,76 +1,111 @@
-//! The colour of surfaces before they are lit.
+//! The colour of surfaces before they are lit, and how it is lit, in numbers of 16 bits.
 
 use crate::{
-    sensors::raster::{canvas::LANES, lens::Rays, shader::flat::BLACK},
-    textures::{NEUTRAL, Texture, channels_of, texture_of},
-    world::{mesh::SceneMesh, skin::Skin},
+    sensors::raster::{canvas::LANES, lens::Lens, shader::flat::BLACK},
+    textures::{NEUTRAL, Texture, texture_of},
+    world::mesh::SceneMesh,
 };
 
 /// Share of a pixel's longer side on the surface that is averaged. A surface seen from the side
 /// would lose all detail if it were 1, and shimmer if it were small.
-const AVERAGED: f32 = 0.5;
+const AVERAGED: f64 = 0.5;
+/// Colours before they are lit, a grey level.
+const FINE: f32 = 128.0;
+/// What is left of a colour between black surfaces' brightness and white.
+const RAISED: f32 = 1.0 - BLACK / 255.0;
 
-/// A value for each pixel of a block.
-pub(super) type Lanes = [f32; LANES];
+/// Red, green, blue and a number that is not used, for each pixel of a block.
+pub(super) type Wide = [u16; 4 * LANES];
 
-/// A block of pixels as if one face covered all of them; those of other faces are ignored later.
-pub(super) struct Patch {
-    /// Index of the face.
-    pub face: usize,
-    /// World points `x, y, z` on the surface.
-    pub position_m: [Lanes; 3],
-    /// Width of a pixel at the surface, across the ray.
-    pub footprint_m: Lanes,
+/// The surface of a face, prepared for one view.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Surface {
+    texture: Option<&'static Texture>,
+    /// The results of [`Lens::on_plane`] for the texture's coordinates.
+    coordinates: [[f32; 3]; 2],
+    /// Square of the texels in the width of a pixel at depth 1.
+    detail: f32,
+    /// What the square of a pixel's longer side on the surface is of that of its width, at depth 1.
+    slant: f32,
+    /// Factors of a texture's channels.
+    factor: [u16; 4],
 }
 
-impl Patch {
-    /// Return the colour of each pixel, sRGB, 0 to 255.
-    #[inline(always)]
-    pub fn colours(&self, mesh: &SceneMesh, rays: &Rays) -> [Lanes; 3] {
-        let colour = mesh.faces[self.face].colour.map(f32::from);
-        let skin = &mesh.skins[self.face];
+impl Surface {
+    pub fn of(mesh: &SceneMesh, index: usize, lens: &Lens, pixel: f32) -> Self {
+        let (face, skin) = (&mesh.faces[index], &mesh.skins[index]);
         let texture = if skin.is_plain() { None } else { texture_of(skin.material) };
-        let raised = |c: f32| BLACK + c * (1.0 - BLACK / 255.0);
-        let Some(texture) = texture else {
-            return colour.map(|c| [raised(c); LANES]);
+        let factor = |own: f32| (own * 256.0 * RAISED) as u16;
+        let [red, green, blue] = face.colour.map(|channel| factor(f32::from(channel)));
+        let plain = Self { factor: [red, green, blue, 0], ..Self::default() };
+        let (Some(texture), Some((plane, facing))) = (texture, lens.nearness_plane(face)) else {
+            return plain;
         };
-        let factors = self.factors(mesh, rays, skin, texture);
-        let is_picture = skin.material.kind.is_picture();
-        std::array::from_fn(|i| {
-            let own = if is_picture { 1.0 } else { colour[i] / NEUTRAL };
-            factors[i].map(|factor| raised((own * factor).min(255.0)))
-        })
-    }
-
-    /// Return the texture's channels at each pixel.
-    #[inline(always)]
-    fn factors(&self, mesh: &SceneMesh, rays: &Rays, skin: &Skin, texture: &Texture) -> [Lanes; 4] {
-        let [x, y, z] = &self.position_m;
-        let [u, v]: [Lanes; 2] = std::array::from_fn(|i| {
-            let ([du, dv, dw], origin) = (skin.axes[i], skin.origin[i]);
-            std::array::from_fn(|k| du * x[k] + dv * y[k] + dw * z[k] + origin)
+        let coordinates = std::array::from_fn(|i| {
+            let (along, origin) = (skin.axes[i].map(f64::from), f64::from(skin.origin[i]));
+            // Whole repeats are left out: the numbers stay small.
+            let repeats = lens.at_eye(along, origin).floor();
+            lens.on_plane(plane, along, origin - repeats)
         });
-        let width = self.width2(mesh.faces[self.face].normal.map(|n| n as f32), rays);
         let per_m2 = skin.axes.map(|axis| axis.iter().map(|a| a * a).sum::<f32>());
-        let scale = per_m2[0].max(per_m2[1]) * (texture.size() * texture.size()) as f32;
-        let mixed: [u64; LANES] =
-            std::array::from_fn(|k| texture.sample(u[k], v[k], width[k] * scale));
-        let apart = mixed.map(channels_of);
-        std::array::from_fn(|i| apart.map(|texel| texel[i]))
+        let texels = texture.size() as f32 * pixel;
+        let factor =
+            if skin.material.kind.is_picture() { [factor(NEUTRAL); 4] } else { plain.factor };
+        Self {
+            texture: Some(texture),
+            coordinates,
+            detail: per_m2[0].max(per_m2[1]) * texels * texels,
+            slant: (AVERAGED * AVERAGED / (facing * facing + 1e-9)) as f32,
+            factor,
+        }
     }
 
-    /// Return the square of the width, on the surface, of what each pixel averages.
+    /// Return the colours of a run of pixels that starts at `[column, row]`, [`FINE`] times.
+    ///
+    /// # Arguments
+    /// * `scale` - depths; 1 in orthographic views.
+    /// * `middle`, `length2` - the scale in the middle of the pixels that show the face, and the
+    ///   result of [`Rays::length2`](crate::sensors::raster::lens::Rays::length2) there.
     #[inline(always)]
-    fn width2(&self, normal: [f32; 3], rays: &Rays) -> Lanes {
-        let [x, y, z] = &self.position_m;
-        let eye_m = rays.eye_m();
-        std::array::from_fn(|k| {
-            let to_eye = [eye_m[0] - x[k], eye_m[1] - y[k], eye_m[2] - z[k]];
-            let length2: f32 =
-                to_eye[0] * to_eye[0] + to_eye[1] * to_eye[1] + to_eye[2] * to_eye[2];
-            let facing = to_eye[0] * normal[0] + to_eye[1] * normal[1] + to_eye[2] * normal[2];
-            let longer = AVERAGED * AVERAGED * length2 / (facing * facing + 1e-9);
-            self.footprint_m[k] * self.footprint_m[k] * longer.max(1.0)
-        })
+    pub fn colours(
+        &self,
+        [column, row]: [usize; 2],
+        scale: &[f32; LANES],
+        middle: f32,
+        length2: f32,
+    ) -> Wide {
+        let Some(texture) = self.texture else {
+            return self.coloured(&[(NEUTRAL * 256.0) as u16; 4 * LANES]);
+        };
+        let (first, row) = (column as f32 + 0.5, row as f32 + 0.5);
+        let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
+        let [[du, u_down, u_at], [dv, v_down, v_at]] = self.coordinates;
+        let (u_row, v_row) = (u_down * row + u_at, v_down * row + v_at);
+        for lane in 0..LANES {
+            let at = first + lane as f32;
+            u[lane] = (du * at + u_row) * scale[lane];
+            v[lane] = (dv * at + v_row) * scale[lane];
+        }
+        let middle2 = middle * middle;
+        let width2 = self.detail * middle2 * (self.slant * middle2 * length2).max(1.0);
+        self.coloured(&texture.sample(&u, &v, width2))
     }
+
+    /// Return the colours of a surface with 256 times these factors of its own colour.
+    #[inline(always)]
+    fn coloured(&self, sums: &Wide) -> Wide {
+        const MOST: u16 = (255.0 * RAISED * FINE) as u16;
+        const LEAST: u16 = (BLACK * FINE) as u16;
+        let mut colours = [0; 4 * LANES];
+        for (i, colour) in colours.iter_mut().enumerate() {
+            *colour = high(sums[i], self.factor[i % 4]).min(MOST) + LEAST;
+        }
+        colours
+    }
+}
+
+/// Return the product over 2^16.
+#[inline(always)]
+pub(super) fn high(a: u16, b: u16) -> u16 {
+    ((u32::from(a) * u32::from(b)) >> 16) as u16
 }
