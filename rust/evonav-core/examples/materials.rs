@@ -51,7 +51,7 @@ fn sheet(file: &str) -> Result<(), Box<dyn Error>> {
     for (index, &material) in squares.iter().enumerate() {
         let Some(texture) = texture_of(material) else { continue };
         let own = if material.kind.is_picture() { [NEUTRAL; 3] } else { GROUND };
-        let level = &texture.levels()[0];
+        let level = texture.finest();
         for (y, x) in (0..128).flat_map(|y| (0..128).map(move |x| (y, x))) {
             let texel = level.texel(x * level.size() / 128, y * level.size() / 128);
             let [left, top] = [index % COLUMNS, index / COLUMNS].map(|n| n * SQUARE_PX);

@@ -10,7 +10,7 @@ use evonav_core::{
         camera::Camera,
         raster::{FrameBuffer, Style, Want, render},
     },
-    textures::{Level, NEUTRAL, Texel, Texture, channels_of, texture_of},
+    textures::{Level, NEUTRAL, Texel, Texture, texture_of},
     world::{mesh::SceneMesh, skin::Skin},
 };
 use proptest::prelude::*;
@@ -33,31 +33,12 @@ fn texels(level: &Level) -> impl Iterator<Item = Texel> + '_ {
 #[test]
 fn textures_keep_the_colour_of_their_surface_on_average() {
     for (kind, texture) in textures().filter(|(kind, _)| !kind.is_picture()) {
-        let level = &texture.levels()[0];
+        let level = texture.finest();
         let count = (level.size() * level.size()) as f32;
         for i in 0..3 {
             let mean = texels(level).map(|texel| texel[i]).sum::<f32>() / count;
             assert!((mean / NEUTRAL - 1.0).abs() < 0.02, "{kind:?} channel {i}: {mean}");
         }
-    }
-}
-
-#[test]
-fn smaller_copies_are_averages() {
-    for (kind, texture) in textures() {
-        for pair in texture.levels().windows(2) {
-            let [fine, coarse] = pair else { unreachable!() };
-            assert_eq!(fine.size(), 2 * coarse.size());
-            for (x, y) in (0..coarse.size()).flat_map(|y| (0..coarse.size()).map(move |x| (x, y))) {
-                let four = [[0, 0], [1, 0], [0, 1], [1, 1]]
-                    .map(|[dx, dy]| fine.texel(2 * x + dx, 2 * y + dy));
-                for i in 0..4 {
-                    let mean = four.iter().map(|texel| texel[i]).sum::<f32>() / 4.0;
-                    assert!((coarse.texel(x, y)[i] - mean).abs() <= 1.01, "{kind:?}");
-                }
-            }
-        }
-        assert_eq!(texture.levels().last().map(Level::size), Some(1));
     }
 }
 
@@ -73,7 +54,7 @@ fn step(level: &Level, at: usize, is_row: bool) -> f32 {
 fn repeated_textures_have_no_seam() {
     let repeated = |kind: MaterialKind| matches!(kind.layout(), Layout::Repeated(_));
     for (kind, texture) in textures().filter(|&(kind, _)| repeated(kind)) {
-        let level = &texture.levels()[0];
+        let level = texture.finest();
         for is_row in [false, true] {
             let inside = (1..level.size()).map(|i| step(level, i, is_row)).fold(0.0, f32::max);
             let seam = step(level, 0, is_row);
@@ -98,20 +79,67 @@ fn sample_naive(level: &Level, u: f64, v: f64) -> [f64; 4] {
     sum
 }
 
+/// A blurred copy at the texel nearest to a place, written down plainly: a binomial mixture of
+/// means over squares of `1 << halvings` texels.
+fn blurred_naive(level: &Level, u: f64, v: f64, halvings: u32, num_weights: i32) -> [f64; 4] {
+    let (side, size) = (1_i64 << halvings, level.size() as i64);
+    let at = |t: f64| (t * (size / side) as f64).floor() as i64;
+    let choose = |k: i32| (0..k).map(|i| f64::from(num_weights - 1 - i) / f64::from(i + 1));
+    let weight = |k: i32| choose(k).product::<f64>() / 2.0_f64.powi(num_weights - 1);
+    let mut sum = [0.0; 4];
+    for (i, j) in (0..num_weights).flat_map(|i| (0..num_weights).map(move |j| (i, j))) {
+        let [x, y] = [(u, i), (v, j)].map(|(t, k)| side * (at(t) + i64::from(k - num_weights / 2)));
+        for (dx, dy) in (0..side).flat_map(|dx| (0..side).map(move |dy| (dx, dy))) {
+            let wrapped = |t: i64| t.rem_euclid(size) as usize;
+            let texel = level.texel(wrapped(x + dx), wrapped(y + dy));
+            for channel in 0..4 {
+                let share = weight(i) * weight(j) / (side * side) as f64;
+                sum[channel] += share * f64::from(texel[channel]);
+            }
+        }
+    }
+    sum
+}
+
+/// Look one place up, as the third of a block of others.
+fn sample(texture: &Texture, u: f32, v: f32, width2: f32) -> [f32; 4] {
+    let (mut all_u, mut all_v) = ([0.3; 8], [0.7; 8]);
+    (all_u[2], all_v[2]) = (u, v);
+    let sums = texture.sample(&all_u, &all_v, width2);
+    std::array::from_fn(|i| f32::from(sums[8 + i]) / 256.0)
+}
+
 proptest! {
     #[test]
-    fn lookups_agree_with_the_plain_mixture(
-        u in -20.0..20.0_f32, v in -20.0..20.0_f32, halvings in 0..5_i32, kind in 0..40_usize,
+    fn near_lookups_agree_with_the_plain_mixture(
+        u in -20.0..20.0_f32, v in -20.0..20.0_f32, width2 in 0.0..2.5_f32, kind in 0..40_usize,
     ) {
         let material = Material { kind: MaterialKind::ALL[kind], variant: 1 };
         let Some(texture) = texture_of(material) else { return Ok(()) };
-        let level = (halvings as usize).min(texture.levels().len() - 1);
-        let width2 = 4.0_f32.powi(level as i32);
-        let found = channels_of(texture.sample(u, v, width2));
-        let expected = sample_naive(&texture.levels()[level], f64::from(u), f64::from(v));
+        let found = sample(texture, u, v, width2);
+        let expected = sample_naive(texture.finest(), f64::from(u), f64::from(v));
         for i in 0..4 {
             // Weights have 8 bits.
             prop_assert!((f64::from(found[i]) - expected[i]).abs() < 2.5, "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn far_lookups_agree_with_the_plain_blur(
+        texel in [-300..300_i32, -300..300_i32], copy in 0..8_u32, kind in 0..40_usize,
+    ) {
+        let material = Material { kind: MaterialKind::ALL[kind], variant: 1 };
+        let Some(texture) = texture_of(material) else { return Ok(()) };
+        let (halvings, is_wide) = (copy / 2, copy % 2 == 1);
+        // The middle of a texel of the copy.
+        let size = (texture.size() >> halvings) as f32;
+        let [u, v] = texel.map(|t| (t as f32 + 0.5) / size);
+        let found = sample(texture, u, v, 4.0 * 2.0_f32.powi(copy as i32));
+        let num_weights = if is_wide { 9 } else { 5 };
+        let expected =
+            blurred_naive(texture.finest(), f64::from(u), f64::from(v), halvings, num_weights);
+        for i in 0..4 {
+            prop_assert!((f64::from(found[i]) - expected[i]).abs() < 1.1, "{found:?} {expected:?}");
         }
     }
 
@@ -121,7 +149,7 @@ proptest! {
     ) {
         let material = Material { kind: MaterialKind::ALL[kind], variant: 0 };
         let Some(texture) = texture_of(material) else { return Ok(()) };
-        let found = channels_of(texture.sample(u, v, 1e8));
+        let found = sample(texture, u, v, 1e8);
         prop_assert!((found[0] / NEUTRAL - 1.0).abs() < 0.02, "{kind}");
     }
 
