@@ -11,7 +11,7 @@ use crate::{
 const AVERAGED: f64 = 0.5;
 /// Colours before they are lit, a grey level.
 const FINE: f32 = 128.0;
-/// What is left of a colour between black surfaces' brightness and white.
+/// Share of the range of colours that lies above the brightness of black surfaces.
 const RAISED: f32 = 1.0 - BLACK / 255.0;
 
 /// Red, green, blue and a number that is not used, for each pixel of a block.
@@ -25,7 +25,7 @@ pub(super) struct Surface {
     coordinates: [[f32; 3]; 2],
     /// Square of the texels in the width of a pixel at depth 1.
     detail: f32,
-    /// What the square of a pixel's longer side on the surface is of that of its width, at depth 1.
+    /// Square of the ratio of a pixel's longer side on the surface to its width, at depth 1.
     slant: f32,
     /// Factors of a texture's channels.
     factor: [u16; 4],
