@@ -36,11 +36,29 @@ pub fn toilet(s: &mut Sketch<'_>) {
         s.pad(x, [h - 0.035, h], between(z, 0.0, 0.285), 0.012, shade(white, 0.97));
         let foot = [between(x, 0.22, 0.78), between(z, 0.1, 0.8)];
         s.column(foot[0], [0.0, 0.05], foot[1], 0.9, 16, white);
+        // The inside of the bowl with the water, the gap under the seat and the lever.
+        let hole = [between(x, 0.21, 0.79), between(z, 0.33, 0.93)];
+        s.column(hole[0], [rim, rim + 0.006], hole[1], 1.0, 16, shade(white, 0.72));
+        let pool = [between(x, 0.34, 0.66), between(z, 0.42, 0.74)];
+        let water = rgb(135, 150, 158).of(MaterialKind::Glass);
+        s.column(pool[0], [rim, rim + 0.008], pool[1], 1.0, 12, water);
+        let bowl = [between(x, 0.12, 0.88), between(z, 0.2, 1.0)];
+        let neck = [rim - 0.034, rim - 0.028];
+        s.column(bowl[0], neck, bowl[1], 1.0, 16, shade(white, 0.45));
+        let lever = [between(x, 0.1, 0.26), [h - 0.1, h - 0.075], between(z, 0.26, 0.285)];
+        s.cuboid(lever[0], lever[1], lever[2], STEEL);
     });
     let pivot_m = [0.0, rim + 0.004, between(z, 0.28, 0.32)[1]];
     s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
         let lid = between(z, 0.28, 0.32);
         s.cuboid(between(x, 0.12, 0.88), [rim, 0.8 * h], lid, shade(white, 0.97));
+        s.trim(|s| {
+            // The lid is a rounded plate with a bright edge.
+            let plate = [between(x, 0.12, 0.88), [rim, 0.8 * h], [lid[0], lid[1] + 0.008]];
+            s.pad(plate[0], plate[1], plate[2], 0.008, white);
+            let oval = [inside(plate[0], 0.03), inside(plate[1], 0.04), [lid[1], lid[1] + 0.012]];
+            s.round(Along::Z, 0.94, 16, oval, shade(white, 0.9));
+        });
     });
 }
 

@@ -38,6 +38,15 @@ pub fn bed(s: &mut Sketch<'_>) {
     s.detail("pillow", if x[1] - x[0] > 1.25 { 2 } else { 1 });
     s.cuboid(x, [0.0, head], head_z, wood);
     s.cuboid(x, [0.0, foot], foot_z, wood);
+    s.trim(|s| {
+        // A raised panel in the headboard.
+        let panel = [head_z[1] - 0.01, head_z[1] + 0.012];
+        let y = [mattress + 0.04, head - 0.05];
+        if y[1] - y[0] > 0.1 {
+            s.pad(inside(x, 0.07), y, panel, 0.01, shade(wood, 1.12));
+        }
+        s.pad(x, [head - 0.035, head], [head_z[0], head_z[1] + 0.012], 0.01, shade(wood, 0.85));
+    });
     bunk(s, [wood, linen], mattress, x);
     if is_tall {
         s.detail("tall post", 4);
@@ -74,15 +83,20 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
         let along = between(length, 0.03, 0.2);
         s.cuboid(side, [top - 0.012, top + 0.07], along, linen_white);
         s.trim(|s| {
-            let plump = [inside(side, -0.015), [top - 0.01, top + 0.085], inside(along, -0.02)];
-            s.pad(plump[0], plump[1], plump[2], 0.035, linen_white);
+            let plump = [inside(side, -0.015), [top - 0.01, top + 0.11], inside(along, -0.025)];
+            s.pad(plump[0], plump[1], plump[2], 0.045, linen_white);
         });
     }
     s.trim(|s| {
         let duvet = linen.of(MaterialKind::Duvet);
-        let [over, fold] = [[top - 0.05, top + 0.035], [top - 0.02, top + 0.06]];
+        let [over, fold] = [[top - 0.62 * depth, top + 0.035], [top - 0.5 * depth, top + 0.055]];
         s.pad(x, over, blanket, 0.03, duvet);
-        s.pad(x, fold, between(length, 0.29, 0.42), 0.025, shade(linen, 1.25));
+        let turned = rgb(240, 238, 232).of(MaterialKind::Fabric);
+        s.pad(x, fold, between(length, 0.27, 0.39), 0.025, turned);
+        s.pad(x, [over[0], top + 0.05], between(length, 0.39, 0.43), 0.02, shade(linen, 0.85));
+        // The shadow under the mattress.
+        let shadow = [top - 0.7 * depth - 0.012, top - 0.7 * depth + 0.006];
+        s.cuboid(x, shadow, length, shade(wood, 0.4));
     });
 }
 
@@ -106,6 +120,10 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     }
     s.cuboid(inside(x, rim), y, ends(z, rim, 0.0)[0], fabric);
     s.cuboid(inside(x, rim), [0.0, 0.7 * h], ends(z, rim, 0.0)[1], fabric);
+    s.trim(|s| {
+        let cushion = [inside(x, 0.9 * rim), [0.0, 0.62 * h], inside(z, 0.9 * rim)];
+        s.pad(cushion[0], cushion[1], cushion[2], 0.1 * h, shade(fabric, 1.25));
+    });
 }
 
 /// Draw a pillow that is thick in the middle.
@@ -113,4 +131,11 @@ pub fn pillow(s: &mut Sketch<'_>) {
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5])).of(MaterialKind::Cushion);
     s.cuboid_at(ALL, [0.2, 0.75], ALL, fabric);
     s.cuboid_at([0.05, 0.95], ALL, [0.05, 0.95], shade(fabric, 1.04));
+    let [x, y, z] = s.spans();
+    let [w, h, d] = s.size();
+    s.trim(|s| {
+        // One soft body in place of a step.
+        let edge = 0.35 * h.min(w).min(d);
+        s.pad(x, between(y, 0.1, 0.85), z, edge, fabric);
+    });
 }

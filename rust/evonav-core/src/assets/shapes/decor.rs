@@ -4,7 +4,7 @@ use crate::assets::{
     material::MaterialKind,
     shapes::{
         colour::{DARK, Paint, STEEL, WOODS, rgb, shade},
-        sketch::{ALL, Along, Sketch, between, ends, inside},
+        sketch::{ALL, Along, Sketch, Span, between, ends, inside},
     },
 };
 
@@ -168,7 +168,20 @@ pub fn teddy_bear(s: &mut Sketch<'_>) {
 
 /// Draw a ball.
 pub fn ball(s: &mut Sketch<'_>) {
-    s.ellipsoid_at(ALL, ALL, ALL, s.tint(0, rgb(205, 105, 45)));
+    let skin = s.tint(0, rgb(205, 105, 45));
+    s.ellipsoid_at(ALL, ALL, ALL, skin);
+    // Black seams around it: discs as wide as the ball.
+    let [x, y, z] = s.spans();
+    let thin = |span: Span| between(span, 0.49, 0.51);
+    let seam = rgb(30, 26, 24);
+    s.trim(|s| {
+        s.round(Along::X, 1.0, 16, [thin(x), y, z], seam);
+        s.round(Along::Y, 1.0, 16, [x, thin(y), z], seam);
+        for side in [[0.22, 0.24], [0.76, 0.78]] {
+            let [y, x] = [y, x].map(|span| between(span, 0.06, 0.94));
+            s.round(Along::Z, 1.0, 16, [x, y, between(z, side[0], side[1])], seam);
+        }
+    });
 }
 
 /// Draw two boots.
@@ -255,4 +268,12 @@ pub fn slab(s: &mut Sketch<'_>) {
     );
     s.cuboid_at(ALL, [0.88, 1.0], ALL, cover);
     s.cuboid_at([0.0, 0.04], ALL, ALL, shade(cover, 0.9));
+    let [x, y, z] = s.spans();
+    s.trim(|s| {
+        // Pages between the covers on three sides, and a round spine.
+        let pages = rgb(240, 236, 222).of(MaterialKind::Pages);
+        s.cuboid(between(x, 0.02, 0.995), between(y, 0.14, 0.86), inside(z, 0.002), pages);
+        let spine = [x[0], x[0] + 0.06 * (x[1] - x[0])];
+        s.pad(spine, y, z, 0.01, shade(cover, 0.75).of(MaterialKind::Smooth));
+    });
 }

@@ -6,7 +6,7 @@ use crate::assets::{
     material::MaterialKind,
     shapes::{
         colour::{DARK, Paint, STEEL, lightest, rgb, shade},
-        sketch::{ALL, Along, Motion, Sketch, between, inside},
+        sketch::{ALL, Along, Motion, Sketch, Span, between, inside},
     },
 };
 
@@ -25,6 +25,7 @@ pub fn television(s: &mut Sketch<'_>) {
     if d < 0.15 {
         s.cuboid(x, y, [z[0], z[1] - 0.01], frame);
         s.cuboid(inside(x, 0.03 * w), inside(y, 0.04 * h), [z[1] - 0.01, z[1]], screen);
+        bezel(s, [x, y, [z[1] - 0.012, z[1]]], frame);
         return;
     }
     s.detail("stand", 1);
@@ -35,6 +36,22 @@ pub fn television(s: &mut Sketch<'_>) {
     s.cuboid(inside(x, 0.03 * w), [bottom + 0.04 * h, 0.97 * h], glass, screen);
     s.cuboid(between(x, 0.44, 0.56), [0.015, 0.5 * h], neck, shade(frame, 1.3));
     s.cuboid(between(x, 0.25, 0.75), [0.0, 0.02], z, shade(frame, 1.3));
+    bezel(s, [x, [bottom, h], [panel[1] - 0.002, panel[1] + 0.01]], frame);
+    s.trim(|s| {
+        let neck = [between(x, 0.43, 0.57), [0.0, bottom + 0.02], [-0.02, 0.02]];
+        s.pad(neck[0], neck[1], neck[2], 0.01, shade(frame, 0.8));
+    });
+}
+
+/// Draw a bezel with a lighter lower edge around a screen, as trim.
+fn bezel(s: &mut Sketch<'_>, spans: [Span; 3], frame: Paint) {
+    let [x, y, z] = spans;
+    let edge = (0.03 * (x[1] - x[0])).min(0.04 * (y[1] - y[0])).min(0.03);
+    s.trim(|s| {
+        s.rim(spans, [0, 1], edge, shade(frame, 0.6));
+        let strip = [y[0], y[0] + 0.35 * edge];
+        s.cuboid(x, strip, [z[0], z[1] + 0.002], shade(frame, 1.6));
+    });
 }
 
 /// Draw a laptop: base with keyboard, lid upright at the back.
@@ -51,6 +68,13 @@ pub fn laptop(s: &mut Sketch<'_>) {
         between(z, 0.15, 0.6),
         DARK.of(MaterialKind::Keyboard),
     );
+    s.trim(|s| {
+        // The hand rest with its touch pad.
+        let touch = between(z, 0.66, 0.92);
+        s.cuboid(between(x, 0.34, 0.66), [base, base + 0.003], touch, shade(shell, 0.75));
+        let edge = [base - 0.004, base + 0.001];
+        s.rim([x, edge, z], [0, 2], 0.006, shade(shell, 1.15));
+    });
     let is_closed = s.condition().openness.is_some_and(|openness| openness < 0.2);
     s.detail(if is_closed { "closed lid" } else { "open lid" }, 1);
     let pivot_m = [0.0, base + 0.004, lid[1] + 0.004];
@@ -58,6 +82,15 @@ pub fn laptop(s: &mut Sketch<'_>) {
         s.cuboid(x, [base, h], lid, shell);
         let screen = [base + 0.06 * h, 0.95 * h];
         s.cuboid(inside(x, 0.04 * w), screen, [lid[1], lid[1] + 0.004], SCREEN);
+        s.trim(|s| {
+            // A black bezel around the screen.
+            let glass = [lid[1] + 0.003, lid[1] + 0.005];
+            let picture = if s.condition().is_on == Some(true) { LIT_SCREEN } else { SCREEN };
+            s.cuboid(inside(x, 0.045 * w), inside(screen, 0.01 * h), glass, picture);
+            let frame =
+                [inside(x, 0.01 * w), [base + 0.02 * h, 0.99 * h], [lid[1], lid[1] + 0.006]];
+            s.rim(frame, [0, 1], 0.035 * w, DARK);
+        });
     });
 }
 

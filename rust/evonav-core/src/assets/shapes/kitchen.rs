@@ -80,7 +80,39 @@ fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
             Face::Left => s.cuboid([x[0] + 0.005, x[0] + 0.015], y, span, door),
             Face::Right => s.cuboid([x[1] - 0.015, x[1] - 0.005], y, span, door),
         }
+        s.trim(|s| drawer_over_door(s, [x, z], face, span, y, door));
     }
+}
+
+/// Draw a drawer's front over the upper part of a door, the gap below it, and a handle on each.
+fn drawer_over_door(
+    s: &mut Sketch<'_>,
+    [x, z]: [Span; 2],
+    face: Face,
+    span: Span,
+    y: Span,
+    door: Paint,
+) {
+    // Draw a plate between two distances behind the front edge of the worktop.
+    let plate =
+        |s: &mut Sketch<'_>, along: Span, y: Span, [near, far]: Span, paint: Paint| match face {
+            Face::Front(_) => s.cuboid(along, y, [z[1] - far, z[1] - near], paint),
+            Face::Left => s.cuboid([x[0] + near, x[0] + far], y, along, paint),
+            Face::Right => s.cuboid([x[1] - far, x[1] - near], y, along, paint),
+        };
+    let (split, grip) = (between(y, 0.0, 0.77)[1], STEEL);
+    plate(s, span, [split, y[1]], [0.003, 0.015], door.of(MaterialKind::Drawer));
+    plate(
+        s,
+        span,
+        [split - 0.012, split],
+        [0.0045, 0.015],
+        shade(door, 0.3).of(MaterialKind::Smooth),
+    );
+    let middle = 0.5 * (split + y[1]);
+    plate(s, between(span, 0.3, 0.7), [middle - 0.009, middle + 0.009], [0.0, 0.004], grip);
+    let upright = [split - 0.2, split - 0.05];
+    plate(s, between(span, 0.86, 0.9), upright, [0.0, 0.006], grip);
 }
 
 /// Draw a fridge: a shell with shelves, closed by two doors over each other.
@@ -107,6 +139,11 @@ pub fn fridge(s: &mut Sketch<'_>) {
     }
     let split = 0.68 * h;
     s.detail("door", 2);
+    s.trim(|s| {
+        // The gap between the doors, and the grille under them.
+        s.cuboid(x, [split - 0.012, split + 0.012], [z[1] - 0.112, z[1] - 0.07], shade(steel, 0.2));
+        s.cuboid(inside(x, 0.02), [0.0, 0.05], [z[1] - 0.11, z[1] - 0.08], shade(steel, 0.25));
+    });
     for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
         let pivot_m = [x[1], 0.0, z[1] - 0.06];
         s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: FRAC_PI_2 }, |s| {
@@ -115,7 +152,14 @@ pub fn fridge(s: &mut Sketch<'_>) {
             let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
             let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
             s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
-            s.trim(|s| s.pad(x, y, [z[1] - 0.1, z[1] - 0.052], 0.008, door));
+            s.trim(|s| {
+                s.pad(x, y, [z[1] - 0.1, z[1] - 0.052], 0.008, door);
+                // Two brackets and a bar.
+                for end in ends([low, low + reach], 0.04, 0.0) {
+                    s.cuboid(handle, end, [z[1] - 0.055, z[1]], shade(grip, 0.7));
+                }
+                s.pad(handle, [low, low + reach], [z[1] - 0.02, z[1]], 0.008, shade(steel, 0.8));
+            });
         });
     }
 }

@@ -35,6 +35,12 @@ pub fn chair(s: &mut Sketch<'_>) {
         s.cuboid(inside(x, 0.08 * w), [seat - 0.06, seat], between(z, 0.08, 0.95), cushion);
         s.cuboid(inside(x, 0.12 * w), [seat + 0.1, h], [z[0] + 0.02 * d, z[0] + 0.12 * d], cushion);
         s.cuboid(between(x, 0.46, 0.54), [seat - 0.05, seat + 0.2], back, DARK);
+        s.trim(|s| {
+            let padded = [z[0] + 0.02 * d, z[0] + 0.12 * d + 0.025];
+            s.pad(inside(x, 0.12 * w), [seat + 0.1, h], padded, 0.02, cushion);
+            let plump = [seat - 0.06, seat + 0.025];
+            s.pad(inside(x, 0.07 * w), plump, between(z, 0.07, 0.96), 0.025, cushion);
+        });
         s.detail("swivel base", 1);
         return;
     }
@@ -54,10 +60,28 @@ pub fn chair(s: &mut Sketch<'_>) {
         let rise = h - seat;
         s.cuboid(inner, [h - 0.25 * rise, h], back, wood);
         s.cuboid(inner, [seat + 0.35 * rise, seat + 0.5 * rise], back, wood);
+        s.trim(|s| {
+            for i in 0..4 {
+                let bar = between(piece(inner, i, 4), 0.4, 0.6);
+                s.cuboid(bar, [seat, h], between(back, 0.3, 0.7), shade(wood, 0.9));
+            }
+        });
     } else {
         s.detail("solid back", 1);
         s.cuboid(inner, [seat + 0.15 * (h - seat), h], back, cushion);
+        let tall = [seat + 0.18 * (h - seat), h - 0.02];
+        s.trim(|s| s.pad(inner, tall, [back[1], back[1] + 0.02], 0.015, cushion));
     }
+    s.trim(|s| {
+        // Rungs between the legs, an apron under the seat and a top rail.
+        for side in [left, right] {
+            let rung = between(side, 0.25, 0.75);
+            s.cuboid(rung, [0.38 * seat, 0.38 * seat + 0.02], inside(z, leg), shade(wood, 0.85));
+        }
+        let apron = [seat - 0.075, seat - 0.04];
+        s.rim([inside(x, 0.012), apron, inside(z, 0.012)], [0, 2], 0.015, shade(wood, 0.8));
+        s.pad(x, [h - 0.05, h], [back[0], back[1] + 0.01], 0.01, shade(wood, 1.1));
+    });
     if w > 0.58 && h > 0.7 {
         s.detail("armrest", 2);
         let arm = seat + 0.45 * (h - seat);
@@ -115,6 +139,25 @@ pub fn sofa(s: &mut Sketch<'_>) {
     let count = (if is_sofa { (w / 0.8).round() } else { 1.0 }).clamp(1.0, 4.0) as usize;
     s.detail("seat cushion", count);
     s.detail("armrest", 2);
+    s.trim(|s| {
+        // Rolled arms, a roll along the back, and shadows under and between the cushions.
+        let [cap, roll] = [[arm_top - 0.07, arm_top + 0.03], [h - 0.09, h]];
+        s.pad([left[0], left[1] + 0.015], cap, z, 0.03, shade(fabric, 1.05));
+        s.pad([right[0] - 0.015, right[1]], cap, z, 0.03, shade(fabric, 1.05));
+        s.pad(inner, roll, [back[0], back[1] + 0.015], 0.03, shade(fabric, 1.05));
+        let dark = shade(fabric, 0.4);
+        s.cuboid(inner, [seat - pad - 0.014, seat - pad], [back[1], front - 0.01], dark);
+        s.cuboid(inner, [foot, foot + 0.012], [back[1], front - 0.015], dark);
+        for i in 1..count {
+            let seam = piece(inner, i, count)[0];
+            let tall = [seat - pad, seat + 0.012];
+            s.cuboid([seam - 0.007, seam + 0.007], tall, [back[1], front + 0.015], dark);
+        }
+        if !is_sofa {
+            let lean = [seat, seat + 0.88 * (h - seat)];
+            s.pad(inside(inner, 0.01), lean, [back[1], back[1] + 0.04], 0.03, soft);
+        }
+    });
     for i in 0..count {
         let cushion = inside(piece(inner, i, count), 0.006);
         s.cuboid(cushion, [seat - pad, seat], [back[1], front], soft);

@@ -60,6 +60,15 @@ pub fn table(s: &mut Sketch<'_>) {
         for z in ends(z, 0.02, 0.5 * thick) {
             s.cuboid(inside(x, thick), [h - top - apron, h - top], z, support);
         }
+        s.trim(|s| {
+            // The apron along the sides, and the shadow and the edge of the top.
+            let y = [h - top - apron, h - top];
+            for x in ends(x, 0.02, 0.5 * thick) {
+                s.cuboid(x, y, inside(z, 0.5 * thick), support);
+            }
+            let shadow = [h - top - 0.008, h - top + 0.001];
+            s.rim([inside(x, 0.004), shadow, inside(z, 0.004)], [0, 2], 0.03, shade(support, 0.4));
+        });
     }
     for level in s.levels() {
         if level > 0.04 && level < h - 0.06 {
