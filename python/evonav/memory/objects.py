@@ -1,6 +1,7 @@
 """Merge detections into lasting object entries: the object map."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav._core import House, ObjectEntry
 from evonav.counted import counted
+from evonav.memory.presence import DepthEvidence, EvidenceConfig
 from evonav.sensors.observation import View
 
 if TYPE_CHECKING:  # agents start fast, and few draw
@@ -194,6 +196,29 @@ class ObjectMap:
         """
         compared = self._map.compare(entry_id, view)
         return Comparison(overlap=compared[:, 0], distance_m=compared[:, 1])
+
+    def depth_evidence(
+        self, entry_ids: Sequence[int], view: View, config: EvidenceConfig | None = None
+    ) -> list[DepthEvidence]:
+        """Compare the points of entries with a view; the map does not change.
+
+        A point is seen through if the image shows something farther away at its pixel, occluded if it shows something
+        nearer, and supported if the depths are equal within a band, `max(band_m, band_share * depth)`.
+
+        Args:
+            entry_ids: The entries.
+            view: View with detections, depth, pose and intrinsics.
+            config: Number of points and width of the band.
+
+        Returns:
+            The counts of each entry, in order.
+
+        Raises:
+            InvalidArgumentError: An entry does not exist, the depth image contains NaN, or a parameter is out of
+                range; the message names it.
+        """
+        counts = self._map.depth_evidence(entry_ids, view, config or EvidenceConfig())
+        return [DepthEvidence(a, b, c, d, tuple(by)) for a, b, c, d, *by in counts.tolist()]
 
     def visible_shares(
         self, target_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig | None = None

@@ -7,7 +7,10 @@ use evonav_core::{
     grid::GridSpec,
     memory::{
         frontiers::{FrontierConfig, Frontiers},
-        objects::{DetectedView, ObjectMap, ObjectMapConfig, sight_lines::SightConfig},
+        objects::{
+            DetectedView, ObjectMap, ObjectMapConfig, depth_evidence::EvidenceConfig,
+            sight_lines::SightConfig,
+        },
         occupancy::OccupancyMap,
     },
     sensors::{camera::Camera, unproject::MaskedDepth, visible_cells::visible_cells},
@@ -113,6 +116,11 @@ fn bench_objects(c: &mut Criterion) {
     let sight = SightConfig::default();
     c.bench_function("objects/visible_shares_20_eyes_100_entries", |b| {
         b.iter(|| map.visible_shares(black_box(target), &eyes, &sight).expect("valid places"));
+    });
+    let ids: Vec<u64> = map.entries().iter().map(|entry| entry.id).collect();
+    let evidence = EvidenceConfig::default();
+    c.bench_function("objects/depth_evidence_100_entries", |b| {
+        b.iter(|| map.depth_evidence(black_box(&ids), image, 20, &evidence).expect("known ids"));
     });
     // As many views as fill the map: the next one is due for a clean-up.
     let due = full_map(ObjectMapConfig { views_per_cleanup: 401, ..config });

@@ -96,6 +96,6 @@ pub fn unproject_masks(
     Ok(clouds)
 }
 
-fn has_depth(depth_m: f32) -> bool {
+pub(crate) fn has_depth(depth_m: f32) -> bool {
     depth_m > 0.0 && depth_m < f32::INFINITY
 }

@@ -1,7 +1,8 @@
-//! Occupancy maps, object entries, sight lines and snapshots.
+//! Occupancy maps, object entries, depth evidence, sight lines and snapshots.
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod depth_evidence;
 mod masks;
 mod objects;
 mod occupancy;

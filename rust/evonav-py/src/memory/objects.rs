@@ -2,7 +2,10 @@
 
 use evonav_core::{
     Error,
-    memory::objects::{self, DetectedView, Entry, ObjectMapConfig, sight_lines::SightConfig},
+    memory::objects::{
+        self, DetectedView, Entry, ObjectMapConfig, depth_evidence::EvidenceConfig,
+        sight_lines::SightConfig,
+    },
     sensors::unproject::MaskedDepth,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
@@ -129,6 +132,28 @@ impl ObjectMap {
             (arrays::rows("targets_m", &targets_m)?, arrays::rows("eyes_m", &eyes_m)?);
         let shares = py.detach(|| self.0.visible_shares(targets, eyes, &config));
         Ok(PyArray1::from_vec(py, shares.map_err(error::to_py)?))
+    }
+
+    fn depth_evidence<'py>(
+        &self,
+        py: Python<'py>,
+        entry_ids: Vec<u64>,
+        view: View<'py>,
+        config: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let config =
+            arrays::from_attributes!(config, EvidenceConfig { max_points, band_m, band_share });
+        let found = view.detections.extract()?;
+        let view = view.detected(&found)?;
+        let (map, num) = (&self.0, view.labels.len());
+        let found = py.detach(|| map.depth_evidence(&entry_ids, view.image, num, &config));
+        let found = found.map_err(error::to_py)?;
+        let shape = [found.len(), 4 + num];
+        let counts = found.into_iter().flat_map(|e| {
+            let all = [e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view];
+            all.into_iter().chain(e.num_supported_by)
+        });
+        arrays::image_of(py, counts.collect(), shape)
     }
 
     fn begin_stage(&mut self, stage: u32) {

@@ -4,6 +4,7 @@ mod cleaning;
 pub mod cloud;
 mod config;
 pub mod dbscan;
+pub mod depth_evidence;
 mod entry;
 mod object_map;
 pub mod sight_lines;

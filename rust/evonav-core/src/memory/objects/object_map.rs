@@ -12,6 +12,7 @@ use crate::{
         Entry, ObjectMapConfig,
         cleaning::{centroid_m, clean, denoise},
         cloud::Cloud,
+        depth_evidence::{DepthEvidence, EvidenceConfig, depth_evidence},
         entry::Sighting,
         sight_lines::{SightConfig, reach_m, visible_shares},
     },
@@ -166,8 +167,7 @@ impl ObjectMap {
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such entry, or as [`ObjectMap::update`].
     pub fn compare(&self, id: u64, view: &DetectedView<'_>) -> Result<Vec<Comparison>, Error> {
-        let entry =
-            self.entry(id).ok_or_else(|| Error::invalid("entry_id", id, "the id of an entry"))?;
+        let entry = self.known(id)?;
         let centre_m = entry.cloud.bounds_m().centre_m();
         let compare = |sighting: Option<Sighting>| match sighting {
             None => Comparison { overlap: 0.0, distance_m: f64::INFINITY },
@@ -194,6 +194,30 @@ impl ObjectMap {
         let clouds = self.entries.iter().map(|entry| &entry.cloud);
         let near = clouds.filter(|cloud| cloud.bounds_m().intersects(&reach_m));
         visible_shares(near.map(Cloud::points).chain([targets]), targets, eyes, config)
+    }
+
+    /// Compare entries with a view; the map does not change.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such entry, or as [`depth_evidence`].
+    pub fn depth_evidence(
+        &self,
+        ids: &[u64],
+        image: MaskedDepth<'_>,
+        num_detections: usize,
+        config: &EvidenceConfig,
+    ) -> Result<Vec<DepthEvidence>, Error> {
+        let entries = ids.iter().map(|&id| self.known(id)).collect::<Result<Vec<_>, _>>()?;
+        depth_evidence(
+            entries.iter().map(|entry| entry.cloud.points()),
+            image,
+            num_detections,
+            config,
+        )
+    }
+
+    fn known(&self, id: u64) -> Result<&Entry, Error> {
+        self.entry(id).ok_or_else(|| Error::invalid("entry_id", id, "the id of an entry"))
     }
 
     /// Convert detections to clean clouds; `None` for those that are filtered out.
