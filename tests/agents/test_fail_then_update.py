@@ -1,7 +1,9 @@
 """Fail-then-Update's questions on arrival, and what it deletes."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from scripted_model import Scripted
 from toy_episode import rounds_of, run
@@ -41,6 +43,27 @@ def test_fail_then_update_deletes_the_moved_table_on_arrival_and_nothing_else(mo
         assert told[i][2].details["rejected"][-1] == gone
     assert records[2].state is EndState.SUCCESS
     assert not set(removed) & {e.entry_id for e in records[2].entries}
+
+
+def test_fail_then_update_deletes_nothing_where_something_hides_the_place():
+    """A door that opened in front of the camera: the table is not seen, and neither is that it is gone."""
+    agent, stages = FailThenUpdate(), []
+    act, begin_stage = agent.act, agent.begin_stage
+
+    def behind_a_door(view):
+        nothing = replace(view.detections, masks=np.full_like(view.detections.masks, -1))
+        return replace(view, depth_m=np.full_like(view.depth_m, 0.3), detections=nothing)
+
+    def act_in_front_of_a_door(observation):
+        if stages[-1] == 3:
+            observation = replace(observation, views=tuple(map(behind_a_door, observation.views)))
+        return act(observation)
+
+    agent.begin_stage = lambda goal: stages.append(goal.stage) or begin_stage(goal)
+    agent.act = act_in_front_of_a_door
+    last = run(agent, *moved_table_stages())[2]
+    assert (last.stop_reason, last.trace[-1].counters["rejected_entries"]) == ("verified", 0)
+    assert last.trace[-2].chosen_entry.is_stale
 
 
 @pytest.mark.parametrize("meaning", ["yes", "no"])

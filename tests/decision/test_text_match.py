@@ -11,6 +11,7 @@ from evonav.decision.question import AnswerError, Question
 from evonav.decision.text.matcher import Matcher, TextMatch
 from evonav.decision.text.ranking import rank_by_feature, rank_entries
 from evonav.errors import DecisionError
+from evonav.memory.presence import DepthEvidence
 from evonav.tasks.public import Goal
 
 
@@ -93,7 +94,10 @@ def test_the_room_is_told_by_what_stands_in_it():
     assert chosen(model, asked) == by_bed
 
 
-def test_verification_needs_the_label_at_the_place():
+SEEN_THROUGH = DepthEvidence(num_see_through=256)
+
+
+def test_verification_answers_yes_to_the_label_at_the_place():
     model = TextMatch()
     for sighting, is_present in (
         (Sighting("Mug", 0.9, 0.6), True),
@@ -102,9 +106,22 @@ def test_verification_needs_the_label_at_the_place():
         (Sighting("Mug", 0.0, float("inf")), False),
         (Sighting("Bowl", 0.9, 0.0), False),
     ):
-        assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], 0.01)).answer is is_present
-    assert not model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.01)).answer
-    assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.0005)).answer
+        assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], SEEN_THROUGH)).answer is is_present
+
+
+@pytest.mark.parametrize(
+    ("evidence", "is_present", "reason"),
+    [
+        (SEEN_THROUGH, False, "no: of 256 points in view, 256 seen through, 0 on a surface, 0 hidden"),
+        (DepthEvidence(num_supported=256), True, "yes: of 256 points"),
+        (DepthEvidence(num_occluded=256), True, "unknown: of 256 points"),
+        (DepthEvidence(num_out_of_view=256), True, "unknown: of 0 points"),
+    ],
+)
+def test_verification_without_the_label_answers_no_only_if_the_place_is_seen_through(evidence, is_present, reason):
+    reply = TextMatch().answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], evidence))
+    assert reply.answer is is_present
+    assert reason in reply.text
 
 
 def test_entries_are_ranked_by_the_cosine_of_their_features_where_they_have_some() -> None:
@@ -127,7 +144,7 @@ class Ruled(VerifyQuestion):
 
 
 def test_every_question_answers_by_a_rule_of_its_own():
-    reply = TextMatch().answer(Ruled(MUG_GOAL, MUG_ON_TABLE, [], 0.1))
+    reply = TextMatch().answer(Ruled(MUG_GOAL, MUG_ON_TABLE, [], SEEN_THROUGH))
     assert (reply.answer, reply.text) == (True, "yes\nas always")
     with pytest.raises(DecisionError, match="no rule for Unruled: ask a model"):
         TextMatch().answer(Unruled(MUG_GOAL, MUG_ON_TABLE, [], 0.1))

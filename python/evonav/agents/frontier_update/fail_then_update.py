@@ -1,6 +1,7 @@
 """Fail-then-Update (paper, Sec. C.4): Frontier-Update that checks on arrival whether its target is there."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,6 +10,7 @@ from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
 from evonav.decision.candidates import Point3
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
+from evonav.memory.presence import DepthEvidence
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
@@ -66,11 +68,16 @@ class FailThenUpdate(FrontierUpdate):
                 goal=self._goal,
                 entry=navigator.with_images(remembered) if self.sensors.needs_rgb else remembered,
                 seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
-                image_share=image_share(observation.views[-1], entry.centre_m, entry.size_m),
+                evidence=self._evidence(entry_id, observation.views[first:]),
                 views=[image for image in images if image is not None],
             )
         )
         return self._verification.unanswered_means == "yes" if is_present is None else is_present
+
+    def _evidence(self, entry_id: int, views: Sequence[View]) -> DepthEvidence:
+        """Return what the view with the most of an entry's points in it shows of them."""
+        found = [evidence for view in views for evidence in self._navigator.objects.depth_evidence([entry_id], view)]
+        return max(found, key=lambda evidence: evidence.num_in_view)
 
     def _sightings(self, entry_id: int, view: View) -> list[Sighting]:
         compared = self._navigator.objects.compare(entry_id, view)
@@ -99,11 +106,3 @@ class FailThenUpdate(FrontierUpdate):
             for _, label, centre_m in self._rejected
         )
         return times < limit
-
-
-def image_share(view: View, centre_m: tuple[float, float, float], size_m: tuple[float, float, float]) -> float:
-    """Return about how much of an image an object fills: its largest face at the camera's distance, 0..1."""
-    pose, intrinsics = view.pose, view.intrinsics
-    distance_m = max(math.dist(pose.position_m, centre_m), 0.1)
-    edges_px = sorted((edge_m / distance_m * intrinsics.focal_px for edge_m in size_m), reverse=True)
-    return min(1.0, edges_px[0] * edges_px[1] / (intrinsics.width_px * intrinsics.height_px))

@@ -11,6 +11,7 @@ from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion,
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import choose_candidate
+from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.tasks.public import Goal
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
@@ -104,8 +105,8 @@ class VerifyQuestion(YesNoQuestion):
     entry: ObjectCandidate
     seen: Sequence[Sighting]
     """Objects in the present views, for models that do not look at images. Not part of the prompt."""
-    image_share: float
-    """Share of the present view that the remembered object's box would cover if nothing hid it."""
+    evidence: DepthEvidence
+    """Its points compared with the present depth. Not part of the prompt."""
     views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
     """Present views, the facing view last."""
 
@@ -121,12 +122,18 @@ class VerifyQuestion(YesNoQuestion):
         )
 
     def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
-        """Answer yes if something with the entry's label is seen at the entry's place."""
-        label, config = self.entry.label, matcher.config
-        if self.image_share < config.min_image_share:
-            return True, "too small to be told from here"
-        for seen in self.seen:
-            is_here = seen.overlap > config.min_overlap or seen.distance_m < config.same_place_m
-            if is_here and canonical(seen.label) == canonical(label):
-                return True, f"{seen.label} seen {seen.distance_m:.2f} m from the remembered middle"
-        return False, f"no {label} seen at the remembered place"
+        """Answer no only if the object's place is seen through, and nothing with its label is detected there."""
+        is_detected = any(self._is_entry(seen, matcher) for seen in self.seen)
+        evidence = self.evidence
+        presence = judge_presence(evidence, is_detected=is_detected)
+        if is_detected:
+            return True, f"{self.entry.label} detected at the remembered place"
+        return presence is not Presence.NO, (
+            f"{presence.value}: of {evidence.num_in_view} points in view, {evidence.num_see_through} seen through, "
+            f"{evidence.num_supported} on a surface, {evidence.num_occluded} hidden"
+        )
+
+    def _is_entry(self, seen: Sighting, matcher: Matcher) -> bool:
+        """Return whether a detection may be of the remembered object."""
+        is_here = seen.overlap > matcher.config.min_overlap or seen.distance_m < matcher.config.same_place_m
+        return is_here and canonical(seen.label) == canonical(self.entry.label)

@@ -69,8 +69,6 @@ class TextMatchConfig:
     """A frontier this near something that the instruction mentions is worth a detour..."""
     lead_m: float = 3.0
     """...of this length."""
-    min_image_share: float = 0.002
-    """Verification: an object that would cover less of the image cannot be missed (detectors give up at 0.001)."""
     same_place_m: float = 0.5
     """Verification: centres this near are the same place."""
     min_overlap: float = 0.2
