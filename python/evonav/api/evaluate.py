@@ -17,7 +17,7 @@ from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunRequest, evaluate_all
+from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import (
     DecisionResources,
@@ -99,8 +99,9 @@ def evaluate(
     model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_workers))
     if decisions.kind != "text":
         check_decision(model, seed)
+    simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
     backend = Backend(
-        simulator=read_settings(SimulatorSettings, "kind", simulator, "simulator").component(),
+        simulator=simulation.component(recorded_backend(folder)),
         perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),
         decision=model,
     )

@@ -20,7 +20,7 @@ from evonav.generation.result import GivenStage
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Control, Task
-from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters, RecordedParameters
 from evonav.tasks.records import Record
 
 NUM_ATTEMPTS = 8
@@ -39,7 +39,7 @@ class ControlledOptions(Record):
     """Tasks a house: the seeds that follow `seed`."""
     rates: tuple[float, ...] = RATES
     """Probabilities of the arms of `rates`."""
-    parameters: GenerationParameters = GenerationParameters()
+    parameters: RecordedParameters = GenerationParameters()
     allow_unknown_assets: bool = False
 
     def model_post_init(self, _context: object) -> None:

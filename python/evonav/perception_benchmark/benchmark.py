@@ -13,7 +13,7 @@ from evonav._core import __version__
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.components import EMBEDDED, Backend
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
@@ -94,7 +94,7 @@ def measure(
     out: Path,
     *,
     config: TourConfig | None = None,
-    simulator: str = "evonav.evaluation.run.components:embedded_simulator",
+    simulator: Component[Simulator] = EMBEDDED,
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
 ) -> Measured:
@@ -105,7 +105,7 @@ def measure(
         tasks: Files from `evonav.tasks.listing.task_files`.
         out: Holds `perception.json` and `records/`.
         config: Must be the folder's own if it holds records.
-        simulator: Import path.
+        simulator: The simulator that draws the views.
         num_workers: 0 runs everything in this process.
         on_progress: Called with records there are, records asked for, and the name of the latest.
 
@@ -132,7 +132,7 @@ def measure(
         num_all = len(tasks) * len(specs)
         num_done, failures = num_all - len(jobs), []
         on_progress(num_done, num_all, "")
-        settings = json.dumps({"config": asdict(config), "simulator": simulator})
+        settings = json.dumps({"config": asdict(config), **simulator.identity("simulator")})
         if jobs:
             with open_pool(WORK, settings, Workforce(min(num_workers, len(jobs))), timeout_s=TASK_TIMEOUT_S) as pool:
                 texts = (
@@ -152,10 +152,14 @@ def measure(
 
 
 def _begun(
-    specs: Sequence[PerceptionSpec], tasks: Sequence[TaskFile], out: Path, config: TourConfig, simulator: str
+    specs: Sequence[PerceptionSpec],
+    tasks: Sequence[TaskFile],
+    out: Path,
+    config: TourConfig,
+    simulator: Component[Simulator],
 ) -> Header:
     """Claim the folder; records of tasks that are others now are dropped."""
-    identity = {"evonav": __version__, "tour": asdict(config), "simulator": simulator}
+    identity = {"evonav": __version__, "tour": asdict(config), **simulator.identity("simulator")}
     there = read_header(out)
     options = {spec.word: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
     digests = {task.task_id: task.digest for task in tasks}
@@ -194,7 +198,7 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
     """Return the function from a job to its record, as `evonav.parallel.pool` calls it."""
     values = json.loads(settings)
     config = TourConfig(**values["config"])
-    simulators: Component[Simulator] = Component(values["simulator"])
+    simulators: Component[Simulator] = Component(values["simulator"], values.get("simulator_options", {}))
     simulator = simulators.create()
 
     def work(text: str) -> str:

@@ -129,19 +129,33 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
     return task_files(folder, tasks.limit, tasks.subset)
 
 
-def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:
+def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResources | None) -> RunConfig:
     """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
+
+    Args:
+        sweep: The file.
+        cell: One of its cells.
+        out: Folder of the sweep. If the sweep has begun, a simulator keeps its style.
+        resources: Files for answers and costs.
 
     Raises:
         EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
     """
     decision = sweep.decisions[cell.decision]
     backend = Backend(
-        simulator=sweep.simulators[cell.simulator].component(),
+        simulator=sweep.simulators[cell.simulator].component(_recorded_backend(out, cell.simulator)),
         perception=sweep.perceptions[cell.perception].component(),
         decision=decision.component(cell.seed, resources),
     )
     return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
+
+
+def _recorded_backend(out: Path, simulator: str) -> Mapping[str, Any] | None:
+    """Return the parts of the runs of a simulator in a sweep that has begun."""
+    if not (out / SWEEP_NAME).exists():
+        return None
+    cells = read_claim(out)["cells"].values()
+    return next((cell["run"]["backend"] for cell in cells if cell["axes"].get("simulator") == simulator), None)
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:
@@ -150,7 +164,7 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
         CellRun(
             cell,
             RunRequest(
-                cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, None)
+                cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, out, None)
             ),
         )
         for cell in cells
@@ -169,7 +183,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
         run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, sweep.num_workers)
     )
     try:
-        config = config_of(sweep, run.cell, resources)
+        config = config_of(sweep, run.cell, out, resources)
         check_decision(config.backend.decision, run.cell.seed)
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error

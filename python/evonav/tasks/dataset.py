@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 from evonav.errors import StoreError, TaskError
 from evonav.parallel.folders import write_atomically
 from evonav.tasks.manifest import Task, TaskId
-from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.parameters import RecordedParameters
 from evonav.tasks.records import Id, Record, Sha256, field_error, parse_record, read_file, record_bytes, sha256_of
 
 DATASET_NAME = "dataset.json"
@@ -81,7 +81,7 @@ class DatasetRecord(Record):
     subset: Id | None
     """Named subset that the tasks are limited to (`evonav.tasks.subsets`)."""
     allow_unknown_assets: bool
-    parameters: GenerationParameters
+    parameters: RecordedParameters
     num_houses: NonNegativeInt
     """Number of houses read: `num_tasks` and the rejections."""
     num_tasks: NonNegativeInt

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.parameters import RecordedParameters
 from evonav.tasks.public import Goal
 from evonav.tasks.records import Id, PoseRecord, Record, Sha256, record_bytes, sha256_of
 from evonav.world.pose import Pose
@@ -67,7 +67,7 @@ class TaskHeader(Record):
     num_stages: Annotated[int, Field(ge=1, le=64)]
     house: HouseSource
     start_pose: PoseRecord
-    parameters: GenerationParameters
+    parameters: RecordedParameters
     checksums: dict[str, Sha256]
     """Checksum of each file's contents: JSON as it is, `.gz` uncompressed, `.png` its RGB values row by row."""
     control: Control | None = None

@@ -47,6 +47,8 @@ Style = Literal["outlined", "plain", "default"]
 `outlined`: flat colours with dark corners, and thin lines around silhouettes: clear to people. `plain`: without the
 lines, the cheapest. `default`: lit surfaces with smooth edges, for detectors and models that know photographs.
 """
+OUTLINED: Style = "outlined"
+"""The style of files that name none: runs and tasks were made in it before there were several."""
 
 
 @dataclass(frozen=True, slots=True)

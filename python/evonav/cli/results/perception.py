@@ -66,9 +66,10 @@ def perception(
 
     Every perception sees the same views. Run again to resume. Writes report.html, summary.json, .csv and .md.
     """
-    from evonav.evaluation.run.settings import PerceptionSettings
+    from evonav.evaluation.run.settings import PerceptionSettings, SimulatorSettings
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
+    from evonav.perception_benchmark.records import read_header
     from evonav.perception_benchmark.tables import perception_tables
 
     names = perceptions or ["gt"]
@@ -78,7 +79,8 @@ def perception(
     for word in names:
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
-    name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
+    there = read_header(out)
+    simulation = SimulatorSettings(allow_unknown_assets=allow_unknown_assets)
     with interruptible(out), chosen_tasks(tasks or old_tasks, limit, subset) as task_files:
         with progress_bar("tours") as on_progress:
             measured = measure(
@@ -86,7 +88,7 @@ def perception(
                 task_files,
                 out,
                 config=TourConfig(views_per_room, houses_per_task, seed),
-                simulator=f"evonav.evaluation.run.components:{name}",
+                simulator=simulation.component(None if there is None else there.identity),
                 num_workers=workers.num_workers,
                 on_progress=on_progress,
             )

@@ -129,14 +129,16 @@ def evaluate(
     Results go to FOLDER/runs/ARM. Run again with other agents to add them.
     """
     from evonav.controlled.evaluate import evaluate_controlled
-    from evonav.controlled.layout import read_controlled
+    from evonav.controlled.layout import read_controlled, run_of
     from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import recorded_backend
     from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
     num_workers = local_run.num_workers
+    simulation = SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets)
     backend = Backend(
-        simulator=SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets).component(),
+        simulator=simulation.component(recorded_backend(run_of(directory, record.arms[0].name))),
         perception=perception.component(),
         decision=decision_component(decisions, spending, directory, seed, num_workers),
     )

@@ -82,7 +82,7 @@ def evaluate(
     OUT`.
     """
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunRequest, evaluate_all
+    from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
@@ -95,7 +95,7 @@ def evaluate(
         run = run.model_copy(update={"workers": 0, "in_process": True})
     workforce = run.workforce()
     backend = Backend(
-        simulator=simulation.component(),
+        simulator=simulation.component(recorded_backend(out)),
         perception=perception.component(),
         decision=decision_component(decisions, spending, out, seed, run.num_workers, dry_run=dry_run),
     )

@@ -16,10 +16,19 @@ from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import check_importable
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
-from evonav.world.simulator import Simulator, SimulatorConfig
+from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
-EMBEDDED: Component[Simulator] = Component("evonav.evaluation.run.components:embedded_simulator")
+
+
+def drawn_in(style: Style) -> dict[str, Style]:
+    """Return the options of a simulator that draws in a style; headers of runs without one mean `outlined`."""
+    return {} if style == OUTLINED else {"style": style}
+
+
+EMBEDDED: Component[Simulator] = Component(
+    "evonav.evaluation.run.components:embedded_simulator", drawn_in(SimulatorConfig().style)
+)
 TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
 TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
 HEADER_KEYS = {"cases": "tasks", "simulator": "simulator", "perception": "perception", "decision": "decision"}
@@ -166,18 +175,18 @@ def load_case(path: Path) -> EpisodeSpec:
     return episode_spec(load_task(path))
 
 
-def embedded_simulator(**camera: Any) -> Simulator:  # noqa: ANN401 - fields of `SimulatorConfig`
-    """Make evonav's own simulator, with AI2-THOR's defaults."""
+def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `SimulatorConfig`
+    """Make evonav's own simulator, with AI2-THOR's defaults; headers of runs without a style mean `outlined`."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(SimulatorConfig(**camera))
+    return EmbeddedSimulator(SimulatorConfig(style=style, **camera))
 
 
-def lenient_simulator(**camera: Any) -> Simulator:  # noqa: ANN401 - fields of `SimulatorConfig`
+def lenient_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `SimulatorConfig`
     """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(SimulatorConfig(**camera), allow_unknown_assets=True)
+    return EmbeddedSimulator(SimulatorConfig(style=style, **camera), allow_unknown_assets=True)
 
 
 def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - fields of `Ai2ThorOptions`

@@ -1,7 +1,7 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -34,6 +34,7 @@ __all__ = [
     "evaluate",
     "evaluate_all",
     "perception_seed",
+    "recorded_backend",
     "run_identity",
 ]
 
@@ -263,6 +264,19 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
         "num_tasks": len(tasks),
     }
+
+
+def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
+    """Return what the header of the run in a folder says of its parts (`Backend.identity`); `None` without a run.
+
+    Raises:
+        StoreError: The run cannot be read.
+    """
+    if not (run_dir / FILE_NAME).is_file():
+        return None
+    with RunStore(run_dir) as store:
+        config = store.meta("config")
+    return config.get("backend") if isinstance(config, dict) else None
 
 
 def _claim_models(store: RunStore, request: RunRequest) -> None:

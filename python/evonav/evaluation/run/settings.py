@@ -5,6 +5,7 @@ Sweep files are validated by these models, and the command derives its options f
 """
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,10 +17,11 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.run.components import drawn_in
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
-from evonav.world.simulator import Simulator, Style
+from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
@@ -44,7 +46,7 @@ class SimulatorSettings(Settings):
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     style: Style | None = None
-    """Embedded: the way in which colours are drawn: outlined, plain or default. Default: outlined."""
+    """Embedded: style of colours: outlined, plain or default. Default: outlined; a resumed run keeps its own."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None
@@ -61,8 +63,12 @@ class SimulatorSettings(Settings):
     """AI2-THOR: seconds to wait for an answer before it is restarted; starting may take three times as long.
     Default: 100."""
 
-    def component(self) -> Component[Simulator]:
+    def component(self, recorded: Mapping[str, Any] | None = None) -> Component[Simulator]:
         """Return the component of this simulator; options that are not given keep its own defaults.
+
+        Args:
+            recorded: Header of the parts of a run that is resumed (`recorded_backend`). It keeps its style, unless
+                another is asked for.
 
         Raises:
             SettingError: An option does not apply to the simulator.
@@ -74,10 +80,19 @@ class SimulatorSettings(Settings):
                 raise SettingError(type(self), "style", "is for simulator embedded")
             host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
             return Component(f"{_COMPONENTS}:ai2thor_simulator", given, host_options)
-        style = {key: given.pop(key) for key in ("style",) if key in given}
+        given.pop("style", None)
         if given:
             raise SettingError(type(self), next(iter(given)), "is for simulator ai2thor")
-        return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator", style)
+        path = f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator"
+        return Component(path, self._drawing(path, recorded or {}))
+
+    def _drawing(self, path: str, recorded: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the options of the drawing: without a style, a header says `outlined`."""
+        if recorded.get("simulator") == path:
+            options: Mapping[str, Any] = recorded.get("simulator_options", {})
+            if self.style in (None, options.get("style", OUTLINED)):
+                return options
+        return drawn_in(self.style or SimulatorConfig().style)
 
 
 class PerceptionSettings(Settings):

@@ -57,8 +57,9 @@ def check_physics(
 
 def simulator_of(task: Task, *, allow_unknown_assets: bool) -> EmbeddedSimulator:
     """Return a simulator with the camera of reference images."""
-    side_px = task.header.parameters.reference_image_px
-    config = SimulatorConfig(width_px=side_px, height_px=side_px, vertical_fov_deg=FIELD_OF_VIEW_DEG)
+    parameters = task.header.parameters
+    side_px, style = parameters.reference_image_px, parameters.reference_style
+    config = SimulatorConfig(width_px=side_px, height_px=side_px, vertical_fov_deg=FIELD_OF_VIEW_DEG, style=style)
     return EmbeddedSimulator(config, allow_unknown_assets=allow_unknown_assets)
 
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, generation::Extensions};
+use crate::{Error, generation::Extensions, sensors::raster::Style};
 
 /// Θ (paper, Sec. A.2), and the values that the paper leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,6 +42,9 @@ pub struct Parameters {
     pub reference_max_m: f64,
     /// Edge length of the reference image.
     pub reference_image_px: usize,
+    /// Way in which the reference image is drawn.
+    #[serde(default = "Style::of_older_files")]
+    pub reference_style: Style,
     /// Smallest number of pixels of a visible target.
     pub reference_min_visible_px: usize,
     /// Distance beyond which a moved object is relocated.
@@ -74,6 +77,7 @@ impl Default for Parameters {
             reference_min_m: 1.0,
             reference_max_m: 1.5,
             reference_image_px: 300,
+            reference_style: Style::default(),
             reference_min_visible_px: 50,
             relocated_min_m: 0.1,
             placement_tries: 100,

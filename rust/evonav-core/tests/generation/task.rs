@@ -9,13 +9,13 @@ use evonav_core::{
     assets::{Catalogue, part::Part, placement_rule::Place},
     generation::{
         AssetGroup, Mode, Parameters, asset_groups,
-        record::{EvolutionOutcome, GeneratedStage},
+        record::{EvolutionOutcome, GeneratedStage, GeneratedTask},
     },
     geometry::{Vec2, Vec3, polygon_contains, sub},
     house::House,
     sensors::{
-        camera::Camera,
-        raster::{FrameBuffer, Style, Want, render},
+        camera::{Camera, View},
+        raster::{FrameBuffer, Light, Style, Want, render_lit},
     },
     world::{mesh::SceneMesh, scene::Scene},
 };
@@ -256,8 +256,9 @@ fn rooms_from(house: &House, start: Vec3) -> BTreeSet<usize> {
 #[test]
 fn references_show_the_target_from_its_room_at_the_reference_distance() {
     for house in houses() {
-        for seed in 0..4 {
-            let task = generate(&house, seed, &Parameters::default());
+        for (seed, reference_style) in (0..4).zip([Style::Outlined, Style::Default].repeat(2)) {
+            let parameters = Parameters { reference_style, ..Parameters::default() };
+            let task = generate(&house, seed, &parameters);
             let mut end: Option<Vec3> = None;
             for ((stage, house), image) in
                 task.stages.iter().zip(stage_houses(&task)).zip(&task.images)
@@ -294,8 +295,10 @@ fn references_show_the_target_from_its_room_at_the_reference_distance() {
                     horizon_rad: pose.horizon_deg.to_radians(),
                 };
                 let mut frame = FrameBuffer::default();
-                let want = Want { rgb: Some(Style::default()), instances: true };
-                render(&SceneMesh::build(&scene), &camera, want, &mut frame).unwrap();
+                let (mesh, style) = (SceneMesh::build(&scene), reference_style);
+                let light = (style == Style::Default).then(|| Light::build(&house, &scene, &mesh));
+                let want = Want { rgb: Some(style), instances: true };
+                render_lit(&mesh, light.as_ref(), &View::from(camera), want, &mut frame).unwrap();
                 let body = scene.bodies.iter().position(|b| b.id == stage.target.id).unwrap() + 1;
                 let count = frame.instances.iter().filter(|&&id| id == body as i32).count();
                 assert_eq!(count, stage.reference_visible_px);
@@ -304,6 +307,24 @@ fn references_show_the_target_from_its_room_at_the_reference_distance() {
             }
         }
     }
+}
+
+#[test]
+fn the_style_of_reference_images_changes_only_them() {
+    let house = &houses()[0];
+    let [flat, lit] = [Style::Outlined, Style::Default].map(|reference_style| {
+        generate(house, 0, &Parameters { reference_style, ..Parameters::default() })
+    });
+    assert!(flat.images.iter().zip(&lit.images).all(|(a, b)| a != b));
+    assert_eq!(GeneratedTask { images: vec![], ..flat }, GeneratedTask { images: vec![], ..lit });
+}
+
+#[test]
+fn parameters_without_a_style_are_of_outlined_images() {
+    let json = Parameters::default().to_json();
+    let named = ["outlined", "default"].map(|name| format!(",\"reference_style\":\"{name}\""));
+    let older = named.iter().fold(json, |text, name| text.replace(name, ""));
+    assert_eq!(Parameters::from_json(&older).unwrap().reference_style, Style::Outlined);
 }
 
 #[test]

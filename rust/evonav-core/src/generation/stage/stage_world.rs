@@ -1,5 +1,7 @@
 //! The world of one stage, and reference views of goals in it.
 
+use std::cell::OnceCell;
+
 use crate::{
     Error,
     assets::{Catalogue, UnknownAssets},
@@ -12,8 +14,8 @@ use crate::{
     house::House,
     rng::Stream,
     sensors::{
-        camera::Camera,
-        raster::{FrameBuffer, Style, Want, render, visible_px},
+        camera::{Camera, View},
+        raster::{FrameBuffer, Light, Style, Want, render_lit, visible_px},
     },
     world::{
         layout::{Layout, rounding::round_to},
@@ -41,6 +43,7 @@ pub struct StageWorld {
     /// Free space of the agent.
     pub navigation: Navigation,
     mesh: SceneMesh,
+    light: OnceCell<Light>,
 }
 
 /// The rooms and objects that can be reached.
@@ -89,7 +92,7 @@ impl StageWorld {
             Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default())?;
         let mesh = SceneMesh::build(&scene);
         let layout = Layout::new(&house, catalogue, unknown, scene)?;
-        Ok(Self { house, layout, navigation, mesh })
+        Ok(Self { house, layout, navigation, mesh, light: OnceCell::new() })
     }
 
     /// Return the positions of AI2-THOR's grid that can be reached from `from_m`, each with its
@@ -186,22 +189,30 @@ impl StageWorld {
             let Some(path_m) = self.navigation.shortest_path(start_m, position) else {
                 return Ok(Err(GoalRejection::Unreachable));
             };
-            render(
-                &self.mesh,
-                &camera,
-                Want { rgb: Some(Style::default()), instances: true },
-                frame,
-            )?;
+            // Words for colours come from flat ones, so they are the same whatever the image's style.
+            self.draw(&camera, Style::Outlined, frame)?;
             let appearance = appearance_of(
                 &self.layout.items[index].asset,
                 self.house.objects[index].condition(),
                 frame,
                 body as i32 + 1,
             );
+            if parameters.reference_style != Style::Outlined {
+                self.draw(&camera, parameters.reference_style, frame)?;
+            }
             let image = std::mem::take(&mut frame.rgb);
             return Ok(Ok(Reference { pose, visible_px, appearance, image, path_m }));
         }
         Ok(Err(GoalRejection::NotVisible))
+    }
+
+    /// Draw colours and instances, in the light of the house where the style wants it.
+    fn draw(&self, camera: &Camera, style: Style, frame: &mut FrameBuffer) -> Result<(), Error> {
+        let light = (style == Style::Default).then(|| {
+            self.light.get_or_init(|| Light::build(&self.house, &self.layout.scene, &self.mesh))
+        });
+        let want = Want { rgb: Some(style), instances: true };
+        render_lit(&self.mesh, light, &View::from(*camera), want, frame)
     }
 }
 

@@ -1,9 +1,12 @@
 //! The ways in which colours are drawn.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Error;
 
 /// A way to draw colours. Depth and instances do not depend on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Style {
     /// Flat colours with dark corners, and thin lines around silhouettes: clear to people.
     #[default]
@@ -18,6 +21,11 @@ impl Style {
     /// All styles with their names.
     pub const NAMES: [(&str, Self); 3] =
         [("outlined", Self::Outlined), ("plain", Self::Plain), ("default", Self::Default)];
+
+    /// Return the style of files that were written before there were several.
+    pub const fn of_older_files() -> Self {
+        Self::Outlined
+    }
 
     /// Return the style of a name.
     ///
