@@ -9,8 +9,10 @@ mod object_asset;
 pub mod part;
 pub mod placement_rule;
 pub mod shapes;
+mod surface_choices;
 
 pub use asset::{Asset, Split};
 pub use catalogue::Catalogue;
 pub use material_names::kind_of_name;
 pub use object_asset::UnknownAssets;
+pub use surface_choices::SurfaceChoices;

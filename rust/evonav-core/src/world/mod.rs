@@ -1,5 +1,6 @@
 //! A house instantiated: bodies in the world frame, navigation, layouts of objects, and inspection.
 
+pub mod appearance;
 pub mod footprint;
 pub mod inspection;
 pub mod layout;

@@ -12,6 +12,7 @@ use evonav_core::{
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
+        appearance::Appearance,
         layout::{SpawnRequest, random_spawn, settled},
         navigation::{self, AgentBody},
         scene::{Body, BodyKind, OrientedBox, Scene},
@@ -118,6 +119,17 @@ impl PyEmbeddedSimulator {
     fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
         let delta: HouseDelta = HouseDelta::from_json(delta_json).map_err(error::to_py)?;
         py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
+    }
+
+    /// Return the same house in a random look (a list of changes, JSON).
+    fn with_look(&self, py: Python<'_>, changes_json: &str) -> PyResult<Self> {
+        py.detach(|| self.core.with_look(&Appearance::from_json(changes_json)?))
+            .map(Self::from)
+            .map_err(error::to_py)
+    }
+
+    fn num_materials(&self) -> usize {
+        self.core.num_materials()
     }
 
     fn house_json(&self) -> String {

@@ -28,7 +28,7 @@ const SKY: [u8; 3] = [190, 215, 235];
 /// open door, 9 would be inside a leaf on the other side and none inside a leaf on this side.
 /// Double doors have a leaf at each jamb. A single door has its hinge at the first jamb; neither
 /// files nor positions show which one it is.
-pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
+pub(crate) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);
     let finish = |index: usize, otherwise: [u8; 3]| {

@@ -31,6 +31,8 @@ pub(in crate::sensors::raster) struct FaceLight {
     /// Columns and rows, 2 or more.
     size: [u16; 2],
     first: u32,
+    /// Index of the space before the face, if its light is that of a space.
+    space: Option<u32>,
 }
 
 /// The light on all faces. A point has the light without the sun, by channel, and the share of
@@ -55,6 +57,23 @@ impl Field {
         for part in mesh.parts.iter().chain(&mesh.trim) {
             for index in part.faces.clone() {
                 field.faces[index] = baker.bake(part, index, &mut field.points);
+            }
+        }
+        field
+    }
+
+    /// Return the light times factors, by channel, of each space.
+    pub fn tinted(&self, tint: impl Fn(usize) -> [f32; 3]) -> Self {
+        let mut field = self.clone();
+        let num_spaces = self.faces.iter().filter_map(|face| face.space).max().map_or(0, |i| i + 1);
+        let tints: Vec<[f32; 3]> = (0..num_spaces as usize).map(tint).collect();
+        for face in &self.faces {
+            let Some(space) = face.space else { continue };
+            let [red, green, blue] = tints[space as usize];
+            let num_points = usize::from(face.size[0]) * usize::from(face.size[1]);
+            for point in &mut field.points[face.first as usize..][..num_points] {
+                let [r, g, b, slope] = *point;
+                *point = [r * red, g * green, b * blue, slope];
             }
         }
         field
@@ -125,7 +144,7 @@ impl Baker<'_> {
         let space = self.sources.space_at(ahead(middle_m));
         if self.mesh.skins[index].material.kind.glows() {
             points.extend([[GLOW, GLOW, GLOW, 0.0]; 4]);
-            return FaceLight { axes: [row_of(0), row_of(1)], size: [2, 2], first };
+            return FaceLight { axes: [row_of(0), row_of(1)], size: [2, 2], first, space: None };
         }
         if is_round {
             let lights = corners.iter().zip(&normals).map(|(&i, &normal)| {
@@ -148,7 +167,8 @@ impl Baker<'_> {
             self.keep_sunny(&mut points[first as usize..], size, origin_m, axes, size_m);
         }
         let size = size.map(|num| num as u16);
-        FaceLight { axes: [row_of(0), row_of(1)], size, first }
+        let space = space.map(|index| index as u32);
+        FaceLight { axes: [row_of(0), row_of(1)], size, first, space }
     }
 
     /// Return the normal of a rounded part at a corner of a face: the mean of the faces there that

@@ -8,20 +8,27 @@ mod field;
 mod sources;
 mod sun;
 
+use std::sync::Arc;
+
 use crate::{
     geometry::Aabb,
     house::House,
-    world::{mesh::SceneMesh, scene::Scene},
+    world::{appearance::Lighting, mesh::SceneMesh, scene::Scene},
 };
 
 use field::Field;
 pub(super) use sun::Sun;
 
+/// Sunlight, times the lamps' and the sky's.
+const SUNLIGHT: [f32; 4] = [1.25, 1.18, 1.05, 0.0];
+
 /// The light in a house.
 #[derive(Debug, Clone)]
 pub struct Light {
     pub(super) field: Field,
-    pub(super) sun: Sun,
+    pub(super) sun: Arc<Sun>,
+    /// Strength of the sunlight, by channel; the last number is 0.
+    pub(super) sunlight: [f32; 4],
 }
 
 impl Light {
@@ -38,6 +45,19 @@ impl Light {
         let contact = contact::Contact::of(scene, mesh, &bounds);
         let sun = Sun::build(sources.sun_direction(), mesh, &bounds);
         let field = Field::build(scene, mesh, &sources, &contact, &sun);
-        Self { field, sun }
+        Self { field, sun: Arc::new(sun), sunlight: SUNLIGHT }
+    }
+
+    /// Return the light with random factors, which are drawn for each group of connected rooms.
+    ///
+    /// # Complexity
+    /// O(points of the light): a small part of what [`Self::build`] takes.
+    pub fn varied(&self, lighting: &Lighting) -> Self {
+        let [red, green, blue] = lighting.sun();
+        Self {
+            field: self.field.tinted(|space| lighting.room(space)),
+            sun: Arc::clone(&self.sun),
+            sunlight: [red * SUNLIGHT[0], green * SUNLIGHT[1], blue * SUNLIGHT[2], 0.0],
+        }
     }
 }

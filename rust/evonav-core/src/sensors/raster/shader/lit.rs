@@ -22,8 +22,6 @@ use crate::{
 /// Colour behind windows and missing walls.
 const SKY: [u8; 3] = [204, 222, 236];
 
-/// Sunlight, times the lamps' and the sky's.
-const SUN: [f32; 3] = [1.25, 1.18, 1.05];
 /// Darkness of corners, most of which is in the light.
 const SHADES: Shades = Shades { corner: 0.24, line: None };
 /// Light in views without a house around them.
@@ -195,7 +193,7 @@ impl Shot<'_> {
     /// * `share` - one over the number of pixels between the places.
     #[inline(always)]
     fn light_between(&self, pixel: [usize; 2], ends: [&[f32; 4]; 2], share: f32) -> Wide {
-        let smooth = ramp([rooted(ends[0], 0.0), rooted(ends[1], 0.0)], share);
+        let smooth = ramp([rooted(ends[0], [0.0; 4]), rooted(ends[1], [0.0; 4])], share);
         let Some(light) = self.light.filter(|_| ends[0][3] + ends[1][3] > 0.0) else {
             return smooth;
         };
@@ -204,7 +202,9 @@ impl Shot<'_> {
         if reach == [0.0; LANES] {
             return smooth;
         }
-        let sunny = ramp([rooted(ends[0], ends[0][3]), rooted(ends[1], ends[1][3])], share);
+        let sun = |slope: f32| light.sunlight.map(|channel| channel * slope);
+        let sunny =
+            ramp([rooted(ends[0], sun(ends[0][3])), rooted(ends[1], sun(ends[1][3]))], share);
         if reach == [1.0; LANES] {
             return sunny;
         }
@@ -227,15 +227,12 @@ fn lanes<T>(row: &[T], first: usize) -> &[T; LANES] {
     row[first..].first_chunk().expect("rows are padded by a block")
 }
 
-/// Return the square root of light and of a share of sunlight, times the exposure, as numbers of
-/// 16 bits.
+/// Return the square root of light and sunlight, times the exposure, as numbers of 16 bits.
 #[inline(always)]
-fn rooted(light: &[f32; 4], slope: f32) -> [f32; 4] {
-    let [red, green, blue] = SUN;
-    let sun = [red, green, blue, 0.0];
+fn rooted(light: &[f32; 4], sun: [f32; 4]) -> [f32; 4] {
     let mut rooted = [0.0; 4];
     for i in 0..4 {
-        let root = (light[i] + sun[i] * slope).max(0.0).sqrt();
+        let root = (light[i] + sun[i]).max(0.0).sqrt();
         rooted[i] = (root * (EXPOSURE * LIGHT)).min(65535.0);
     }
     rooted
