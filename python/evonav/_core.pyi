@@ -482,6 +482,15 @@ class EmbeddedSimulator:
         style: str,
     ) -> EmbeddedSimulator: ...
     def apply(self, delta_json: str) -> EmbeddedSimulator: ...
+    def with_look(self, changes_json: str, *, are_checked: bool) -> EmbeddedSimulator:
+        """Return the same house in a random look (`evonav.world.appearance`); unless checked, unknown names are errors.
+
+        It replaces an earlier look; an empty list is the house's own.
+        """
+
+    def num_materials(self) -> int:
+        """Return the number of materials and assets from which the look's materials were drawn."""
+
     def house_json(self) -> str: ...
     def bodies(self) -> list[tuple[str, str, str, tuple[float, float, float], tuple[float, float, float]]]:
         """Return id, category, kind, centre and size of the box of each body, in instance order."""

@@ -17,6 +17,7 @@ from evonav.evaluation.episode.sensors import map_frame
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import MapFrame, View
 from evonav.sensors.visibility import visible_occupancy
+from evonav.world.appearance import Change, Colors, Lighting, Materials
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, OccupancyGrid, SceneObject, SimulatorConfig, Style
@@ -181,6 +182,57 @@ class Simulator:
         if not paths:
             raise SimulationError(f"no path from {self.pose.position_m} to {target!r}")
         return min(paths, key=lambda path: float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()))
+
+    def randomize(
+        self,
+        *,
+        materials: bool = True,
+        lighting: bool | Lighting = True,
+        colors: bool = False,
+        categories: Sequence[str] | None = None,
+        room_types: Sequence[str] | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Give the house a random look, for training; `reset` and `reset_appearance` give it its own again.
+
+        Only colours change: depth, detections and collisions stay as they are. Each call replaces the look of the one
+        before. `evonav.world.appearance` describes the changes.
+
+        Args:
+            materials: Whether surfaces get other materials of their class: another floor, another sofa's cloth.
+            lighting: Whether rooms and sun get another brightness and colour, or a `Lighting` with its ranges and seed.
+                It is seen in the style `default` alone.
+            colors: Whether surfaces get any colours, like AI2-THOR's `RandomizeColors`.
+            categories: Categories of what gets materials and colours, such as `Sofa` or `Floor`. Default: all.
+            room_types: Types of the rooms in which it is, such as `Kitchen`. Default: all.
+            seed: Seed of the look; equal seeds give equal looks.
+
+        Raises:
+            InvalidArgumentError: The seed, a category or a type of room does not exist.
+
+        Examples:
+            >>> import evonav
+            >>> simulator = evonav.Simulator(evonav.load_houses("bundled")[2])
+            >>> own = simulator.look().rgb
+            >>> simulator.randomize(seed=7)
+            >>> bool((simulator.look().rgb == own).all())
+            False
+            >>> simulator.reset_appearance()
+            >>> bool((simulator.look().rgb == own).all())
+            True
+        """
+        changes: list[Change] = []
+        if materials:
+            changes.append(Materials(seed, categories, room_types))
+        if colors:
+            changes.append(Colors(seed, categories, room_types))
+        if lighting:
+            changes.append(lighting if isinstance(lighting, Lighting) else Lighting(seed))
+        self.embedded.set_appearance(changes)
+
+    def reset_appearance(self) -> None:
+        """Give the house its own look again."""
+        self.embedded.set_appearance(())
 
     def plot(self, path: NDArray[np.float64] | None = None) -> Picture:
         """Draw the house from above, with the agent and what it looks at.

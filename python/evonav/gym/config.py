@@ -3,11 +3,13 @@
 import math
 from typing import Any, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.world.appearance import Change, Colors, Lighting, Materials
 from evonav.world.simulator import Action, SimulatorConfig, Style
 
 ActionMode = Literal["actions", "waypoints"]
@@ -15,6 +17,7 @@ WaypointFrame = Literal["relative", "polar", "start"]
 Reward = Literal["sparse", "spl", "progress"]
 StopMode = Literal["explicit", "automatic"]
 RenderView = Literal["camera", "map"]
+Randomized = Literal["materials", "lighting", "colors"]
 
 ObservationName = Literal[
     "depth",
@@ -77,6 +80,8 @@ class NavConfig(BaseModel):
     success_radius_m: float = Field(ProtocolConfig().success_radius_m, ge=0.01, le=100.0)
     style: Style = SimulatorConfig().style
     """Way in which the colours of `rgb` are drawn: `outlined`, `plain` (the fastest) or `default`."""
+    randomize: tuple[Randomized, ...] = ()
+    """What is drawn anew for each episode: `materials`, `lighting` (seen in the style `default` alone) or `colors`."""
     render_view: RenderView = "camera"
     """Picture that `render` gives: what the agent's `camera` sees, or a `map` of the house with path and target."""
     map_px: int = Field(400, ge=32, le=2048)
@@ -134,6 +139,14 @@ class NavConfig(BaseModel):
         """Smallest number of pixels of an object in `semantic`: that of ground-truth perception."""
         perception = GroundTruthPerception()
         return max(perception.min_area_px, round(perception.min_area_fraction * self.width_px * self.height_px))
+
+    def draw_appearance(self, random: np.random.Generator) -> tuple[Change, ...]:
+        """Draw the look of an episode's house; none if nothing is randomised. `random` itself stays as it is."""
+        if not self.randomize:
+            return ()
+        seed = int(random.spawn(1)[0].integers(2**63))
+        kinds: dict[Randomized, type[Change]] = {"materials": Materials, "colors": Colors, "lighting": Lighting}
+        return tuple(kind(seed=seed) for name, kind in kinds.items() if name in self.randomize)
 
     def has(self, name: str) -> bool:
         """Return whether an observation has a key."""

@@ -25,6 +25,7 @@ from evonav.gym.map_view import MapView
 from evonav.gym.stage import RewardedStage, task_result
 from evonav.gym.worlds import StageWorld, TaskSource, WorldLoader
 from evonav.parallel.local import num_cores
+from evonav.world.appearance import Change
 from evonav.world.pose import Pose
 
 Observations = dict[str, Any]
@@ -42,6 +43,7 @@ class _Episode:
     at: StageWorld
     rewarded: RewardedStage
     results: list[Infos]
+    look: tuple[Change, ...]
     is_over: bool = False
 
 
@@ -254,19 +256,19 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         at = self.loader.get(number, 1)
         # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
-        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start_pose)
+        look = self.config.draw_appearance(random)
+        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start_pose, look)
         self._origins[index] = (*start.position_m, start.yaw_rad, start.horizon_rad)
-        return _Episode(random, number, next_number, at, rewarded, [])
+        return _Episode(random, number, next_number, at, rewarded, [], look)
 
     def _begin_stage(
-        self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose
+        self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose, look: tuple[Change, ...]
     ) -> tuple[RewardedStage, Pose]:
         """Put an agent into a stage; `numbers` are those of this task and the next."""
-        simulator = at.world.entered()
+        simulator = at.world.entered(look)
         start = simulator.enter(pose)
         self._batch.place(index, simulator.core, start, at.world.labels)
-        path_m = self._batch.plan_one(index, at.target_m)
-        if path_m:
+        if path_m := self._batch.plan_one(index, at.target_m):
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
         if self.render_mode is not None and self.config.render_view == "map":
             self._maps[index] = MapView(self.config, at, start)
@@ -285,7 +287,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             episode.is_over = True
             return ended | {"task_result": task_result(episode.results)}
         episode.at = self.loader.get(episode.number, at.stage + 1)
-        episode.rewarded, _ = self._begin_stage(index, (episode.number, episode.next_number), episode.at, end)
+        numbers = (episode.number, episode.next_number)
+        episode.rewarded, _ = self._begin_stage(index, numbers, episode.at, end, episode.look)
         self._has_succeeded[index], self._has_arrived[index] = 1, 0
         return ended
 

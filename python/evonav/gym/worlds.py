@@ -2,6 +2,7 @@
 
 import copy
 from collections import OrderedDict
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +20,7 @@ from evonav.tasks.files import load_task
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import Task
 from evonav.tasks.subsets import subset_roots
+from evonav.world.appearance import Change
 from evonav.world.embedded import EmbeddedSimulator
 
 BYTES_PER_HOUSE_BYTE = 40
@@ -91,9 +93,12 @@ class World:
     labels: NDArray[np.uint8]
     num_bytes: int
 
-    def entered(self) -> EmbeddedSimulator:
-        """Return a simulator of the same house with a pose of its own."""
-        return copy.copy(self.simulator)
+    def entered(self, look: Sequence[Change] = ()) -> EmbeddedSimulator:
+        """Return a simulator of the same house with a pose and a look of its own."""
+        simulator = copy.copy(self.simulator)
+        if look:
+            simulator.set_appearance(look)
+        return simulator
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,6 +86,10 @@ class Engine:
     """Half the height of the last map view, in metres."""
     object_filter: frozenset[str] | None = None
     """Ids of the objects that the metadata lists; `None` for all."""
+    random_seed: int = 0
+    """Seed of the session, by `SetRandomSeed`."""
+    num_randomizations: int = 0
+    """Number of random looks drawn since then."""
     last: Result = field(default_factory=Result)
 
     @property

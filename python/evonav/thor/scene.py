@@ -7,6 +7,7 @@ from itertools import count
 from typing import Any, TypeVar, cast
 
 from evonav.thor.actions.registry import ActionError
+from evonav.world.appearance import Change, with_change
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -30,6 +31,8 @@ class Scene:
         """Number that is unique to this scene and state."""
         self.disabled: dict[str, Document] = {}
         """Objects that were removed, by id."""
+        self.appearance: tuple[Change, ...] = ()
+        """Changes of the house's look, by `RandomizeMaterials` and the like."""
         self._simulator: EmbeddedSimulator | None = None
         self._derived: dict[Callable[[Scene], object], object] = {}
 
@@ -58,6 +61,21 @@ class Scene:
         simulator.apply(delta_json)
         self.begin_edit()
         self.house, self._simulator = json.loads(simulator.house_json), simulator
+
+    def randomize(self, change: Change) -> None:
+        """Change the look of the house, on top of earlier changes."""
+        self._show(with_change(self.appearance, change))
+
+    def restore(self, *kinds: type[Change]) -> None:
+        """Undo the changes of the look of some kinds."""
+        self._show(tuple(change for change in self.appearance if not isinstance(change, kinds)))
+
+    def _show(self, appearance: tuple[Change, ...]) -> None:
+        # The simulator must be another object, because derived data is cached by its identity.
+        simulator = copy.copy(self.simulator)
+        simulator.set_appearance(appearance)
+        self.appearance, self._simulator = appearance, simulator
+        self.mark_changed()
 
     def mark_changed(self) -> None:
         """Record a change of the house, also one that does not change the simulator."""
@@ -92,4 +110,5 @@ class Scene:
     def _built(self, house: Document) -> EmbeddedSimulator:
         simulator = EmbeddedSimulator(self.config, allow_unknown_assets=True)
         simulator.reset(json.dumps(house), name=self.name)
+        simulator.set_appearance(self.appearance, are_checked=True)
         return simulator

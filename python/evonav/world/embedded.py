@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError
+from evonav.world.appearance import Change, changes_json
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
@@ -21,7 +22,7 @@ class EmbeddedSimulator:
     """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second per CPU core.
 
     Angles of poses are canonical (`Pose.canonical`), so a simulator that uses degrees gives the same bits. Calls
-    release the GIL. A pickle contains the house and the pose; the rest is computed again in a few milliseconds.
+    release the GIL. A pickle contains the house, its look and the pose; the rest is computed again in milliseconds.
 
     Examples:
         >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
@@ -49,9 +50,10 @@ class EmbeddedSimulator:
         self._house_name = "house"
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._objects: tuple[SceneObject, ...] | None = None
+        self._appearance: tuple[Change, ...] = ()
 
     def reset(self, house: str | _core.House, pose: Pose | None = None, *, name: str | None = None) -> Pose:
-        """Load a house; the agent stands at `pose`, or at the house's own start.
+        """Load a house in its own look; the agent stands at `pose`, or at the house's own start.
 
         If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
@@ -85,6 +87,7 @@ class EmbeddedSimulator:
             allow_unknown_assets=self.allow_unknown_assets,
             style=self.config.style,
         )
+        self._appearance = ()
         return self._enter(core, pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
@@ -107,6 +110,40 @@ class EmbeddedSimulator:
     def enter(self, pose: Pose | None = None) -> Pose:
         """Put the agent at `pose`, as `reset` does, in the current house."""
         return self._enter(self._world, pose)
+
+    @property
+    def appearance(self) -> tuple[Change, ...]:
+        """The changes of the house's look; empty if it is the house's own."""
+        return self._appearance
+
+    def set_appearance(self, changes: Sequence[Change], *, are_checked: bool = False) -> None:
+        """Give the house a random look, until the next `reset`; only colours change.
+
+        Args:
+            changes: `Materials`, `Colors` and `Lighting` of `evonav.world.appearance`, carried out one after another on
+                the house's own look; none for its own look. Of several `Lighting`, the last counts.
+            are_checked: Whether to ignore categories that the house no longer has, not to refuse them.
+
+        Raises:
+            InvalidArgumentError: A number is out of range, or a category or a type of room does not exist; the look
+                stays.
+            SimulationError: There is no house yet.
+
+        Examples:
+            >>> import evonav
+            >>> from evonav.world.appearance import Lighting, Materials
+            >>> from evonav.world.embedded import EmbeddedSimulator
+            >>> simulator = EmbeddedSimulator()
+            >>> pose = simulator.reset(evonav.load_houses("bundled")[2])
+            >>> own = simulator.render()
+            >>> simulator.set_appearance([Materials(seed=1), Lighting(seed=1)])
+            >>> other = simulator.render()
+            >>> bool((own.rgb != other.rgb).any()), bool((own.depth_m == other.depth_m).all())
+            (True, True)
+        """
+        changes = tuple(changes)
+        self._loaded = self._world.with_look(changes_json(changes), are_checked=are_checked)
+        self._appearance = changes
 
     @property
     def core(self) -> _core.EmbeddedSimulator:
@@ -281,8 +318,9 @@ class EmbeddedSimulator:
         house_json = state["_loaded"]
         self.__dict__.update(state | {"_loaded": None})
         if house_json:
-            pose = self._pose
+            pose, changes = self._pose, self._appearance
             self.reset(house_json, name=self._house_name)
+            self.set_appearance(changes, are_checked=True)
             self._pose = pose
 
     @property

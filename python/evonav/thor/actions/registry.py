@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 # The functions of these modules register themselves.
 _MODULES = (
-    *("session", "motion", "teleport", "paths", "spawn"),
+    *("session", "appearance", "motion", "teleport", "paths", "spawn"),
     *("object_queries", "interactable_poses", "object_placement", "object_states", "cameras"),
 )
 
@@ -168,12 +168,7 @@ _AI2THOR_ONLY = frozenset(
         "PullObject",
         "PushObject",
         "PutObject",
-        "RandomizeColors",
-        "RandomizeLighting",
-        "RandomizeMaterials",
         "ReleaseObject",
-        "ResetColors",
-        "ResetMaterials",
         "RotateAgent",
         "RotateHeldObject",
         "RotateWristRelative",

@@ -200,8 +200,9 @@ def get_in_scene_asset_geometry(
 
 @action("SetRandomSeed")
 def set_random_seed(engine: Engine, *, seed: int) -> None:
-    """Seed the noise of the LoCoBot's motion; other random actions have seeds of their own."""
+    """Seed the noise of the LoCoBot's motion and random looks; other random actions have seeds of their own."""
     engine.agent.noise = np.random.default_rng(abs(seed))
+    engine.random_seed, engine.num_randomizations = seed, 0
 
 
 @action("SetObjectFilter")

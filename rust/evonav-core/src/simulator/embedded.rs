@@ -93,28 +93,27 @@ impl EmbeddedSimulator {
         Self::assemble(house, config, scene, navigation)
     }
 
-    /// Return the same house in a random look, which replaces an earlier one.
-    ///
-    /// # Errors
-    /// [`Error::InvalidArgument`] for a category or a type of room that does not exist.
+    /// Return the same house in a random look, which replaces an earlier one. Names that the house
+    /// lacks have no effect; [`Appearance::check_names`] finds them.
     ///
     /// # Complexity
     /// O(parts); free space, rays and an unchanged light are shared.
-    pub fn with_look(&self, appearance: &Appearance) -> Result<Self, Error> {
+    #[must_use]
+    pub fn with_look(&self, appearance: &Appearance) -> Self {
         let built = Arc::clone(&self.built);
         if appearance.changes.is_empty() {
-            return Ok(Self { built, look: None });
+            return Self { built, look: None };
         }
         let Built { house, config, scene, .. } = &*built;
         let (varied, num_materials) =
-            scene_of(house, Catalogue::bundled(), config.unknown, scene, appearance)?;
+            scene_of(house, Catalogue::bundled(), config.unknown, scene, appearance);
         let look = Look {
             appearance: appearance.clone(),
             num_materials,
             mesh: SceneMesh::build(&varied),
             light: OnceLock::new(),
         };
-        Ok(Self { built, look: Some(look) })
+        Self { built, look: Some(look) }
     }
 
     /// Return the number of materials and assets from which the look's materials were drawn.
@@ -140,10 +139,10 @@ impl EmbeddedSimulator {
         };
         let navigation = self.built.navigation.with_scene(&scene)?;
         let changed = Self::assemble(house, self.built.config, scene, navigation)?;
-        match &self.look {
+        Ok(match &self.look {
             Some(look) => changed.with_look(&look.appearance),
-            None => Ok(changed),
-        }
+            None => changed,
+        })
     }
 
     fn assemble(

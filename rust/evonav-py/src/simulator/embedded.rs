@@ -122,10 +122,16 @@ impl PyEmbeddedSimulator {
     }
 
     /// Return the same house in a random look (a list of changes, JSON).
-    fn with_look(&self, py: Python<'_>, changes_json: &str) -> PyResult<Self> {
-        py.detach(|| self.core.with_look(&Appearance::from_json(changes_json)?))
-            .map(Self::from)
-            .map_err(error::to_py)
+    #[pyo3(signature = (changes_json, *, are_checked))]
+    fn with_look(&self, py: Python<'_>, changes_json: &str, are_checked: bool) -> PyResult<Self> {
+        py.detach(|| {
+            let appearance = Appearance::from_json(changes_json)?;
+            if !are_checked {
+                appearance.check_names(self.core.house(), Catalogue::bundled())?;
+            }
+            Ok(self.core.with_look(&appearance).into())
+        })
+        .map_err(error::to_py)
     }
 
     fn num_materials(&self) -> usize {

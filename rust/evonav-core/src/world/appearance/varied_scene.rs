@@ -20,24 +20,35 @@ const ROOM_TYPES: [&str; 4] = ["Bathroom", "Bedroom", "Kitchen", "LivingRoom"];
 /// Categories of bodies that are not objects.
 const STRUCTURE: [&str; 6] = ["Ceiling", "Doorframe", "Doorway", "Floor", "Wall", "Window"];
 
+impl Appearance {
+    /// Check that categories and types of rooms exist.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the first that neither the house nor the catalogue has.
+    pub fn check_names(&self, house: &House, catalogue: &Catalogue) -> Result<(), Error> {
+        self.changes.iter().try_for_each(|change| match change {
+            Change::Materials(surfaces) | Change::Colors(surfaces) => {
+                surfaces.check_names(house, catalogue)
+            }
+            Change::Lighting(_) => Ok(()),
+        })
+    }
+}
+
 /// Return a scene in a look, with the same shapes, and the number of materials that were to choose
 /// from.
-///
-/// # Errors
-/// [`Error::InvalidArgument`] for a category or a type of room that does not exist.
 pub(crate) fn scene_of(
     house: &House,
     catalogue: &Catalogue,
     unknown: UnknownAssets,
     scene: &Scene,
     appearance: &Appearance,
-) -> Result<(Scene, usize), Error> {
+) -> (Scene, usize) {
     let mut varied = scene.clone();
     let subjects = subjects(house);
     let mut painter = Painter::new(house, catalogue, unknown);
     for change in &appearance.changes {
         let (Change::Materials(surfaces) | Change::Colors(surfaces)) = change else { continue };
-        surfaces.check_names(house, catalogue)?;
         for (body, subject) in varied.bodies.iter_mut().zip(&subjects) {
             if !surfaces.includes(subject, body) {
                 continue;
@@ -48,7 +59,7 @@ pub(crate) fn scene_of(
             }
         }
     }
-    Ok((varied, painter.num_materials()))
+    (varied, painter.num_materials())
 }
 
 impl Surfaces {
