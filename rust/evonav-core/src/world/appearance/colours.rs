@@ -17,15 +17,15 @@ const SHADES: [f64; 2] = [0.5, 1.4];
 
 /// Give each material of a body one colour of any hue, as bright and as strong as AI2-THOR's.
 pub(super) fn colour(change: &Surfaces, subject: &Subject<'_>, body: &mut Body) {
-    let mut means: BTreeMap<u8, (f64, f64)> = BTreeMap::new();
+    let mut averages: BTreeMap<u8, (f64, f64)> = BTreeMap::new();
     for part in body.parts.iter().chain(&body.trim) {
-        let (sum, count) = means.entry(group(part)).or_default();
+        let (sum, count) = averages.entry(group(part)).or_default();
         *sum += luminance(part.colour);
         *count += 1.0;
     }
     let stream = Stream::new(change.seed, &["colors", subject.look]);
     for part in body.parts.iter_mut().chain(&mut body.trim) {
-        let (sum, count) = means.get(&group(part)).copied().unwrap_or((1.0, 1.0));
+        let (sum, count) = averages.get(&group(part)).copied().unwrap_or((1.0, 1.0));
         let mut draws = stream.at(&[i64::from(group(part))]);
         let (hue, saturation, value) =
             (draws.uniform(), 0.5 + 0.5 * draws.uniform(), 0.5 + 0.5 * draws.uniform());

@@ -5,7 +5,7 @@ use crate::house::House;
 /// A body of a house, as changes know it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Subject<'a> {
-    /// What the body is in the house file.
+    /// Kind of thing that the body is in the house file.
     pub part_of_house: PartOfHouse,
     /// Name that things which look alike share: the asset of objects, the room of walls.
     pub look: &'a str,
@@ -13,7 +13,7 @@ pub(super) struct Subject<'a> {
     pub room_types: [&'a str; 2],
 }
 
-/// What a body is in the house file, by index.
+/// Kind of thing that a body is in the house file, with its index.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum PartOfHouse {
     Floor,
