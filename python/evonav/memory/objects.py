@@ -200,14 +200,14 @@ class ObjectMap:
     def depth_evidence(
         self, entry_ids: Sequence[int], view: View, config: EvidenceConfig | None = None
     ) -> list[DepthEvidence]:
-        """Compare the points of entries with a view; the map does not change.
+        """Compare the points of entries with the depth image of a view; the map does not change.
 
         A point is seen through if the image shows something farther away at its pixel, occluded if it shows something
         nearer, and supported if the depths are equal within a band, `max(band_m, band_share * depth)`.
 
         Args:
             entry_ids: The entries.
-            view: View with detections, depth, pose and intrinsics.
+            view: View with depth, pose and intrinsics.
             config: Number of points and width of the band.
 
         Returns:
@@ -218,7 +218,7 @@ class ObjectMap:
                 range; the message names it.
         """
         counts = self._map.depth_evidence(entry_ids, view, config or EvidenceConfig())
-        return [DepthEvidence(a, b, c, d, tuple(by)) for a, b, c, d, *by in counts.tolist()]
+        return [DepthEvidence(*row) for row in counts.tolist()]
 
     def visible_shares(
         self, target_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig | None = None

@@ -28,8 +28,6 @@ class DepthEvidence:
     """The image shows something nearer, which hides the point."""
     num_out_of_view: int = 0
     """The point is outside the image, or its pixel has no depth."""
-    num_supported_by: tuple[int, ...] = ()
-    """Number of supported points on the surface of each detection of the view."""
 
     @property
     def num_in_view(self) -> int:

@@ -120,7 +120,9 @@ fn bench_objects(c: &mut Criterion) {
     let ids: Vec<u64> = map.entries().iter().map(|entry| entry.id).collect();
     let evidence = EvidenceConfig::default();
     c.bench_function("objects/depth_evidence_100_entries", |b| {
-        b.iter(|| map.depth_evidence(black_box(&ids), image, 20, &evidence).expect("known ids"));
+        b.iter(|| {
+            map.depth_evidence(black_box(&ids), &camera, &depth_m, &evidence).expect("known ids")
+        });
     });
     // As many views as fill the map: the next one is due for a clean-up.
     let due = full_map(ObjectMapConfig { views_per_cleanup: 401, ..config });

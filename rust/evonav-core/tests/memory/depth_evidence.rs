@@ -25,13 +25,12 @@ const NUM_PX: usize = CAMERA.width_px * CAMERA.height_px;
 /// Each point alone, by the camera's own projection.
 fn depth_evidence_naive(
     cloud: &[Point],
-    image: MaskedDepth<'_>,
-    num_detections: usize,
+    camera: &Camera,
+    depth_m: &[f32],
     config: &EvidenceConfig,
 ) -> DepthEvidence {
-    let MaskedDepth { camera, depth_m, masks } = image;
     let num = cloud.len().min(config.max_points);
-    let mut found = counts(num_detections);
+    let mut found = DepthEvidence::default();
     for k in 0..num {
         let point = cloud[(k * cloud.len()).checked_div(num).unwrap()];
         let Some([u, v, z]) = camera.project(point.map(f64::from)) else {
@@ -47,8 +46,7 @@ fn depth_evidence_naive(
             found.num_out_of_view += 1;
             continue;
         }
-        let pixel = row as usize * camera.width_px + col as usize;
-        let depth = f64::from(depth_m[pixel]);
+        let depth = f64::from(depth_m[row as usize * camera.width_px + col as usize]);
         let band_m = f64::max(config.band_m, config.band_share * z);
         if depth <= 0.0 || depth.is_infinite() {
             found.num_out_of_view += 1;
@@ -58,22 +56,13 @@ fn depth_evidence_naive(
             found.num_occluded += 1;
         } else {
             found.num_supported += 1;
-            for detection in 0..num_detections {
-                let is_on_it = masks[pixel] == detection as i32;
-                found.num_supported_by[detection] += u32::from(is_on_it);
-            }
         }
     }
     found
 }
 
-fn counts(num_detections: usize) -> DepthEvidence {
-    DepthEvidence { num_supported_by: vec![0; num_detections], ..DepthEvidence::default() }
-}
-
 fn evidence(cloud: &[Point], depth_m: &[f32]) -> DepthEvidence {
-    let image = MaskedDepth { camera: CAMERA, depth_m, masks: &[-1; NUM_PX] };
-    depth_evidence([cloud], image, 0, &EvidenceConfig::default()).unwrap().remove(0)
+    depth_evidence([cloud], &CAMERA, depth_m, &EvidenceConfig::default()).unwrap()[0]
 }
 
 /// A square of points, 0.4 m wide, upright at a distance straight ahead.
@@ -96,7 +85,6 @@ proptest! {
     fn counts_are_those_of_the_plain_twin(
         clouds in vec(vec([-5.0_f32..5.0, -1.0_f32..4.0, -2.0_f32..8.0], 0..60), 0..6),
         depth_m in depths(),
-        masks in vec(-1..3, NUM_PX),
         yaw_rad in -4.0..4.0,
         horizon_rad in -1.0..1.0,
         max_points in 1_usize..70,
@@ -105,11 +93,10 @@ proptest! {
     ) {
         let camera = Camera { yaw_rad, horizon_rad, ..CAMERA };
         let config = EvidenceConfig { max_points, band_m, band_share };
-        let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
-        let found = depth_evidence(clouds.iter().map(Vec::as_slice), image, 3, &config)?;
+        let found = depth_evidence(clouds.iter().map(Vec::as_slice), &camera, &depth_m, &config)?;
         let twin: Vec<_> = clouds
             .iter()
-            .map(|cloud| depth_evidence_naive(cloud, image, 3, &config))
+            .map(|cloud| depth_evidence_naive(cloud, &camera, &depth_m, &config))
             .collect();
         prop_assert_eq!(&found, &twin);
         for (counts, cloud) in found.iter().zip(&clouds) {
@@ -118,7 +105,6 @@ proptest! {
                 + counts.num_occluded
                 + counts.num_out_of_view;
             prop_assert_eq!(sum as usize, cloud.len().min(max_points));
-            prop_assert!(counts.num_supported_by.iter().sum::<u32>() <= counts.num_supported);
         }
     }
 }
@@ -128,13 +114,16 @@ fn points_are_seen_through_supported_or_occluded_by_what_is_at_their_pixel() {
     let cloud = square(2.0);
     assert_eq!(
         evidence(&cloud, &[2.11; NUM_PX]),
-        DepthEvidence { num_see_through: 256, ..counts(0) }
+        DepthEvidence { num_see_through: 256, ..Default::default() }
     );
     for depth in [1.91, 2.0, 2.09] {
-        let supported = DepthEvidence { num_supported: 256, ..counts(0) };
+        let supported = DepthEvidence { num_supported: 256, ..Default::default() };
         assert_eq!(evidence(&cloud, &[depth; NUM_PX]), supported);
     }
-    assert_eq!(evidence(&cloud, &[1.89; NUM_PX]), DepthEvidence { num_occluded: 256, ..counts(0) });
+    assert_eq!(
+        evidence(&cloud, &[1.89; NUM_PX]),
+        DepthEvidence { num_occluded: 256, ..Default::default() }
+    );
 }
 
 #[test]
@@ -146,11 +135,11 @@ fn the_band_grows_with_the_distance() {
 
 #[test]
 fn a_pixel_without_a_depth_and_a_place_outside_the_image_say_nothing() {
-    let nothing = DepthEvidence { num_out_of_view: 256, ..counts(0) };
+    let nothing = DepthEvidence { num_out_of_view: 256, ..Default::default() };
     assert_eq!(evidence(&square(2.0), &[f32::INFINITY; NUM_PX]), nothing);
     assert_eq!(evidence(&square(2.0), &[0.0; NUM_PX]), nothing);
     assert_eq!(evidence(&square(-2.0), &[4.0; NUM_PX]), nothing);
-    assert_eq!(evidence(&[], &[4.0; NUM_PX]), counts(0));
+    assert_eq!(evidence(&[], &[4.0; NUM_PX]), DepthEvidence::default());
 }
 
 #[test]
@@ -163,41 +152,24 @@ fn the_points_of_a_large_entry_are_taken_evenly() {
 }
 
 #[test]
-fn supported_points_are_counted_by_the_detection_on_whose_surface_they_are() {
-    // The left half of the image is one detection, the right half another; a third is not there.
-    let masks: Vec<i32> = (0..NUM_PX).map(|i| i32::from(i % 40 >= 20)).collect();
-    let cloud = square(2.0);
-    let compared = |depth_m: f32| {
-        let image = MaskedDepth { camera: CAMERA, depth_m: &[depth_m; NUM_PX], masks: &masks };
-        depth_evidence([&cloud[..]], image, 3, &EvidenceConfig::default()).unwrap().remove(0)
-    };
-    let [left, right, third] = compared(2.0).num_supported_by[..] else { panic!() };
-    assert_eq!((left + right, third), (256, 0));
-    assert!(left > 100 && right > 100);
-    assert_eq!(compared(5.0).num_supported_by, [0, 0, 0]);
-}
-
-#[test]
 fn what_does_not_fit_is_named() {
-    let (depth_m, masks) = (vec![1.0; NUM_PX], vec![1; NUM_PX]);
-    let refused = |camera: Camera, depth_m: &[f32], num: usize, config: EvidenceConfig| {
-        let image = MaskedDepth { camera, depth_m, masks: &masks };
-        depth_evidence([&[][..]], image, num, &config).unwrap_err().to_string()
+    let depth_m = vec![1.0; NUM_PX];
+    let refused = |camera: Camera, depth_m: &[f32], config: EvidenceConfig| {
+        depth_evidence([&[][..]], &camera, depth_m, &config).unwrap_err().to_string()
     };
     let config = EvidenceConfig::default();
     let mut with_nan = depth_m.clone();
     with_nan[7] = f32::NAN;
-    assert!(refused(CAMERA, &depth_m[1..], 2, config).contains("depth_m"));
-    assert!(refused(CAMERA, &with_nan, 2, config).contains("NaN"));
-    assert!(refused(CAMERA, &depth_m, 1, config).contains("masks"));
+    assert!(refused(CAMERA, &depth_m[1..], config).contains("depth_m"));
+    assert!(refused(CAMERA, &with_nan, config).contains("NaN"));
     let no_camera = Camera { vertical_fov_rad: 0.0, ..CAMERA };
-    assert!(refused(no_camera, &depth_m, 2, config).contains("vertical_fov_rad"));
+    assert!(refused(no_camera, &depth_m, config).contains("vertical_fov_rad"));
     for (name, wrong) in [
         ("max_points", EvidenceConfig { max_points: 0, ..config }),
         ("band_m", EvidenceConfig { band_m: f64::NAN, ..config }),
         ("band_share", EvidenceConfig { band_share: 1.5, ..config }),
     ] {
-        assert!(refused(CAMERA, &depth_m, 2, wrong).contains(name));
+        assert!(refused(CAMERA, &depth_m, wrong).contains(name));
     }
 }
 
@@ -211,12 +183,11 @@ fn a_map_compares_the_entries_asked_for_and_names_an_unknown_one() {
     map.update(&view).unwrap();
     let config = EvidenceConfig::default();
     let id = map.entries()[0].id;
-    let there = map.depth_evidence(&[id, id], image, 1, &config).unwrap();
+    let there = map.depth_evidence(&[id, id], &CAMERA, &depth_m, &config).unwrap();
     assert_eq!(there.len(), 2);
     assert_eq!((there[0].num_supported, there[1].num_supported), (256, 256));
-    assert_eq!(there[0].num_supported_by, [256]);
-    let farther = MaskedDepth { depth_m: &[4.0; NUM_PX], ..image };
-    assert_eq!(map.depth_evidence(&[id], farther, 1, &config).unwrap()[0].num_see_through, 256);
-    let unknown = map.depth_evidence(&[id, 99], image, 1, &config).unwrap_err();
+    let gone = map.depth_evidence(&[id], &CAMERA, &[4.0; NUM_PX], &config).unwrap();
+    assert_eq!(gone[0].num_see_through, 256);
+    let unknown = map.depth_evidence(&[id, 99], &CAMERA, &depth_m, &config).unwrap_err();
     assert!(unknown.to_string().contains("99"), "{unknown}");
 }

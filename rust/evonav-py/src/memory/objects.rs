@@ -143,17 +143,13 @@ impl ObjectMap {
     ) -> PyResult<Bound<'py, PyArray2<u32>>> {
         let config =
             arrays::from_attributes!(config, EvidenceConfig { max_points, band_m, band_share });
-        let found = view.detections.extract()?;
-        let view = view.detected(&found)?;
-        let (map, num) = (&self.0, view.labels.len());
-        let found = py.detach(|| map.depth_evidence(&entry_ids, view.image, num, &config));
-        let found = found.map_err(error::to_py)?;
-        let shape = [found.len(), 4 + num];
-        let counts = found.into_iter().flat_map(|e| {
-            let all = [e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view];
-            all.into_iter().chain(e.num_supported_by)
-        });
-        arrays::image_of(py, counts.collect(), shape)
+        let (depth_m, [height_px, width_px]) = arrays::row_major("depth_m", &view.depth_m)?;
+        let camera = view.pose.camera([width_px, height_px], view.intrinsics.vertical_fov_rad);
+        let found = py.detach(|| self.0.depth_evidence(&entry_ids, &camera, depth_m, &config));
+        let found = found.map_err(error::to_py)?.into_iter();
+        let rows =
+            found.map(|e| [e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view]);
+        arrays::rows_of(py, rows.collect())
     }
 
     fn begin_stage(&mut self, stage: u32) {

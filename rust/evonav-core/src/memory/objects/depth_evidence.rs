@@ -5,7 +5,7 @@ use crate::{
     geometry::{rotate, sub},
     sensors::{
         camera::Camera,
-        unproject::{MaskedDepth, Point, has_depth},
+        unproject::{Point, has_depth},
     },
 };
 
@@ -36,7 +36,7 @@ impl EvidenceConfig {
 }
 
 /// Number of an entry's compared points by what the depth image shows at their pixels.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DepthEvidence {
     /// The image shows something farther away: nothing is at the point.
     pub num_see_through: u32,
@@ -46,8 +46,6 @@ pub struct DepthEvidence {
     pub num_occluded: u32,
     /// The point is behind the camera or outside the image, or its pixel has no depth.
     pub num_out_of_view: u32,
-    /// Number of supported points on the surface of each detection.
-    pub num_supported_by: Vec<u32>,
 }
 
 /// Compare the points of entries with a depth image.
@@ -58,23 +56,22 @@ pub struct DepthEvidence {
 ///
 /// # Arguments
 /// * `clouds` - points of each entry, world frame.
-/// * `image` - depth and masks of the present view.
-/// * `num_detections` - masks are numbered from 0 to one less than this.
+/// * `camera` - camera of the image.
+/// * `depth_m` - planar depth, row-major, metres; infinite or not positive where there is none.
 ///
 /// # Returns
 /// The counts of each entry, in order. Their sum is the number of compared points.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image's size is not the camera's, a depth is NaN, the camera
-/// is impossible, a mask's number is too large, or a parameter is outside its domain.
+/// is impossible, or a parameter is outside its domain.
 ///
 /// # Complexity
-/// O(pixels + entries x (`max_points` + detections)); no allocation but the result.
+/// O(pixels + entries x `max_points`); no allocation but the result.
 ///
 /// # Examples
 /// ```
 /// # use evonav_core::{memory::objects::depth_evidence::*, sensors::camera::Camera};
-/// # use evonav_core::sensors::unproject::MaskedDepth;
 /// let camera = Camera {
 ///     width_px: 2,
 ///     height_px: 2,
@@ -84,32 +81,29 @@ pub struct DepthEvidence {
 ///     horizon_rad: 0.0,
 /// };
 /// let cup = [[0.1, 1.4, 2.0], [0.1, 1.6, 2.0]];
-/// let wall_behind_it = MaskedDepth { camera, depth_m: &[4.0; 4], masks: &[-1; 4] };
-/// let found = depth_evidence([&cup[..]], wall_behind_it, 0, &EvidenceConfig::default())?;
+/// let found = depth_evidence([&cup[..]], &camera, &[4.0; 4], &EvidenceConfig::default())?;
 /// assert_eq!(found[0].num_see_through, 2);
 /// # Ok::<(), evonav_core::Error>(())
 /// ```
 pub fn depth_evidence<'a>(
     clouds: impl IntoIterator<Item = &'a [Point]>,
-    image: MaskedDepth<'_>,
-    num_detections: usize,
+    camera: &Camera,
+    depth_m: &[f32],
     config: &EvidenceConfig,
 ) -> Result<Vec<DepthEvidence>, Error> {
     config.check()?;
-    check_image(&image, num_detections)?;
-    let projection = Projection::new(&image.camera);
+    check_image(camera, depth_m)?;
+    let projection = Projection::new(camera);
     let compare = |points: &[Point]| {
-        let mut found =
-            DepthEvidence { num_supported_by: vec![0; num_detections], ..Default::default() };
+        let mut found = DepthEvidence::default();
         let num = points.len().min(config.max_points);
         for k in 0..num {
             let measured = projection.pixel_of(points[k * points.len() / num]);
-            let Some((pixel, z)) = measured.filter(|&(pixel, _)| has_depth(image.depth_m[pixel]))
-            else {
+            let Some((pixel, z)) = measured.filter(|&(pixel, _)| has_depth(depth_m[pixel])) else {
                 found.num_out_of_view += 1;
                 continue;
             };
-            let depth = f64::from(image.depth_m[pixel]);
+            let depth = f64::from(depth_m[pixel]);
             let band_m = config.band_m.max(config.band_share * z);
             if depth > z + band_m {
                 found.num_see_through += 1;
@@ -117,9 +111,6 @@ pub fn depth_evidence<'a>(
                 found.num_occluded += 1;
             } else {
                 found.num_supported += 1;
-                if let Ok(detection) = usize::try_from(image.masks[pixel]) {
-                    found.num_supported_by[detection] += 1;
-                }
             }
         }
         found
@@ -127,20 +118,14 @@ pub fn depth_evidence<'a>(
     Ok(clouds.into_iter().map(compare).collect())
 }
 
-fn check_image(image: &MaskedDepth<'_>, num_detections: usize) -> Result<(), Error> {
-    let MaskedDepth { camera, depth_m, masks } = *image;
+fn check_image(camera: &Camera, depth_m: &[f32]) -> Result<(), Error> {
     camera.check()?;
     let num_px = camera.width_px * camera.height_px;
-    for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.len())] {
-        Error::require(name, len, "one value a pixel of the camera", |n| n == num_px)?;
+    Error::require("depth_m", depth_m.len(), "one value a pixel of the camera", |n| n == num_px)?;
+    match depth_m.iter().find(|depth| depth.is_nan()) {
+        Some(depth) => Err(Error::invalid("depth_m", depth, "not NaN")),
+        None => Ok(()),
     }
-    if let Some(depth) = depth_m.iter().find(|depth| depth.is_nan()) {
-        return Err(Error::invalid("depth_m", depth, "not NaN"));
-    }
-    let largest = masks.iter().copied().max().unwrap_or(-1);
-    Error::require("masks", largest, "negative or the index of a detection", |mask| {
-        usize::try_from(mask).map_or(true, |mask| mask < num_detections)
-    })
 }
 
 /// [`Camera::project`] with the parts that are the same for all points computed once.

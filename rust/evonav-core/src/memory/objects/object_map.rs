@@ -16,7 +16,10 @@ use crate::{
         entry::Sighting,
         sight_lines::{SightConfig, reach_m, visible_shares},
     },
-    sensors::unproject::{MaskedDepth, Point, unproject_masks},
+    sensors::{
+        camera::Camera,
+        unproject::{MaskedDepth, Point, unproject_masks},
+    },
 };
 
 /// The detections of one view.
@@ -196,24 +199,19 @@ impl ObjectMap {
         visible_shares(near.map(Cloud::points).chain([targets]), targets, eyes, config)
     }
 
-    /// Compare entries with a view; the map does not change.
+    /// Compare entries with a depth image; the map does not change.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such entry, or as [`depth_evidence`].
     pub fn depth_evidence(
         &self,
         ids: &[u64],
-        image: MaskedDepth<'_>,
-        num_detections: usize,
+        camera: &Camera,
+        depth_m: &[f32],
         config: &EvidenceConfig,
     ) -> Result<Vec<DepthEvidence>, Error> {
         let entries = ids.iter().map(|&id| self.known(id)).collect::<Result<Vec<_>, _>>()?;
-        depth_evidence(
-            entries.iter().map(|entry| entry.cloud.points()),
-            image,
-            num_detections,
-            config,
-        )
+        depth_evidence(entries.iter().map(|entry| entry.cloud.points()), camera, depth_m, config)
     }
 
     fn known(&self, id: u64) -> Result<&Entry, Error> {
