@@ -55,7 +55,7 @@ fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
     let mesh = SceneMesh::build(&scene_of(&[part]));
     let camera = level_camera(16, 16, 1.5, [0.0; 3]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: Some(Style::default()), instances: true }, &mut frame)
+    render(&mesh, &camera, Want { rgb: Some(Style::Outlined), instances: true }, &mut frame)
         .unwrap();
     assert!(frame.instances.iter().all(|&id| id == 0));
 }
@@ -69,7 +69,7 @@ fn colours_show_corners_and_sky() {
     let mesh = SceneMesh::build(&scene_of(&[ahead, beside]));
     let camera = level_camera(301, 301, 90.0_f64.to_radians(), [0.5, 0.0, 0.0]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: Some(Style::default()), instances: false }, &mut frame)
+    render(&mesh, &camera, Want { rgb: Some(Style::Outlined), instances: false }, &mut frame)
         .unwrap();
     let at = |col: usize| &frame.rgb[3 * (150 * 301 + col)..][..3];
     assert_eq!(at(20), [204, 222, 236]);
@@ -77,6 +77,21 @@ fn colours_show_corners_and_sky() {
     // The walls meet at x = 2, z = 3.
     let corner = (150.5 + 150.5 * 1.5 / 3.0) as usize;
     assert!(u32::from(at(corner)[0]) * 10 < u32::from(at(corner - 30)[0]) * 8);
+}
+
+/// The gap under a door is dark, not as bright as the sky.
+#[test]
+fn nothing_is_bright_above_the_horizon_and_dark_below() {
+    let mesh = SceneMesh::build(&scene_of(&[red_cuboid([0.1; 3], [0.0, 0.0, -3.0])]));
+    let camera = level_camera(40, 40, 1.5, [0.0, 1.5, 0.0]);
+    let mut frame = FrameBuffer::default();
+    let want = Want { rgb: Some(Style::Default), instances: false };
+    render(&mesh, &camera, want, &mut frame).unwrap();
+    let brightness: Vec<u32> =
+        frame.rgb.chunks_exact(3 * 40).map(|row| row.iter().map(|&c| u32::from(c)).sum()).collect();
+    let (above, below) = brightness.split_at(20);
+    assert!(above.iter().all(|&row| row > 4 * below[19]));
+    assert!(below.iter().all(|&row| row == below[19]));
 }
 
 /// A wall 20 m away is seen, one a hair farther is sky; so is what the near plane cuts off.
@@ -88,7 +103,7 @@ fn surfaces_are_drawn_between_the_clip_planes() {
     for half_height_m in [None, Some(2.0)] {
         let view = View { half_height_m, ..View::from(camera) };
         let mut frame = FrameBuffer::default();
-        let want = Want { rgb: Some(Style::default()), instances: true };
+        let want = Want { rgb: Some(Style::Outlined), instances: true };
         for (z, is_seen) in [
             (near_m - 1e-3, false),
             (near_m + 1e-3, true),

@@ -303,6 +303,11 @@ impl Rays {
         ray
     }
 
+    /// Return whether a pixel of a perspective view looks below the horizon.
+    pub fn is_below_horizon(&self, [column, row]: [usize; 2]) -> bool {
+        self.horizon_m.is_none() && self.ray(column as f32 + 0.5, row as f32 + 0.5)[1] < 0.0
+    }
+
     /// Return the square of the distance of what a pixel shows, relative to its depth; 1 in
     /// orthographic views.
     #[inline(always)]

@@ -19,8 +19,10 @@ use crate::{
     world::mesh::SceneMesh,
 };
 
-/// Colour behind windows and missing walls.
+/// Colour above the horizon behind missing walls, and of maps' surroundings.
 const SKY: [u8; 3] = [204, 222, 236];
+/// Colour below the horizon where nothing is: the gaps under outer doors, which are in shade.
+const GROUND: [u8; 3] = [46, 44, 42];
 
 /// Darkness of corners, most of which is in the light.
 const SHADES: Shades = Shades { corner: 0.24, line: None };
@@ -91,7 +93,10 @@ impl Lit {
                     }
                     shot.run(index, surface, row, start..end, colours);
                 } else {
-                    colours[3 * start..3 * end].as_chunks_mut().0.fill(SKY);
+                    // The ends of a run lie on one side of the horizon in level pictures.
+                    let is_below = shot.rays.is_below_horizon([start, row]);
+                    let colour = if is_below { GROUND } else { SKY };
+                    colours[3 * start..3 * end].as_chunks_mut().0.fill(colour);
                 }
                 start = end;
             }
