@@ -14,7 +14,7 @@ use evonav_core::{
         camera::{Camera, View},
         instance_masks::instance_areas,
         png::encode_png,
-        raster::{FrameBuffer, Style, Want, render, visible_px},
+        raster::{FrameBuffer, Light, Style, Want, render, render_lit, visible_px},
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
@@ -24,9 +24,10 @@ use evonav_core::{
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
 
-fn scene() -> Scene {
+fn house() -> (House, Scene) {
     let house = House::from_json("house", HOUSE).expect("a valid house");
-    Scene::build(&house, Catalogue::bundled(), UnknownAssets::Error).expect("known assets")
+    let scene = Scene::build(&house, Catalogue::bundled(), UnknownAssets::Error);
+    (house, scene.expect("known assets"))
 }
 
 /// Views all around from four places.
@@ -44,8 +45,9 @@ fn cameras(scene: &Scene, image_px: [usize; 2]) -> Vec<Camera> {
 }
 
 fn bench_raster(c: &mut Criterion) {
-    let scene = scene();
+    let (house, scene) = house();
     let mesh = SceneMesh::build(&scene);
+    let light = Light::build(&house, &scene, &mesh);
     for image_px in [[300, 300], [640, 480]] {
         for (name, want) in [
             ("depth", Want { rgb: None, instances: false }),
@@ -58,7 +60,11 @@ fn bench_raster(c: &mut Criterion) {
             let mut frame = FrameBuffer::default();
             let mut next = cameras.iter().cycle();
             c.bench_function(&format!("raster/{name}_{}x{}", image_px[0], image_px[1]), |b| {
-                b.iter(|| next.next().map(|camera| render(&mesh, camera, want, &mut frame)));
+                b.iter(|| {
+                    next.next().map(|camera| {
+                        render_lit(&mesh, Some(&light), &View::from(*camera), want, &mut frame)
+                    })
+                });
             });
         }
     }
@@ -126,6 +132,9 @@ fn bench_raster(c: &mut Criterion) {
         });
     }
     c.bench_function("mesh/build", |b| b.iter(|| SceneMesh::build(black_box(&scene))));
+    c.bench_function("light/build", |b| {
+        b.iter(|| Light::build(&house, &scene, black_box(&mesh)));
+    });
     c.bench_function("raycast3d/build", |b| b.iter(|| RayCaster::build(black_box(&mesh))));
 }
 

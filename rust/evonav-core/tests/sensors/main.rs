@@ -7,6 +7,7 @@ mod scenes;
 mod images;
 mod png;
 mod raster;
+mod shading;
 mod textures;
 mod visible_bodies;
 mod visible_px;

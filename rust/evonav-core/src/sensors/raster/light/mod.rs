@@ -11,8 +11,9 @@ mod sun;
 use std::sync::Arc;
 
 use crate::{
-    geometry::Aabb,
+    geometry::{Aabb, Vec3},
     house::House,
+    sensors::raster::canvas::LANES,
     world::{appearance::Lighting, mesh::SceneMesh, scene::Scene},
 };
 
@@ -59,5 +60,15 @@ impl Light {
             sun: Arc::clone(&self.sun),
             sunlight: [red * SUNLIGHT[0], green * SUNLIGHT[1], blue * SUNLIGHT[2], 0.0],
         }
+    }
+
+    /// Return the direction towards the sun, in the world frame.
+    pub fn towards_sun(&self) -> Vec3 {
+        self.sun.towards.map(f64::from)
+    }
+
+    /// Return the share of the sun, 0 to 1, that reaches a point of a surface that faces it.
+    pub fn sun_at(&self, point_m: Vec3) -> f32 {
+        self.sun.reaches(&point_m.map(|x| [x as f32; LANES]))[0]
     }
 }
