@@ -95,7 +95,7 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
         s.pad(x, fold, between(length, 0.27, 0.39), 0.025, turned);
         s.pad(x, [over[0], top + 0.05], between(length, 0.39, 0.43), 0.02, shade(linen, 0.85));
         // The shadow under the mattress.
-        let shadow = [top - 0.7 * depth - 0.012, top - 0.7 * depth + 0.006];
+        let shadow = [top - 0.7 * depth, top - 0.7 * depth + 0.006];
         s.cuboid(x, shadow, length, shade(wood, 0.4));
     });
 }

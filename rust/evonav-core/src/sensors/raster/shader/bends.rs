@@ -17,6 +17,9 @@ pub(super) struct Shades {
     pub corner: f32,
     /// Darkness of lines around silhouettes, if there are lines.
     pub line: Option<f32>,
+    /// Whether rows and columns count apart, so that the darkness around a thing that stands close
+    /// to a wall is even.
+    pub is_even: bool,
 }
 
 /// The light that corners and silhouettes leave in one row, and the row continued at both ends.
@@ -53,6 +56,10 @@ impl Bends {
             let width = canvas.width_px;
             let neighbours = [left, right, above, below].map(|row| &row[..width]);
             let (light, centre) = (&mut self.light[..width], &centre[..width]);
+            if shades.is_even && !is_line {
+                darken_evenly(light, centre, neighbours, [scale, most], is_orthographic);
+                continue;
+            }
             // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
             let in_perspective = |nearness: f32| nearness + 1e-6;
             let orthographic = |_: f32| 1.0;
@@ -111,6 +118,24 @@ fn darken_row(
         let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
         let bend = (around - centre[i]) / unit(centre[i]) * scale;
         light[i] *= 1.0 - shade(bend);
+    }
+}
+
+/// Darken `light` by the greater bend of each pixel's row and column, as [`darken_row`] does by
+/// their mean.
+#[inline(always)]
+fn darken_evenly(
+    light: &mut [f32],
+    centre: &[f32],
+    [left, right, above, below]: [&[f32]; 4],
+    [scale, most]: [f32; 2],
+    is_orthographic: bool,
+) {
+    for i in 0..light.len() {
+        let unit = if is_orthographic { 1.0 } else { centre[i] + 1e-6 };
+        let bend = |sum: f32| (0.5 * sum - centre[i]) * scale / unit;
+        let shade = |sum: f32| corner_shade(0.5 * bend(sum), most);
+        light[i] *= 1.0 - shade(left[i] + right[i]).max(shade(above[i] + below[i]));
     }
 }
 

@@ -25,7 +25,7 @@ const SKY: [u8; 3] = [204, 222, 236];
 const GROUND: [u8; 3] = [46, 44, 42];
 
 /// Darkness of corners, most of which is in the light.
-const SHADES: Shades = Shades { corner: 0.24, line: None };
+const SHADES: Shades = Shades { corner: 0.20, line: None, is_even: true };
 /// Light in views without a house around them.
 const EVEN: f32 = 0.85;
 /// The response `x (a + b x - c x^2)` to brightness `x`: more contrast in the middle than at both ends.
