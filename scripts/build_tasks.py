@@ -11,7 +11,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from evonav.generation import TaskRejectedError, generate_task
+from evonav.generation import GenerationParameters, TaskRejectedError, generate_task
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_dataset
@@ -19,6 +19,8 @@ from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_data
 ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
 HOUSES = ROOT.parent / "houses.jsonl.gz"
 SEED = 0
+PARAMETERS = GenerationParameters(reference_style="outlined")
+"""Another style would give the tasks other digests, so runs and packs of earlier versions would be of other tasks."""
 FIRST_TEST_HOUSE = 84
 """Line of the first house with test assets."""
 NUM_TASKS = {2: 5, 3: 4, 4: 4, 5: 4, 6: 3, 7: 2, 8: 1, 10: 1}
@@ -43,7 +45,7 @@ def build_tasks() -> list[Task]:
     tasks = []
     for house in chosen_houses():
         try:
-            tasks.append(generate_task(house, seed=SEED, dataset="evonav-mini", split="test"))
+            tasks.append(generate_task(house, seed=SEED, config=PARAMETERS, dataset="evonav-mini", split="test"))
         except TaskRejectedError as error:
             sys.stderr.write(f"left out: {error}\n")
     return sorted(tasks, key=lambda task: task.task_id)

@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
+from evonav.world.simulator import SimulatorConfig, Style
 
 NEAR_OBJECT_M = (0.5, 2.2)
+STYLE: Style = "outlined"
+"""The style of the frames that the bundled weights were trained on."""
 TILTS_RAD = (math.radians(-5), math.radians(35))
 
 
@@ -47,7 +50,7 @@ def frames(tasks: list[list[Path]], num_per_house: int, seed: int, tilted: float
         seed: Of everything random.
         tilted: Share of views whose camera looks down by any of `TILTS_RAD` instead of as the house has it.
     """
-    simulator = EmbeddedSimulator(allow_unknown_assets=True)
+    simulator = EmbeddedSimulator(SimulatorConfig(style=STYLE), allow_unknown_assets=True)
     for index, stages in enumerate(tasks):
         rng = np.random.default_rng([seed, index])
         stage = stages[int(rng.integers(len(stages)))]

@@ -70,7 +70,7 @@ class SimulatorConfig:
     """Spacing of `reachable_positions`, in metres."""
     occupancy_cell_m: float = 0.1
     """Edge of a cell of the oracle occupancy, in metres."""
-    style: Style = "outlined"
+    style: Style = "default"
     """Way in which colours are drawn; depth and instances do not depend on it. AI2-THOR has one of its own."""
 
     @property

@@ -87,7 +87,7 @@ fn bench_raster(c: &mut Criterion) {
     render(
         &mesh,
         &cameras_300[0],
-        Want { rgb: Some(Style::default()), instances: false },
+        Want { rgb: Some(Style::Outlined), instances: false },
         &mut frame,
     )
     .expect("a camera in the house");

@@ -46,7 +46,7 @@ class SimulatorSettings(Settings):
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     style: Style | None = None
-    """Embedded: style of colours: outlined, plain or default. Default: outlined; a resumed run keeps its own."""
+    """Embedded: style of colours: outlined, plain or default. Default: default; a resumed run keeps its own."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None

@@ -9,11 +9,11 @@ use crate::Error;
 #[serde(rename_all = "snake_case")]
 pub enum Style {
     /// Flat colours with dark corners, and thin lines around silhouettes: clear to people.
-    #[default]
     Outlined,
     /// Colours of [`Self::Outlined`] without the lines, the cheapest.
     Plain,
     /// Lit surfaces with smooth edges, for detectors and models that know photographs.
+    #[default]
     Default,
 }
 
