@@ -1,4 +1,4 @@
-"""Measures how much the simulator's pictures look like AI2-THOR's: `docs/simulator-fidelity.md`.
+"""Measures how much the simulator's pictures look like AI2-THOR's: `docs/pictures.md`.
 
     python scripts/measure_pictures.py [--houses FILE ...] [--recorded FOLDER] [--sheet 24] [--out out/pictures]
 
