@@ -207,7 +207,7 @@ impl Level {
         sums
     }
 
-    /// Return the mixture around a place, in 256ths of texels, as packed sums.
+    /// Return the mixture around a place, in units of 1/256 of a texel, as packed sums.
     #[inline(always)]
     fn mixture(&self, x: u32, y: u32, mask: u32) -> u64 {
         let (fx, fy) = (u64::from(x & 255), u64::from(y & 255));
