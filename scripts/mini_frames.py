@@ -18,7 +18,7 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig, Style
 
 NEAR_OBJECT_M = (0.5, 2.2)
-STYLE: Style = "outlined"
+STYLE: Style = "default"
 """The style of the frames that the bundled weights were trained on."""
 TILTS_RAD = (math.radians(-5), math.radians(35))
 

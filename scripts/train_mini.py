@@ -5,7 +5,8 @@
 `--tasks` are folders of tasks made from houses of the *train* split with `evonav tasks generate` (ours: 1,000 houses
 of `attr-onav-1k-train-1000.jsonl.gz`, the bundled houses of the train split and 17 of `tiny-train.jsonl.gz`, see
 CONTRIBUTING.md on data sets; houses of ProcTHOR-10k do as well). Needs torch. Prints the loss every 50 steps and
-saves every 250; the same arguments, machine and torch give the same weights. `export_mini.py` makes what ships.
+saves every 250; the same arguments, machine and torch give the same weights. `--on-from CHECKPOINT` goes on with the
+weights and types of an earlier training. `export_mini.py` makes what ships.
 """
 
 import argparse
@@ -48,6 +49,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tasks", nargs="+", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--on-from", type=Path)
     parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--lr", type=float, default=4e-3)
@@ -55,9 +57,12 @@ def main() -> None:
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     tasks = [task for folder in args.tasks for task in house_files(folder)]
-    pictures, classes = render(tasks, args.seed, None)
+    saved = torch.load(args.on_from) if args.on_from else None
+    pictures, classes = render(tasks, args.seed, saved["classes"] if saved else None)
     print(f"{len(tasks)} houses, {len(classes)} types", flush=True)
     net = MiniNet(len(classes))
+    if saved:
+        net.load_state_dict(saved["state"])
     optimizer = torch.optim.AdamW(net.parameters(), lr=args.lr, weight_decay=1e-2)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, args.lr, total_steps=args.steps, pct_start=0.1)
     batches = endless(tasks, pictures, classes, args.seed)
