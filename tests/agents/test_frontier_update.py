@@ -22,11 +22,11 @@ from evonav.world.pose import Pose
 
 
 def moved_stages():
-    """The chair is found, the agent goes to the bedroom, and the chair is gone when it is asked for again."""
+    """The chair is found, the agent goes to the bin in the bedroom, and the chair is gone when asked for again."""
     gone = {"Chair|1": (0.5, 0.45, 0.6)}
     return (
         stage_case(1, "Chair|1"),
-        stage_case(2, "Bed|1"),
+        stage_case(2, "GarbageCan|1"),
         stage_case(3, "Chair|1", moves=CHAIR_AWAY, mode="SALIENT_OBJECT"),
         stage_case(4, "Chair|1", moves=gone, before=CHAIR_AWAY, mode="SALIENT_OBJECT"),
     )
