@@ -64,7 +64,9 @@
       found.place = place;
       const second = place.replace(/stage=.*/, "stage=2");
       location.hash = second;
-      // What the frame says of the first place may still be on its way.
+      // What the frame says of the first place may still be on its way: it must not change the address back.
+      const source = player.querySelector("iframe").contentWindow;
+      dispatchEvent(new MessageEvent("message", { source, data: "#stage=1&round=1" }));
       await until(() => location.hash.startsWith(`${second}&`));
       found.replay = [player.open, location.hash, player.querySelector("iframe").getAttribute("sandbox"), player.querySelector("b").textContent];
       let seen = null;

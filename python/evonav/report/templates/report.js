@@ -117,7 +117,7 @@
 
   // An episode round by round: `#replay=PAGE&stage=3&round=2` opens it, in a frame that can reach nothing.
   const player = document.getElementById("player");
-  let speaker = null;
+  let speaker = null, shown = "";
   const play = async () => {
     // What the frame before still has to say is not listened to.
     speaker = null;
@@ -132,6 +132,7 @@
     frame.srcdoc = text.replace('<body class="viewer"', `<body data-place="${where}" class="viewer embedded"`);
     player.querySelector("iframe").replaceWith(frame);
     speaker = frame.contentWindow;
+    shown = hash;
     if (!player.open) player.showModal();
   };
   player.addEventListener("close", () => {
@@ -139,10 +140,13 @@
     if (location.hash.startsWith("#replay=")) history.replaceState(null, "", location.pathname + location.search);
   });
   addEventListener("message", ({ source, data }) => {
-    if (source !== speaker) return;
+    // After a new address, the frame may still speak of the old one before `hashchange` comes.
+    if (source !== speaker || location.hash !== shown) return;
     if (data === "close") player.close();
-    else if (/^#stage=\d+&round=\d+$/.test(data)) history.replaceState(null, "", `${location.hash.split("&")[0]}&${data.slice(1)}`);
-    else if (typeof data === "string" && /^[\w.-]+\.html#/.test(data)) location.hash = `replay=${data.replace("#", "&")}`;
+    else if (/^#stage=\d+&round=\d+$/.test(data)) {
+      shown = `${shown.split("&")[0]}&${data.slice(1)}`;
+      history.replaceState(null, "", shown);
+    } else if (typeof data === "string" && /^[\w.-]+\.html#/.test(data)) location.hash = `replay=${data.replace("#", "&")}`;
   });
   addEventListener("hashchange", play);
   play();
