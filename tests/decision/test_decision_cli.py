@@ -5,16 +5,22 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+import evonav
 from evonav.cli import app
+from evonav.decision.change_notice import CHANGE_NOTICE
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.mock_answers import mock_answer
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
+from evonav.replay.replay import RunReplay
+from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import KEY, check_request, serving
 
 COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--in-process")
@@ -72,6 +78,7 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     [
         (("--decision", "vlm"), "--model is needed"),
         (("--decision", "gpt"), "expected text, vlm or module:name"),
+        (("--tell-of-change",), "--tell-of-change is of no use"),
         (("--temperature", 0.5), "--temperature is of no use"),
         (("--decision", "own_vlm:OwnVlm", "--max-tokens", 5), "--max-tokens is of no use"),
         (("--decision", "nothing:Here"), "nothing"),
@@ -123,6 +130,50 @@ def test_recording_wants_a_new_file(tmp_path: Path) -> None:
         code, told = run(*options, "--out", tmp_path / "b")
     assert code != 0
     assert "holds exchanges already" in told
+
+
+def _texts(requests: list[dict[str, Any]]) -> list[str]:
+    """Return the first text of each request."""
+    return [
+        next(part["text"] for part in request["messages"][0]["content"] if part["type"] == "text")
+        for request in requests
+    ]
+
+
+def _only_task(run_dir: Path) -> str:
+    with RunStore(run_dir) as store:
+        (task_id,) = {task_id for _, task_id, _ in store.states()}
+    return task_id
+
+
+def test_a_model_is_told_of_changes_in_all_prompts_or_in_none_and_old_runs_keep_theirs(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
+        assert stub.requests is not None
+        model = {"kind": "vlm", "model": "m", "base_url": stub.url}
+        common: dict[str, Any] = {"limit": 1, "workers": 0, "protocol": ProtocolConfig(max_rounds=2)}
+        told = {**model, "tell_of_change": True}
+        evonav.evaluate("fu", "3d-mem", decision=told, out=tmp_path / "told", **common)
+        assert all(text == CHANGE_NOTICE for text in _texts(stub.requests))
+        with pytest.raises(evonav.EvonavError, match="tells_of_change"):
+            evonav.evaluate("fu", decision=model, out=tmp_path / "told", **common)
+        stub.requests.clear()
+        evonav.evaluate("3d-mem", "ftu", decision=model, out=out, **common)
+        assert not any("moved" in text for text in _texts(stub.requests))
+        with RunStore(out) as store:  # as such a run was recorded before there was the option
+            config = store.meta("config")
+            assert config["backend"]["decision_options"].pop("tells_of_change") is False
+            store.set_meta("config", config)
+        stub.requests.clear()
+        evonav.evaluate("fu", decision=model, out=out, **common)
+        former = "searches a home in which things may have been moved since they were last seen. Choose"
+        assert all(former in text for text in _texts(stub.requests))
+        with bundled_tasks() as tasks:
+            task_id = _only_task(out)
+            (stage,) = RunReplay(out, lambda name: tasks / name).episode("fu", task_id, last_stage=1)
+        questions = [question for shown in stage.rounds for question in shown.questions]
+        assert questions
+        assert all(any(former in part for _, part in one.parts if isinstance(part, str)) for one in questions)
 
 
 def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) -> None:

@@ -118,3 +118,11 @@ def test_garbage_is_no_answer(asked: dict[str, list[tuple[Question[Any], Reply[A
             with pytest.raises(AnswerError) as caught:
                 pairs[0][0].parse(garbage)
             assert caught.value.fault == "invalid", kind
+
+
+def test_no_prompt_says_that_things_may_have_been_moved(
+    asked: dict[str, list[tuple[Question[Any], Reply[Any]]]],
+) -> None:
+    for kind, pairs in asked.items():
+        for question, _ in pairs:
+            assert "moved" not in question.prompt().text, kind

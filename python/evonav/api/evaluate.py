@@ -96,12 +96,13 @@ def evaluate(
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
     decisions.check()
-    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_workers))
+    recorded = recorded_backend(folder)
+    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_workers), recorded)
     if decisions.kind != "text":
         check_decision(model, seed)
     simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
     backend = Backend(
-        simulator=simulation.component(recorded_backend(folder)),
+        simulator=simulation.component(recorded),
         perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),
         decision=model,
     )

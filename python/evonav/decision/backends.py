@@ -56,6 +56,7 @@ def vlm(
     price: Sequence[float] | None = None,
     max_cost_usd: float | None = None,
     noise: Mapping[str, float] | None = None,
+    tells_of_change: bool | None = None,
 ) -> DecisionModel:
     """Make a model behind an OpenAI-compatible endpoint.
 
@@ -74,6 +75,7 @@ def vlm(
         price: Dollars a million tokens, in and out.
         max_cost_usd: Largest cost of the run; needs `price`.
         noise: Rates of mistakes.
+        tells_of_change: See `with_notice`.
 
     Raises:
         InvalidArgumentError: An option makes no sense.
@@ -88,7 +90,8 @@ def vlm(
         model=account or model,
     )
     client = VlmClient(config, store=store, mode=mode, account=booked, keeps_failures=True, keeps_images=keeps_images)
-    return _with_noise(VlmDecision(client, structured=structured, needs_images=images), noise, seed)
+    decision = VlmDecision(client, structured=structured, needs_images=images, tells_of_change=tells_of_change)
+    return _with_noise(decision, noise, seed)
 
 
 def own(
@@ -101,6 +104,7 @@ def own(
     ledger: str | None = None,
     account: str | None = None,
     noise: Mapping[str, float] | None = None,
+    tells_of_change: bool | None = None,
 ) -> DecisionModel:
     """Make a model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
 
@@ -113,19 +117,23 @@ def own(
         ledger: File that counts the run's questions.
         account: Name in the ledger; default: the model's path.
         noise: Rates of mistakes.
+        tells_of_change: See `with_notice`; for a model with `ask`.
 
     Raises:
-        InvalidArgumentError: It cannot be imported or made, or is none such.
+        InvalidArgumentError: It cannot be imported or made, is none such, or has `answer` and is to be told of changes.
         StoreError: The file of exchanges cannot be opened.
     """
     model = load_custom_model(path, seed)
     if hasattr(model, "answer"):
+        if tells_of_change:
+            raise InvalidArgumentError(f"{path}: a model with `answer` makes its own prompts; tell it of changes there")
         return _with_noise(cast("DecisionModel", model), noise, seed)
     booked = Account(ledger=None if ledger is None else Ledger(ledger), model=account or path)
     store = None if cache is None else ResponseCache(Path(cache))
     client = CustomClient(path, model, store=store, mode=mode, account=booked, keeps_images=keeps_images)
     needs_images = bool(getattr(model, "needs_images", True))
-    return _with_noise(VlmDecision(client, structured="off", needs_images=needs_images), noise, seed)
+    decision = VlmDecision(client, structured="off", needs_images=needs_images, tells_of_change=tells_of_change)
+    return _with_noise(decision, noise, seed)
 
 
 def counting(
@@ -137,11 +145,15 @@ def counting(
     images: bool = True,
     request: Mapping[str, Any] | None = None,
     noise: Mapping[str, float] | None = None,
+    tells_of_change: bool | None = None,
 ) -> DecisionModel:
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
     client = VlmClient(vlm_config(model, request))
     is_json = structured != "off"
-    counted = Counting(TextMatch(), client, Ledger(ledger), str(seed), needs_images=images, is_json=is_json)
+    name, is_informed = str(seed), tells_of_change
+    counted = Counting(
+        TextMatch(), client, Ledger(ledger), name, needs_images=images, is_json=is_json, tells_of_change=is_informed
+    )
     return _with_noise(counted, noise, seed)
 
 

@@ -14,6 +14,7 @@ from PIL import Image
 from evonav.agents.agent import Agent, Belief
 from evonav.agents.explanation import inspectable
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
+from evonav.decision.change_notice import with_notice
 from evonav.decision.prompts import Picture
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
@@ -66,6 +67,7 @@ class Recorder:
         heading_px: int | None = None,
         *,
         keeps_depth: bool = False,
+        tells_of_change: bool | None = False,
     ) -> None:
         """Start without rounds.
 
@@ -75,7 +77,9 @@ class Recorder:
             losses: Losses of the agent's process, by stage: there the agent does not act.
             heading_px: Longer edge of the heading views, where pages' own size is too small.
             keeps_depth: Keep depth images, too.
+            tells_of_change: True if the run's prompts say that things may have been moved, see `with_notice`.
         """
+        self._tells_of_change = tells_of_change
         self._keeps_depth = keeps_depth
         self.agent = agent
         self._on_round = on_round
@@ -166,7 +170,7 @@ class Recorder:
 
     def _question(self, entry: QueryLogEntry) -> ReplayedQuestion:
         parts: list[tuple[str, str | bytes]] = []
-        for turn in entry.question.prompt().turns:
+        for turn in with_notice(entry.question.prompt(), self._tells_of_change).turns:
             for part in turn.parts:
                 shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
                 parts.append((turn.role, shown))

@@ -15,6 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.component import import_callable
+from evonav.decision.change_notice import recorded_notice
 from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
@@ -144,7 +145,14 @@ class RunReplay:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
                 agent = make_agent(agent_name, self.backend.decision.create(seed))
                 losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
-                recorder = Recorder(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
+                recorder = Recorder(
+                    agent,
+                    on_round,
+                    losses,
+                    self._heading_px,
+                    keeps_depth=self._keeps_depth,
+                    tells_of_change=recorded_notice(self.backend.decision.path, self.backend.decision.options),
+                )
                 perception = self.backend.perception.create()
                 episode = Episode(
                     case,

@@ -143,19 +143,19 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
     """
     decision = sweep.decisions[cell.decision]
     backend = Backend(
-        simulator=sweep.simulators[cell.simulator].component(_recorded_backend(out, cell.simulator)),
+        simulator=sweep.simulators[cell.simulator].component(_recorded_backend(out, "simulator", cell.simulator)),
         perception=sweep.perceptions[cell.perception].component(),
-        decision=decision.component(cell.seed, resources),
+        decision=decision.component(cell.seed, resources, _recorded_backend(out, "decision", cell.decision)),
     )
     return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
 
 
-def _recorded_backend(out: Path, simulator: str) -> Mapping[str, Any] | None:
-    """Return the parts of the runs of a simulator in a sweep that has begun."""
+def _recorded_backend(out: Path, axis: str, name: str) -> Mapping[str, Any] | None:
+    """Return the parts of the runs with a simulator, or a decision model, in a sweep that has begun."""
     if not (out / SWEEP_NAME).exists():
         return None
     cells = read_claim(out)["cells"].values()
-    return next((cell["run"]["backend"] for cell in cells if cell["axes"].get("simulator") == simulator), None)
+    return next((cell["run"]["backend"] for cell in cells if cell["axes"].get(axis) == name), None)
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:

@@ -42,8 +42,8 @@ class ChooseQuestion(ClosedQuestion[Choice]):
                 objects.append((f"The view in which object {index} was last seen:", candidate.view))
         return goal_prompt(
             self.goal,
-            "The robot searches a home in which things may have been moved since they were last seen. Choose where "
-            "it goes next: to a remembered object that is the goal, or to a frontier behind which the goal may be.",
+            "The robot searches a home. Choose where it goes next: to a remembered object that is the goal, or to a "
+            "frontier behind which the goal may be.",
             ("What the robot sees ahead:", self.heading_view),
             *objects,
             *((f"Frontier {i}: {one.travel_m:.1f} m away", one.image) for i, one in enumerate(self.frontiers)),

@@ -131,8 +131,7 @@ class GraphQuestion(Question[GraphChoice]):
         what = {True: "what the robot sees now", False: "from its memory"}
         return goal_prompt(
             self.goal,
-            "The robot searches a home in which things may have been moved since they were last seen. Objects that "
-            "it remembers, one a line: id, class, x, y and z in metres, room.\n"
+            "The robot searches a home. Objects that it remembers, one a line: id, class, x, y and z in metres, room.\n"
             + ("\n".join(objects) or "none")
             + "\nPairs of objects that were seen together, one a line: id, id, [numbers of the images].\n"
             + ("\n".join(edges) or "none"),

@@ -137,10 +137,11 @@ def evaluate(
     record = read_controlled(directory)
     num_workers = local_run.num_workers
     simulation = SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets)
+    recorded = recorded_backend(run_of(directory, record.arms[0].name))
     backend = Backend(
-        simulator=simulation.component(recorded_backend(run_of(directory, record.arms[0].name))),
+        simulator=simulation.component(recorded),
         perception=perception.component(),
-        decision=decision_component(decisions, spending, directory, seed, num_workers),
+        decision=decision_component(decisions, spending, directory, seed, num_workers, recorded=recorded),
     )
     names = names_of(agent)
 

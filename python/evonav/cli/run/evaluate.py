@@ -94,10 +94,13 @@ def evaluate(
         check_terminal()
         run = run.model_copy(update={"workers": 0, "in_process": True})
     workforce = run.workforce()
+    recorded = recorded_backend(out)
     backend = Backend(
-        simulator=simulation.component(recorded_backend(out)),
+        simulator=simulation.component(recorded),
         perception=perception.component(),
-        decision=decision_component(decisions, spending, out, seed, run.num_workers, dry_run=dry_run),
+        decision=decision_component(
+            decisions, spending, out, seed, run.num_workers, recorded=recorded, dry_run=dry_run
+        ),
     )
     config = run.config(seed, backend, decisions)
     config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))

@@ -2,6 +2,7 @@
 
 from typing import TypeVar
 
+from evonav.decision.change_notice import with_notice
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.decision import with_schema
@@ -17,7 +18,15 @@ class Counting:
     """A decision model that notes what its questions would cost."""
 
     def __init__(
-        self, model: DecisionModel, client: VlmClient, ledger: Ledger, name: str, *, needs_images: bool, is_json: bool
+        self,
+        model: DecisionModel,
+        client: VlmClient,
+        ledger: Ledger,
+        name: str,
+        *,
+        needs_images: bool,
+        is_json: bool,
+        tells_of_change: bool | None = False,
     ) -> None:
         """Count the questions to `model`.
 
@@ -28,6 +37,7 @@ class Counting:
             name: Name of the episode, which precedes the kind.
             needs_images: True if questions should have images, as they would for the model.
             is_json: True if requests would come with a JSON Schema.
+            tells_of_change: See `with_notice`.
         """
         self.needs_images = needs_images
         self._model = model
@@ -35,10 +45,11 @@ class Counting:
         self._ledger = ledger
         self._name = name
         self._is_json = is_json
+        self._tells_of_change = tells_of_change
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the model's answer."""
-        prompt = question.prompt()
+        prompt = with_notice(question.prompt(), self._tells_of_change)
         if self._is_json:
             prompt = with_schema(prompt, question.answer_schema())
         used = Usage(self._client.estimate(prompt).input_tokens, OUTPUT_TOKENS)

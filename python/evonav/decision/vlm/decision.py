@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Literal, TypeVar
 
+from evonav.decision.change_notice import with_notice
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
@@ -47,13 +48,21 @@ _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, i
 class VlmDecision:
     """Answers every question by asking a model."""
 
-    def __init__(self, client: CachingClient, *, structured: Structured = "auto", needs_images: bool = True) -> None:
+    def __init__(
+        self,
+        client: CachingClient,
+        *,
+        structured: Structured = "auto",
+        needs_images: bool = True,
+        tells_of_change: bool | None = False,
+    ) -> None:
         """Create a decision model.
 
         Args:
             client: Client that asks and caches.
             structured: Answers by JSON Schema: auto, on, off.
             needs_images: True if agents should put images into questions.
+            tells_of_change: True if prompts say that things may have been moved, see `with_notice`.
 
         Raises:
             InvalidArgumentError: `structured` is none of the three.
@@ -63,6 +72,7 @@ class VlmDecision:
         self.client = client
         self.structured: Structured = structured
         self.needs_images = needs_images
+        self.tells_of_change = tells_of_change
         self._is_refused = False
         """True after the server has refused `response_format`."""
 
@@ -98,7 +108,7 @@ class VlmDecision:
 
     def _ask(self, question: Question[A], attempt: int) -> tuple[Answer, bool]:
         """Return the answer, and whether JSON was requested."""
-        plain = question.prompt()
+        plain = with_notice(question.prompt(), self.tells_of_change)
         if self.structured == "off":
             return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())

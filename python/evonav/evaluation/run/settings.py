@@ -162,6 +162,8 @@ class DecisionSettings(Settings):
     """VLM: seconds to wait for one answer. Default: 60."""
     max_retries: int | None = None
     """VLM: number of retries after a lost connection, status 429 or a server error. Default: 4."""
+    tell_of_change: bool = False
+    """Tell the model in every prompt that things may have been moved; the paper's agents are not informed."""
     noise: dict[str, float] = Field(default_factory=dict)
     """Rates of simulated mistakes, between 0 and 1: wrong, unparsable, refusal, lost; and delay in seconds."""
 
@@ -207,7 +209,7 @@ class DecisionSettings(Settings):
         elif ":" not in self.kind:
             raise SettingError(type(self), "kind", f"{self.kind}: expected text, vlm or module:name")
         else:
-            self._refuse_all_but("model", "mode", "exchanges", "exchange_images")
+            self._refuse_all_but("model", "mode", "exchanges", "exchange_images", "tell_of_change")
         if self.mode == "live" and self.exchanges is not None:
             raise SettingError(type(self), "exchanges", "is of no use with mode live, which stores nothing")
 
@@ -221,7 +223,7 @@ class DecisionSettings(Settings):
         if self.kind == "text":
             return noise
         if self.kind != "vlm":
-            return {"path": self.kind, **noise}
+            return {"path": self.kind, "tells_of_change": self.tell_of_change, **noise}
         from evonav.decision.backends import SAMPLING
 
         model = self.named_model()
@@ -230,15 +232,20 @@ class DecisionSettings(Settings):
             sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
         given = _given(temperature=self.temperature, top_p=self.top_p, max_tokens=self.max_tokens)
         request = {**sampling, **given}
-        return {"model": model, "structured": self.structured, "images": self.images, "request": request, **noise}
+        how = {"structured": self.structured, "images": self.images, "tells_of_change": self.tell_of_change}
+        return {"model": model, **how, "request": request, **noise}
 
-    def component(self, seed: int, resources: "DecisionResources | None") -> Component[DecisionModel]:
+    def component(
+        self, seed: int, resources: "DecisionResources | None", recorded: Mapping[str, Any] | None = None
+    ) -> Component[DecisionModel]:
         """Return the component of this decision model.
 
         Args:
             seed: The run's.
             resources: The files for answers and costs; without them the model cannot be asked, which is
                 enough for estimates.
+            recorded: Header of the parts of a run that is resumed. If it is older than `tell_of_change`, its prompts
+                stay as they were, unless the setting is given.
 
         Raises:
             InvalidArgumentError: A setting is invalid.
@@ -249,6 +256,8 @@ class DecisionSettings(Settings):
         if self.kind == "text":
             return Component("evonav.decision.backends:text_match", options)
         path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'own'}"
+        if not self.tell_of_change and _is_silent_on_change(recorded or {}, path):
+            del options["tells_of_change"]
         if resources is None:
             return Component(path, options)
         host_options: dict[str, Any] = {
@@ -369,6 +378,11 @@ def check_decision(decision: Component[DecisionModel], seed: int) -> None:
     check = getattr(decision.create(seed), "check", None)
     if check is not None:
         check()
+
+
+def _is_silent_on_change(recorded: Mapping[str, Any], path: str) -> bool:
+    """Return whether a run's header names this decision model, and is older than `DecisionSettings.tell_of_change`."""
+    return recorded.get("decision") == path and "tells_of_change" not in recorded.get("decision_options", {})
 
 
 def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
