@@ -6,10 +6,12 @@ from itertools import pairwise
 import pytest
 from toy_house import ToySimulator, episode_spec
 
+from evonav.agents.stay_still import StayStill
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import make_agent
+from evonav.evaluation.run.run import perception_seed
 from evonav.perception.ground_truth import GroundTruthPerception
 
 
@@ -58,3 +60,60 @@ def test_trace_adds_up_to_the_record():
             assert sum(math.dist(a, b) for a, b in pairwise(entry.path_m)) <= 1.0 + 1e-6
             assert all(math.dist(a, b) <= 0.25 + 1e-9 for a, b in pairwise(entry.path_m))
         assert StageRecord.model_validate_json(record.model_dump_json()) == record
+
+
+class Listening(StayStill):
+    """Notes what it is told, and when, in a list that the simulator shares."""
+
+    def __init__(self, events):
+        super().__init__()
+        self.events = events
+
+    def begin_task(self, task):
+        super().begin_task(task)
+        self.task_id = task.task_id
+
+    def begin_stage(self, goal):
+        super().begin_stage(goal)
+        self.events.append("goal")
+
+    def act(self, observation):
+        self.events.append("act")
+        return super().act(observation)
+
+
+class Planning(ToySimulator):
+    """Notes when a path is computed."""
+
+    def __init__(self, events):
+        super().__init__()
+        self.events = events
+
+    def shortest_path(self, *args):
+        self.events.append("path")
+        return super().shortest_path(*args)
+
+
+def test_the_reference_path_is_computed_before_the_agent_knows_the_goal():
+    events = []
+    run_episode("toy-moved", Listening(events), ProtocolConfig(max_rounds=1), Planning(events))
+    assert events == ["path", "goal", "act", "path"] * 3
+
+
+def test_the_task_has_another_name_for_agents_which_all_agents_of_a_run_share():
+    def name_of(task_id, seed, run_seed):
+        agent = Listening([])
+        spec, protocol = episode_spec(task_id), ProtocolConfig(max_rounds=1)
+        parts = (ToySimulator(), GroundTruthPerception(), protocol, seed)
+        next(Episode(spec, "agent", agent, *parts, perception_seed=perception_seed(run_seed, task_id)).run())
+        return agent.task_id
+
+    names = [
+        name_of("toy-moved", 1, 0),
+        name_of("toy-moved", 2, 0),
+        name_of("toy-moved", 1, 5),
+        name_of("toy-static", 1, 0),
+    ]
+    assert names[0] == names[1]
+    assert len(set(names)) == 3
+    assert not any("toy" in name for name in names)

@@ -21,6 +21,7 @@ class TaskInfo:
     """
 
     task_id: str
+    """A name for the task, the same for all agents of a run; it does not tell the house or how it was generated."""
     num_stages: int
     max_rounds: int
     """Decision rounds per stage (paper: 50)."""

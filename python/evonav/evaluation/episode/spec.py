@@ -1,5 +1,6 @@
 """Describe a task as the evaluator runs it: its stages, targets and hidden changes."""
 
+import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -152,3 +153,14 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
 
 def _guided_walk(oracle: OracleStage) -> GuidedWalk:
     return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
+
+
+def opaque_task_id(perception_seed: int) -> str:
+    """Return a task's name for agents, which tells neither the house nor the generator's seed.
+
+    It is the same for all agents of a run, and in a run that is resumed or replayed.
+
+    Args:
+        perception_seed: Seed of the perception, which is drawn from the run's seed and the task's id.
+    """
+    return hashlib.sha256(f"task\0{perception_seed}".encode()).hexdigest()[:12]

@@ -12,7 +12,7 @@ from evonav.evaluation.episode.oracle_baselines import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
-from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
+from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, opaque_task_id
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
@@ -104,10 +104,12 @@ class Stage:
         try:
             with attribute_errors(ErrorKind.HARNESS):
                 self._start()
+                # The agent is told the goal after this, or the time until its first round would tell of the distance.
+                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                    reference_m = [] if self._stage.guided is not None else self._path_to_target_m()
+                self._instruct()
                 if self._stage.guided is not None:
                     return self._guided(self._stage.guided)
-                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-                    reference_m = self._path_to_target_m()
                 progress = self._begin(self._protocol.budget(self._sensor_config), reference_m)
                 stop_reason = self._rounds(progress, self._carry_out)
                 return self._measured(progress, reference_m, stop_reason)
@@ -118,7 +120,7 @@ class Stage:
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:
-        """Load the stage's house, place the agent, and send it the goal."""
+        """Load the stage's house and place the agent."""
         stage = self._record.stage
         with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             start = self._simulator.reset(self._stage.house_json, self._requested)
@@ -142,6 +144,9 @@ class Stage:
         )
         if self._observer is not None:
             self._observer.stage_begins(stage, self._simulator)
+
+    def _instruct(self) -> None:
+        """Send the agent the goal, and read its memory as the stage begins."""
         with attribute_errors(ErrorKind.AGENT):
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
@@ -165,7 +170,7 @@ class Stage:
             self._sensor_config = self._granted()
             self._agent.begin_task(
                 TaskInfo(
-                    task_id=self._spec.task_id,
+                    task_id=opaque_task_id(self._perception_seed),
                     num_stages=len(self._spec.stages),
                     max_rounds=self._protocol.budget(self._sensor_config),
                     map_frame=map_frame(self._simulator.occupancy()),

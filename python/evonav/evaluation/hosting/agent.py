@@ -102,7 +102,14 @@ class RemoteAgent(HostedAgent):
     If that process is lost, the next request starts a fresh agent in a fresh process, which knows no task yet.
     """
 
-    def __init__(self, processes: AgentProcesses, name: str, decision: Component[DecisionModel], seed: int) -> None:
+    def __init__(
+        self,
+        processes: AgentProcesses,
+        name: str,
+        decision: Component[DecisionModel],
+        seed: int,
+        task_id: str | None = None,
+    ) -> None:
         """Start nothing yet.
 
         Args:
@@ -110,11 +117,13 @@ class RemoteAgent(HostedAgent):
             name: Name of the agent.
             decision: Decision model, made in the agent's process.
             seed: Seed of the model.
+            task_id: Name of the task in the log and in errors; default: the name that the agent is given.
         """
         self._processes = processes
         self._name = name
         self._decision = decision
         self._seed = seed
+        self._task_id = task_id
         self._process: AgentProcess | None = None
         self._sensors: SensorConfig | None = None
         self._is_lost = False
@@ -143,7 +152,7 @@ class RemoteAgent(HostedAgent):
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
-        self._label = f"{self._name} {task.task_id}"
+        self._label = f"{self._name} {self._task_id or task.task_id}"
         self._describe(self._label)
         self._is_lost = False
         self._sense(self._ask("begin_task", task))

@@ -114,7 +114,7 @@ class WorkerContext:
     def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
-            return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed)
+            return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed, job.task_id)
         try:
             if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINES:
                 return self._debugged_agent(job)
