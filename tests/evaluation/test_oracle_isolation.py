@@ -131,7 +131,7 @@ def process_loot(tmp_path_factory):
 def test_no_oracle_data_is_in_an_agents_process(process_loot):
     strings, ids = process_loot["strings"], {*OBJECTS, "room|1", "room|2", "wall|south"}
     assert "Chair" in strings
-    assert "toy-moved" in strings  # what it may know
+    assert not [text for text in strings if "toy-moved" in text]  # the task's own name would lead to its targets
     assert not ids & set(strings)
     assert not [text for text in strings if any(name in text for name in ids)]
     places = [*(centre for _, centre, _ in OBJECTS.values()), *CHAIR_AWAY.values()]
