@@ -96,6 +96,10 @@ def relation(kind, noun):
         ),
         ("the soap bar in the sink", "SoapBar", ParsedGoal("soap bar", (relation("on", "sink"),))),
         ("", None, ParsedGoal("")),
+        # The sentence says what to find; the category counts only where the sentence names no known type.
+        ("Go to the desk in the bedroom.", "SideTable", ParsedGoal("desk", (relation("in", "bedroom"),))),
+        ("Go to the loveseat in the bedroom.", "Sofa", ParsedGoal("sofa", (relation("in", "bedroom"),))),
+        ("Find it near the window.", "Dresser", ParsedGoal("dresser", (relation("near", "window"),))),
     ],
 )
 def test_reads(text, category, goal):

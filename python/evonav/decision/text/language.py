@@ -169,7 +169,7 @@ def parse_goal(instruction: str, category: str | None = None) -> ParsedGoal:
 
     Args:
         instruction: English text, in evonav's grammar or freer.
-        category: Category of the target; by default it is read from the sentence.
+        category: Category of the target, which counts only where the sentence names no known type of object.
 
     Returns:
         What was understood; never fails. A noun that cannot be made out is empty.
@@ -180,7 +180,9 @@ def parse_goal(instruction: str, category: str | None = None) -> ParsedGoal:
     matches = list(_RELATION.finditer(text))
     # Before the noun "and" joins colours: "the black and white mug".
     head = _phrase(re.sub(_COLOUR_PAIR, r"\1 \2", text[: matches[0].start()] if matches else text))
-    noun = canonical(category) if category else canonical(_without_adjectives(head))
+    noun = canonical(_without_adjectives(head))
+    if category and noun not in _NOUNS:
+        noun = canonical(category)
     relations: list[Relation] = []
     for match, following in zip_longest(matches, matches[1:]):
         kind = next(_RELATIONS[i][0] for i in range(len(_RELATIONS)) if match.group(f"r{i}"))
