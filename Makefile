@@ -7,7 +7,7 @@ LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-procthor test-models lint format bench wheel data readme docs lock clean
+.PHONY: help setup demo test test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -60,6 +60,19 @@ $(VENV)-models/.dependencies: pyproject.toml
 test-models: setup $(VENV)-models/.dependencies  ## test predicted perception with PyTorch (6 GB)
 	PYTHONPATH=$(CURDIR)/python $(VENV)-models/bin/python -m pytest tests/models
 
+# A real language model that reads text, in an environment of its own (1.2 GB; docs/decision.md).
+$(VENV)-llm/.dependencies: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-llm
+	$(VENV)-llm/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(VENV)-llm/bin/python -m pip install --quiet --group llm
+	touch $@
+
+llm: $(VENV)-llm/.dependencies  ## serve a real language model on this machine (1.2 GB)
+	$(VENV)-llm/bin/python scripts/serve_llm.py
+
+test-llm: setup $(VENV)-llm/.dependencies  ## test decisions with a real language model (1.2 GB)
+	EVONAV_LLM_PYTHON=$(CURDIR)/$(VENV)-llm/bin/python $(BIN)/python -m pytest tests/llm
+
 lint: setup  ## check format, types, imports, spelling and English
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets -- -D warnings
@@ -107,4 +120,4 @@ lock: $(VENV)/.maturin  ## renew requirements-dev.txt with the newest versions
 	$(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 --group dev --upgrade --output-file requirements-dev.txt
 
 clean:  ## delete the environments and all that was built
-	rm -rf $(VENV) $(VENV)-models $(VENV)-procthor target dist out
+	rm -rf $(VENV) $(VENV)-llm $(VENV)-models $(VENV)-procthor target dist out

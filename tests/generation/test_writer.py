@@ -90,6 +90,31 @@ def num_stages(tasks: list[Task]) -> int:
     return sum(task.num_stages for task in tasks)
 
 
+def test_a_text_model_merges_the_describers_texts(folder: Path) -> None:
+    before = list(load_tasks(folder))
+    asked: list[str] = []
+
+    def merges(request: dict[str, Any]) -> dict[str, str]:
+        (part,) = request["messages"][0]["content"]
+        assert part["type"] == "text"
+        assert "image" not in part["text"]
+        asked.append(part["text"])
+        return {"text": f"Go there, please, for the {len(asked)}. time."}
+
+    with serving(merges) as stub:
+        client = client_of(stub)
+        assert estimate_texts(folder, client, images=False).num_questions == num_stages(before)
+        writing = write_texts(folder, client, images=False)
+        again = write_texts(folder, client, images=False)
+    assert writing.num_written == again.num_written_before == num_stages(before) == len(asked)
+    for old, new in zip(before, load_tasks(folder), strict=True):
+        for was, now in zip(old.public_stages, new.public_stages, strict=True):
+            assert now.writer == "vlm:gpt-4o, without images"
+            assert now.appearance_instruction == was.appearance_instruction
+            assert now.unified_instruction.startswith("Go there, please")
+            assert any(was.basic_instruction in text and was.appearance_instruction in text for text in asked)
+
+
 def test_texts_and_checksums_change_and_nothing_else(stub: Stub, folder: Path) -> None:
     before = list(load_tasks(folder))
     files_before = bytes_of(folder)

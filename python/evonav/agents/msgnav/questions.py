@@ -166,8 +166,14 @@ class GraphQuestion(Question[GraphChoice]):
         return f"Image {answer.id}, {answer.category}" if answer.kind == "image" else "Continue Exploration"
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """Return the schema of the three forms."""
-        return {"type": "string", "pattern": r"^(Object \d+|Image \d+, [A-Za-z][A-Za-z ]*|Continue Exploration)$"}
+        """Return the schema of the three forms, with the numbers that the question has."""
+        # Servers compile this to a grammar; some know no `\d`, and without bounds small models go on for ever.
+        forms = ["Continue Exploration"]
+        if self.objects:
+            forms.append(f"Object ({'|'.join(str(node.entry_id) for node in self.objects)})")
+        if self.images:
+            forms.append(f"Image ({'|'.join(map(str, range(len(self.images))))}), [A-Za-z][A-Za-z ]{{0,40}}")
+        return {"type": "string", "pattern": f"^({'|'.join(forms)})$"}
 
     def alternatives(self, answer: GraphChoice) -> Sequence[GraphChoice]:
         """Return every other object, and exploration."""

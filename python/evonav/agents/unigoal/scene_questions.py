@@ -186,7 +186,7 @@ class GroupScoreQuestion(Question[float]):
 
     def answer_schema(self) -> Mapping[str, Any]:
         """Return the schema of a number as text."""
-        return {"type": "string", "pattern": r"^(0(\.\d+)?|1(\.0+)?)$"}
+        return {"type": "string", "pattern": "^(0([.][0-9]{1,6})?|1([.]0{1,6})?)$"}
 
     def alternatives(self, answer: float) -> Sequence[float]:
         """Return the other end of the scale."""

@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of tasks, which are rewritten in place.")]
 Concurrency = Annotated[int, typer.Option(min=1, metavar="N", help="Number of questions asked at the same time.")]
+Images = Annotated[
+    bool,
+    typer.Option(
+        "--images/--no-images",
+        help="Show the reference images. Without, a text model merges the parts of each instruction, and how goals "
+        "look stays as the rules wrote it.",
+    ),
+]
 
 
 @with_settings("endpoint", "spending")
@@ -26,6 +34,7 @@ def write(
     endpoint: "DecisionSettings",
     spending: "SpendingSettings",
     concurrency: Concurrency = 4,
+    images: Images = True,
     dry_run: DryRun = False,
     limit: Limit = None,
 ) -> None:
@@ -45,7 +54,7 @@ def write(
     store = None if endpoint.exchanges is None else ResponseCache(Path(endpoint.exchanges))
     client = VlmClient(config, store=store, mode=endpoint.mode, account=account)
     if dry_run:
-        estimate = estimate_texts(folder, client, limit=limit)
+        estimate = estimate_texts(folder, client, images=images, limit=limit)
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"
         num_left = estimate.num_questions - estimate.num_cached
         counts = f"{estimate.num_cached} answered by the cache; {num_left} to ask"
@@ -53,7 +62,13 @@ def write(
         typer.echo(f"at most {estimate.usage.input_tokens} tokens in, {estimate.usage.output_tokens} out{cost}")
         return
     with progress_bar("tasks") as show:
-        writing = write_texts(folder, client, limit=limit, on_task=lambda state: show(state.num_done, state.num_tasks))
+        writing = write_texts(
+            folder,
+            client,
+            images=images,
+            limit=limit,
+            on_task=lambda state: show(state.num_done, state.num_tasks),
+        )
     _tell(writing)
     cost = "" if account.cost_usd is None else f", ${account.cost_usd:.4f}"
     counts = f"{counted(account.num_asked, 'question')} asked, {account.num_replayed} answered from exchanges"

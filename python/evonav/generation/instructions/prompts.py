@@ -21,6 +21,11 @@ UNIFIED_PROMPT = (
     "Keep relations such as on, next to, near, or below only when they are supported by the image."
 )
 """The paper's prompt for unified instructions."""
+UNIFIED_TEXT_PROMPT = (
+    "Given the basic instruction and the appearance instruction, write one concise navigation instruction that "
+    "combines spatial relations with visual appearance."
+)
+"""The same without what it says of the reference image, for models that read text only."""
 
 MAX_CHARACTERS = 2000
 MAX_SENTENCES = 2
@@ -49,16 +54,18 @@ def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> 
     return Prompt.of(Text(f"{APPEARANCE_PROMPT}\n\n{inputs}"), Picture(image))
 
 
-def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Prompt:
+def unified_question(basic: str, appearance: str, image: NDArray[np.uint8] | None) -> Prompt:
     """Return the prompt that asks for a unified instruction.
 
     Args:
         basic: The target's basic instruction.
         appearance: The target's appearance instruction.
-        image: `(H, W, 3)` RGB reference image.
+        image: `(H, W, 3)` RGB reference image; `None` for a model that reads text only, which is not told of one.
     """
-    inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}\nReference image:"
-    return Prompt.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}"), Picture(image))
+    inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}"
+    if image is None:
+        return Prompt.of(Text(f"{UNIFIED_TEXT_PROMPT}\n\n{inputs}"))
+    return Prompt.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}\nReference image:"), Picture(image))
 
 
 def repair_request(fault: str) -> str:

@@ -66,15 +66,16 @@ class Estimate:
     """Estimated usage of the remaining questions (upper bound)."""
 
 
-def writer_of(client: VlmClient) -> str:
+def writer_of(client: VlmClient, images: bool = True) -> str:
     """Return the value of `PublicStage.writer` for a model's texts."""
-    return f"vlm:{client.config.model}"
+    return f"vlm:{client.config.model}" if images else f"vlm:{client.config.model}, without images"
 
 
 def write_texts(
     directory: Path | str,
     client: VlmClient,
     *,
+    images: bool = True,
     limit: int | None = None,
     on_task: Callable[[Writing], None] | None = None,
 ) -> Writing:
@@ -83,6 +84,8 @@ def write_texts(
     Args:
         directory: Folder with one folder a task.
         client: Client of the model; its limit on concurrent questions also limits the concurrent tasks.
+        images: Show the reference images to the model. Without them, the appearance instructions stay the describer's
+            and the model writes the unified ones from the texts alone.
         limit: Number of tasks, from the first; default all.
         on_task: Called after each task.
 
@@ -102,7 +105,7 @@ def write_texts(
             try:
                 for root in [*roots, None]:
                     if root is not None and writing.stopped is None:
-                        waiting.add(pool.submit(_write_task, root, client, stop))
+                        waiting.add(pool.submit(_write_task, root, client, images, stop))
                     at_most = 0 if root is None else 2 * client.config.max_concurrency
                     while len(waiting) > at_most:
                         done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
@@ -122,7 +125,9 @@ def write_texts(
     return writing
 
 
-def estimate_texts(directory: Path | str, client: VlmClient, *, limit: int | None = None) -> Estimate:
+def estimate_texts(
+    directory: Path | str, client: VlmClient, *, images: bool = True, limit: int | None = None
+) -> Estimate:
     """Estimate the cost of `write_texts` without asking any question.
 
     Raises:
@@ -132,13 +137,13 @@ def estimate_texts(directory: Path | str, client: VlmClient, *, limit: int | Non
     for root in _roots(Path(directory), limit):
         task = load_task(root)
         for public, image in zip(task.public_stages, task.reference_images, strict=True):
-            if public.writer == writer_of(client):
+            if public.writer == writer_of(client, images):
                 continue
-            # The second question will contain the model's appearance text, which is not known yet.
-            for question in (
-                appearance_question(public.category, public.basic_instruction, image),
-                unified_question(public.basic_instruction, public.appearance_instruction, image),
-            ):
+            questions = [appearance_question(public.category, public.basic_instruction, image)] if images else []
+            # With images, this question will contain the model's appearance text, which is not known yet.
+            shown = image if images else None
+            questions.append(unified_question(public.basic_instruction, public.appearance_instruction, shown))
+            for question in questions:
                 is_cached = client.is_cached(question)
                 num_questions += 1
                 num_cached += is_cached
@@ -146,16 +151,19 @@ def estimate_texts(directory: Path | str, client: VlmClient, *, limit: int | Non
     return Estimate(num_questions, num_cached, usage)
 
 
-def write_stage(public: PublicStage, image: NDArray[np.uint8], client: VlmClient) -> PublicStage:
-    """Return a stage's public part with the model's texts.
+def write_stage(public: PublicStage, image: NDArray[np.uint8] | None, client: VlmClient) -> PublicStage:
+    """Return a stage's public part with the model's texts; without an image only the unified instruction is new.
 
     Raises:
         VlmError: The model gives no usable text.
     """
     basic = public.basic_instruction
-    appearance = _text(client, appearance_question(public.category, basic, image))
+    appearance = public.appearance_instruction
+    if image is not None:
+        appearance = _text(client, appearance_question(public.category, basic, image))
     unified = _text(client, unified_question(basic, appearance, image))
-    texts = {"appearance_instruction": appearance, "unified_instruction": unified, "writer": writer_of(client)}
+    writer = writer_of(client, images=image is not None)
+    texts = {"appearance_instruction": appearance, "unified_instruction": unified, "writer": writer}
     return public.model_copy(update=texts)
 
 
@@ -172,20 +180,20 @@ def _text(client: VlmClient, question: Prompt) -> str:
     return text
 
 
-def _write_task(root: Path, client: VlmClient, stop: threading.Event) -> tuple[Task, Writing]:
+def _write_task(root: Path, client: VlmClient, images: bool, stop: threading.Event) -> tuple[Task, Writing]:
     """Rewrite one task, or leave it as it was if the pass ends first."""
     task = load_task(root)
     part = Writing(num_done=1)
     stages: list[PublicStage] = []
     for public, image in zip(task.public_stages, task.reference_images, strict=True):
-        if public.writer == writer_of(client):
+        if public.writer == writer_of(client, images):
             part.num_written_before += 1
             stages.append(public)
             continue
         if stop.is_set():
             return task, Writing()
         try:
-            stages.append(write_stage(public, image, client))
+            stages.append(write_stage(public, image if images else None, client))
             part.num_written += 1
         except VlmError as error:
             if error.kind in LASTING:
