@@ -11,6 +11,8 @@ from toy_episode import START
 from toy_house import CHAIR_AWAY, OBJECTS, stage_case
 
 from evonav.agents.agent import NavigateTo
+from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
+from evonav.agents.navigator import NavigatorConfig
 from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.evaluation.protocol import ProtocolConfig
@@ -242,7 +244,8 @@ def all_shown():
     """Frontiers alone are chosen, all classes are kept, and images are asked for; the chair moves after a stage."""
     model = scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
     model.needs_images = True
-    agent = Watched(ThreeDMemConfig(max_classes=100), model)
+    navigator = NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)  # does not run out of frontiers
+    agent = Watched(ThreeDMemConfig(navigator=navigator, max_classes=100), model)
     stages = (stage_case(1, "Chair|1"), stage_case(2, "Chair|1", moves=CHAIR_AWAY, mode="SALIENT_OBJECT"))
     run(agent, *stages, max_rounds=15)
     asked = [(entry, question) for entry in agent.rounds for question in entry["questions"]]

@@ -35,6 +35,14 @@ class ExplorerConfig:
     frontiers: FrontierConfig = field(default_factory=FrontierConfig)
 
 
+AS_THREE_D_MEM = ExplorerConfig(min_conflict_cells=None, frontiers=FrontierConfig(min_border_cells=0))
+"""3D-Mem's exploration, which MSGNav shares.
+
+The last observation of a cell wins, the map is never cleared, and only regions of unknown floor are frontiers."""
+AS_THREE_D_MEM_PLUS = ExplorerConfig(min_conflict_cells=None)
+"""The same with our fallback: without any region, unknown cells beside free ones are frontiers."""
+
+
 class Explorer:
     """An occupancy map that is rebuilt when an observation contradicts it, and the frontiers that are left."""
 

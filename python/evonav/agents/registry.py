@@ -31,7 +31,12 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
     ),
+    "3d-mem+": (
+        "evonav.agents.three_d_mem.agent:ThreeDMemPlus",
+        "3D-Mem with our fallback for frontiers: it does not run out of them",
+    ),
     "msgnav": ("evonav.agents.msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
+    "msgnav+": ("evonav.agents.msgnav.agent:MsgNavPlus", "MSGNav with our fallback for frontiers"),
     "unigoal": (
         "evonav.agents.unigoal.agent:UniGoal",
         "UniGoal as released: single actions, detector, nearest frontiers",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
-from evonav.agents.explorer import ExplorerConfig
+from evonav.agents.explorer import AS_THREE_D_MEM, AS_THREE_D_MEM_PLUS
 from evonav.agents.msgnav.candidates import GraphObject, PastChoice
 from evonav.agents.msgnav.memory import GraphMemory
 from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
@@ -33,10 +33,8 @@ from evonav.tasks.public import Goal, TaskInfo
 class MsgNavConfig:
     """MSGNav's constants."""
 
-    navigator: NavigatorConfig = field(
-        default_factory=lambda: NavigatorConfig(explorer=ExplorerConfig(min_conflict_cells=None), image_px=512)
-    )
-    """The map is never cleared; images of 512 px at most."""
+    navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM, image_px=512))
+    """3D-Mem's exploration; images of 512 px at most."""
     max_edge_m: float = 3.5
     """Entries seen together have an edge up to this distance."""
     max_selected: int = 20
@@ -281,6 +279,14 @@ class MsgNav(NavigatorAgent):
 
     def _round_counters(self) -> Mapping[str, int]:
         return {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
+
+
+class MsgNavPlus(MsgNav):
+    """MSGNav with our fallback for frontiers, which its released code lacks."""
+
+    def __init__(self, config: MsgNavConfig | None = None, decision: DecisionModel | None = None) -> None:
+        navigator = NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS, image_px=512)
+        super().__init__(config or MsgNavConfig(navigator=navigator), decision)
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:

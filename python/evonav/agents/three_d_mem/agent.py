@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from evonav.agents.agent import AgentAction
-from evonav.agents.explorer import ExplorerConfig
+from evonav.agents.explorer import AS_THREE_D_MEM, AS_THREE_D_MEM_PLUS
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
@@ -26,10 +26,7 @@ NOTHING_LEFT = "aborted: no snapshot and no frontier left"
 class ThreeDMemConfig:
     """3D-Mem's constants."""
 
-    navigator: NavigatorConfig = field(
-        # The last observation of a cell wins, and the map is never cleared.
-        default_factory=lambda: NavigatorConfig(explorer=ExplorerConfig(min_conflict_cells=None))
-    )
+    navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM))
     max_classes: int = 10
     """Largest number of classes that pass the prefilter."""
     recluster_reach_m: float = RECLUSTER_REACH_M
@@ -152,3 +149,10 @@ class ThreeDMem(NavigatorAgent):
             "num_snapshots": len(self._snapshots.snapshots),
             **super()._round_details(reason),
         }
+
+
+class ThreeDMemPlus(ThreeDMem):
+    """3D-Mem with our fallback for frontiers, which its released code lacks."""
+
+    def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
+        super().__init__(config or ThreeDMemConfig(navigator=NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)), decision)
