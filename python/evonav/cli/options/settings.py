@@ -146,7 +146,7 @@ def settings_options(name: str) -> Options:
             settings.DecisionSettings,
             MODEL_PANEL,
             {"mode": "vlm_mode"},
-            fields=("model", "base_url", "mode", "exchanges"),
+            fields=("model", "base_url", "mode", "exchanges", "images"),
         ),
         "spending": Options(settings.SpendingSettings, MODEL_PANEL),
         "simulation": Options(

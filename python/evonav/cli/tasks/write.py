@@ -18,14 +18,6 @@ if TYPE_CHECKING:
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of tasks, which are rewritten in place.")]
 Concurrency = Annotated[int, typer.Option(min=1, metavar="N", help="Number of questions asked at the same time.")]
-Images = Annotated[
-    bool,
-    typer.Option(
-        "--images/--no-images",
-        help="Show the reference images. Without, a text model merges the parts of each instruction, and how goals "
-        "look stays as the rules wrote it.",
-    ),
-]
 
 
 @with_settings("endpoint", "spending")
@@ -34,14 +26,13 @@ def write(
     endpoint: "DecisionSettings",
     spending: "SpendingSettings",
     concurrency: Concurrency = 4,
-    images: Images = True,
     dry_run: DryRun = False,
     limit: Limit = None,
 ) -> None:
     """Let a model rewrite instructions; run again to resume.
 
-    With the paper's prompts, it describes how goals look and merges the parts of each instruction. The key is read from
-    OPENAI_API_KEY.
+    With the paper's prompts, it describes how goals look and merges the parts of each instruction. With --no-images it
+    only merges them. The key is read from OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.client import VlmClient, VlmConfig
@@ -54,7 +45,7 @@ def write(
     store = None if endpoint.exchanges is None else ResponseCache(Path(endpoint.exchanges))
     client = VlmClient(config, store=store, mode=endpoint.mode, account=account)
     if dry_run:
-        estimate = estimate_texts(folder, client, images=images, limit=limit)
+        estimate = estimate_texts(folder, client, images=endpoint.images, limit=limit)
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"
         num_left = estimate.num_questions - estimate.num_cached
         counts = f"{estimate.num_cached} answered by the cache; {num_left} to ask"
@@ -65,7 +56,7 @@ def write(
         writing = write_texts(
             folder,
             client,
-            images=images,
+            images=endpoint.images,
             limit=limit,
             on_task=lambda state: show(state.num_done, state.num_tasks),
         )
