@@ -10,8 +10,10 @@ from scripted_model import scripted
 from toy_episode import START
 from toy_house import OBJECTS, stage_case
 
-from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished
+from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished, UniGoalConfig
 from evonav.agents.unigoal.bev import BevMap
+from evonav.agents.unigoal.graphs import GraphConfig
+from evonav.agents.unigoal.questions import CategoryQuestion
 from evonav.agents.unigoal.scene_questions import GroupScoreQuestion, RelationLinesQuestion
 from evonav.decision.text.matcher import TextMatch
 from evonav.evaluation.protocol import ProtocolConfig
@@ -21,6 +23,7 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 
+AS_PUBLISHED = UniGoalConfig(graph=GraphConfig(mode="paper"))
 SHORT = ProtocolConfig(max_actions=60)
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
 
@@ -76,8 +79,8 @@ def test_the_goal_in_view_is_approached_confirmed_and_stopped_at():
 
 @pytest.fixture(scope="module")
 def in_vain():
-    """A search for what no detector knows, to the end of the budget."""
-    agent = Watched()
+    """A search for what no detector knows, to the end of the budget; only as published may it be named so."""
+    agent = Watched(AS_PUBLISHED)
     (record,) = run(agent, stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig())
     return agent, record
 
@@ -106,10 +109,17 @@ def test_with_nothing_left_to_explore_it_goes_to_random_explored_places(in_vain)
 
 
 def test_as_released_six_categories_are_known_as_published_all_that_are_mapped():
-    for kind, category in ((UniGoal, None), (UniGoalAsPublished, "refrigerator")):
+    for kind, category in ((UniGoal, "chair"), (UniGoalAsPublished, "refrigerator")):
         agent = kind()
         run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_actions=1))
         assert agent.diagnostics().details["category"] == category
+
+
+def test_as_released_the_category_is_a_chair_after_ten_answers_that_name_none():
+    model = scripted(category="none")
+    (record,) = run(UniGoal(decision=model), stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_actions=1))
+    assert sum(isinstance(question, CategoryQuestion) for question in model.questions) == 10
+    assert record.trace[0].details["category"] == "chair"
 
 
 class ShySight(GroundTruthPerception):
@@ -187,7 +197,7 @@ def test_the_scene_graph_stays_and_the_goal_graph_goes():
     # The goal is read once a stage, and anew in the next one.
     assert [q.goal.stage for q in model.questions if q.kind == "goal-objects"] == [1, 2]
     categories = [{entry.details["category"] for entry in record.trace} for record in (first, second)]
-    assert categories == [{None}, {"bed"}]
+    assert categories == [{"chair"}, {"bed"}]
 
 
 def test_a_wrong_number_of_relation_lines_drops_the_edges():
@@ -206,7 +216,7 @@ def test_a_wrong_number_of_relation_lines_drops_the_edges():
 
 def test_a_group_score_that_is_no_number_is_zero():
     model = scripted(group_score="quite likely")
-    (record,) = run(UniGoal(decision=model), stage_case(1, "GarbageCan|1"))
+    (record,) = run(UniGoalAsPublished(decision=model), stage_case(1, "GarbageCan|1"))
     assert any(isinstance(question, GroupScoreQuestion) for question in model.questions)
     assert all(entry.details.get("mid_term_m") is None for entry in record.trace)
 
@@ -231,7 +241,7 @@ def test_as_published_a_node_found_whole_is_walked_to():
 
 def test_runs_are_the_same_every_time(in_vain):
     agent, record = in_vain
-    again = Watched()
+    again = Watched(AS_PUBLISHED)
     (shorter,) = run(again, stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig(max_actions=350))
     assert shorter.trace == record.trace[:350]
     # Places drawn when nothing is left to explore are the same ones, too.

@@ -45,6 +45,22 @@ MAP_CATEGORIES = (
 )
 """All categories of the map's detector."""
 
+ASSOCIATED_CATEGORY: dict[str, str] = {
+    **dict.fromkeys(("AlarmClock", "DogBed", "Dresser", "LaundryHamper", "Pillow", "TeddyBear"), "bed"),
+    **dict.fromkeys(("CoffeeTable", "FloorLamp", "Newspaper", "Ottoman"), "couch"),
+    **dict.fromkeys(("RoomDecor", "TableTopDecor", "Vase", "WateringCan"), "plant"),
+    **dict.fromkeys(("CD", "Desktop", "Laptop", "RemoteControl", "TVStand"), "tv"),
+    **dict.fromkeys(("Cloth", "Faucet", "HandTowel", "HandTowelHolder", "Plunger", "ScrubBrush"), "toilet"),
+    **dict.fromkeys(("ShowerCurtain", "ShowerHead", "Sink", "SoapBar", "SoapBottle", "SprayBottle"), "toilet"),
+    **dict.fromkeys(("TissueBox", "ToiletPaper", "ToiletPaperHanger", "Towel", "TowelHolder"), "toilet"),
+}
+"""The category of `CODE_CATEGORIES` that is thought of first with a type that none of them names; else a chair.
+
+The original forces a language model to name one of the six; this stands in for its answer. It is our choice by
+meaning, and no rate was looked at."""
+FALLBACK_CATEGORY = CODE_CATEGORIES[0]
+"""The released code's category after ten answers that name none: a chair."""
+
 NO_CATEGORY = "none"
 """Category of a goal that the detector does not know."""
 

@@ -26,7 +26,7 @@ from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View
 from evonav.tasks.public import Goal
-from evonav.tasks.vocabulary import CODE_CATEGORIES, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
+from evonav.tasks.vocabulary import CODE_CATEGORIES, FALLBACK_CATEGORY, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 MatchStage = Literal["zero", "partial", "perfect"]
 
@@ -59,6 +59,8 @@ class GraphConfig:
     perfect_score: float = 0.9
     num_decompositions: int = 10
     """Number of tries before the whole graph is the only subgraph."""
+    num_category_tries: int = 10
+    """Number of tries before the category is a chair, as released."""
     correction_hops: int = 2
     correction_reach_m: float = 2.0
     """Longest edge of a hop: every two nodes are joined, so two hops without a limit would be the whole house."""
@@ -118,9 +120,15 @@ class GraphReasoner:
             self.subgraphs = parts or (self.goal_graph,)
         else:
             self.subgraphs = (self.goal_graph,)
-        known = CODE_CATEGORIES if self.config.mode == "code" else MAP_CATEGORIES
-        category = ask(CategoryQuestion(goal, text, objects[0], known))
-        self.category = None if category in (None, NO_CATEGORY) else category
+        self.category = self._category(text, objects[0])
+
+    def _category(self, text: str, target: str) -> str | None:
+        """Return what the detector looks for; as released, it is always one of six categories."""
+        if self.config.mode == "code":
+            question = CategoryQuestion(self._goal, text, target, CODE_CATEGORIES, may_decline=False)
+            return self._queries.ask(question, self.config.num_category_tries) or FALLBACK_CATEGORY
+        category = self._queries.ask(CategoryQuestion(self._goal, text, target, MAP_CATEGORIES, may_decline=True))
+        return None if category == NO_CATEGORY else category
 
     def observe(self, view: View) -> None:
         """Add a view and relate its new nodes; an answer with a wrong number of relations relates none of them."""

@@ -16,7 +16,13 @@ from evonav.decision.question import AnswerError, ClosedQuestion, Question, firs
 from evonav.decision.text.language import canonical, parse_goal
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import Goal
-from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
+from evonav.tasks.vocabulary import (
+    ASSOCIATED_CATEGORY,
+    CATEGORY_OF_TYPE,
+    FALLBACK_CATEGORY,
+    MAP_CATEGORIES,
+    NO_CATEGORY,
+)
 
 _LIST = re.compile(r"\[([^\[\]]*)\]\.?")
 _RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")
@@ -24,6 +30,7 @@ _CATEGORY_OF_NOUN = {
     **{canonical(category): category for category in MAP_CATEGORIES},
     **{canonical(kind): category for kind, category in CATEGORY_OF_TYPE.items()},
 }
+_ASSOCIATED_CATEGORY_OF_NOUN = {canonical(kind): category for kind, category in ASSOCIATED_CATEGORY.items()}
 
 
 def relation_line(a: str, b: str, subject: str, relation: str, object_: str) -> str:
@@ -257,27 +264,37 @@ class CategoryQuestion(ClosedQuestion[str]):
     target: str
     """The object to find, as the goal graph calls it."""
     categories: tuple[str, ...]
+    may_decline: bool
+    """`none` is an answer, too; in the released code it is not."""
 
     def prompt(self) -> Prompt:
         """Show the goal in words, and the categories."""
+        form = f'one of them, or with "{NO_CATEGORY}" if it is none of them.'
+        if not self.may_decline:
+            form = "one of them, the closest if it is none of them."
         return Prompt.of(
             f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
             f"[{', '.join(self.categories)}]. Which of these is the object? Answer on the first line with exactly "
-            f'one of them, or with "{NO_CATEGORY}" if it is none of them.',
+            f"{form}",
         )
 
     def parse(self, text: str) -> str:
-        """Read one of the categories, or `none`."""
+        """Read one of the categories, or `none` where the question allows it."""
         line = first_line(text).rstrip(".").lower()
         if line not in self.choices():
             raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
         return line
 
     def choices(self) -> Sequence[str]:
-        """Return the categories, and `none`."""
-        return (*self.categories, NO_CATEGORY)
+        """Return the categories, and `none` where it is allowed."""
+        return (*self.categories, NO_CATEGORY) if self.may_decline else self.categories
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
-        """Return the category of the target's noun."""
-        found = _CATEGORY_OF_NOUN.get(canonical(self.target), NO_CATEGORY)
-        return (found if found in self.categories else NO_CATEGORY), "looked up"
+        """Return the category of the target's noun; without one, `none` or the one thought of first."""
+        noun = canonical(self.target)
+        found = _CATEGORY_OF_NOUN.get(noun)
+        if found in self.categories:
+            return found, "looked up"
+        if self.may_decline:
+            return NO_CATEGORY, "looked up"
+        return _ASSOCIATED_CATEGORY_OF_NOUN.get(noun, FALLBACK_CATEGORY), "the closest"
