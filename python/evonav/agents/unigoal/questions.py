@@ -271,7 +271,7 @@ class CategoryQuestion(ClosedQuestion[str]):
         """Show the goal in words, and the categories."""
         form = f'one of them, or with "{NO_CATEGORY}" if it is none of them.'
         if not self.may_decline:
-            form = "one of them, the closest if it is none of them."
+            form = "one of them, the closest if it is something else."
         return Prompt.of(
             f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
             f"[{', '.join(self.categories)}]. Which of these is the object? Answer on the first line with exactly "
