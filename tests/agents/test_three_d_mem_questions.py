@@ -36,6 +36,7 @@ SINK = thing(3, "Sink", 6.3, 2.0, y=0.8, size=(0.5, 0.2, 0.4))
 MUG_ON_TABLE = thing(4, "Mug", 2.0, 2.0, y=0.85, size=(0.1, 0.1, 0.1), seen=9)
 MUG_ON_COUNTER = thing(5, "Mug", 5.9, 2.0, y=0.95, size=(0.1, 0.1, 0.1))
 FRIDGE = thing(6, "Fridge", 7.5, 2.0, y=0.9, size=(0.7, 1.8, 0.7))
+BED = thing(7, "Bed", 1.0, 6.0, size=(1.5, 0.6, 2.0))
 ALL = (COUNTER, SINK, MUG_ON_TABLE, MUG_ON_COUNTER, FRIDGE)
 FRONTIERS = (
     FrontierCandidate(8, (0.0, 1.0), 1.0, pixels(80)),
@@ -141,17 +142,17 @@ def test_prefilter_answers_can_be_said(names):
         assert question.parse(question.answer_text(other)) == other
 
 
-def test_rules_keep_the_classes_that_the_instruction_speaks_of():
+def test_rules_keep_the_classes_that_the_instruction_speaks_of_then_those_of_its_room():
     reply = TextMatch().answer(prefilter())
-    assert reply.answer == ("Mug", "CounterTop", "Sink")
+    assert reply.answer == ("Mug", "CounterTop", "Sink", "Fridge")
     assert prefilter().parse(reply.text) == reply.answer
 
 
-def test_rules_keep_no_class_where_none_is_spoken_of():
+def test_rules_keep_no_class_where_none_may_help():
     """As without an answer in the original: no snapshot is left, and the agent explores."""
-    reply = TextMatch().answer(prefilter(("Bed", "Fridge")))
+    reply = TextMatch().answer(prefilter(("Bed", "Chair")))
     assert reply.answer == ()
-    assert prefilter(("Bed", "Fridge")).parse(reply.text) == ()
+    assert prefilter(("Bed", "Chair")).parse(reply.text) == ()
 
 
 @given(st.permutations([MUG_ON_TABLE, MUG_ON_COUNTER, COUNTER, SINK]), st.integers(1, 3))
@@ -164,9 +165,15 @@ def test_rules_choose_what_they_would_choose_for_frontier_update(objects, cut):
     assert chosen == objects[TextMatch().answer(flat).answer.index] == MUG_ON_COUNTER
 
 
-def test_rules_explore_where_no_relation_holds_and_settle_when_nothing_is_left():
-    assert TextMatch().answer(snapshot_question([MUG_ON_TABLE])).answer.snapshot is None
-    assert TextMatch().answer(snapshot_question([MUG_ON_TABLE], rounds=5)).answer == SnapshotChoice(0, 0)
+def test_rules_settle_for_the_goals_kind_even_where_no_relation_holds():
+    flat = ChooseQuestion(MUG_GOAL, (0.0, 0.0), [MUG_ON_TABLE], FRONTIERS, ALL, 40)
+    assert TextMatch().answer(flat).answer.kind == "frontier"  # Frontier-Update explores on
+    assert TextMatch().answer(snapshot_question([MUG_ON_TABLE])).answer == SnapshotChoice(0, 0)
+
+
+def test_rules_explore_where_nothing_fits_and_settle_when_nothing_is_left():
+    assert TextMatch().answer(snapshot_question([COUNTER])).answer.snapshot is None
     assert TextMatch().answer(snapshot_question([COUNTER], frontiers=())).answer == SnapshotChoice(0, 0)
+    assert TextMatch().answer(snapshot_question([FRIDGE], frontiers=())).answer == SnapshotChoice(0, 0)
     with pytest.raises(AnswerError):
-        TextMatch().answer(snapshot_question([FRIDGE], frontiers=()))
+        TextMatch().answer(snapshot_question([BED], frontiers=()))

@@ -83,14 +83,14 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
-        """Name the classes that the instruction mentions: the goal's own first, then what it should be on or near.
+        """Name the goal's own class, then what it should be on or near, then what its type of room has.
 
         Where the list holds none of them, none is named, and no snapshot is left: only frontiers are.
         """
         goal = matcher.parsed(self.goal)
-        scores = {name: matcher.label_score(goal, name) for name in self.class_names}
-        ranked = sorted((name for name in scores if scores[name] > 0.0), key=lambda name: (-scores[name], name))
-        return tuple(ranked[: self.max_classes]), f"{len(ranked)} of {len(scores)} classes are spoken of"
+        scores = {name: matcher.label_score(goal, name) for name in self.class_names if matcher.may_help(goal, name)}
+        ranked = sorted(scores, key=lambda name: (-scores[name], name))
+        return tuple(ranked[: self.max_classes]), f"{len(ranked)} of {len(self.class_names)} classes may help"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,11 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
         ]
 
     def by_rule(self, matcher: Matcher) -> tuple[SnapshotChoice, str]:
-        """Choose as Frontier-Update would among the objects of all snapshots, ranked as it ranks them."""
+        """Choose the object of the goal's kind that fits best, whether or not all that is said of it holds.
+
+        The original asks for the final answer, and a model commits to the first plausible one. Else a frontier is
+        chosen as Frontier-Update would; without frontiers, the first object that may help.
+        """
         places = [choice for choice in self.choices() if choice.snapshot is not None]
         objects = [candidate for snapshot in self.snapshots for candidate in snapshot.objects]
         ranked = rank_entries(matcher, self.goal, objects, self.position_m)
@@ -171,6 +175,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             self.frontiers,
             self.surroundings,
             num_rounds_left=self.num_rounds_left,
+            is_final=True,
         )
         if choice.kind == "object":
             return places[ranked[choice.index]], reason

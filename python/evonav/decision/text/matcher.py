@@ -97,6 +97,11 @@ class Matcher:
         related = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *related])
 
+    def may_help(self, goal: ParsedGoal, label: str) -> bool:
+        """Return whether a label is the goal's, or of something that is near it or in the same type of room."""
+        sign_of = _ROOM_OF_SIGN.get(canonical(label))
+        return self.label_score(goal, label) > 0.0 or (sign_of is not None and sign_of == goal.room)
+
     def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
 

@@ -112,6 +112,7 @@ def choose_candidate(
     surroundings: Sequence[ObjectCandidate],
     *,
     num_rounds_left: int,
+    is_final: bool = False,
 ) -> tuple[Choice, str]:
     """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near.
 
@@ -122,6 +123,8 @@ def choose_candidate(
         frontiers: Frontiers that can be explored.
         surroundings: Everything remembered.
         num_rounds_left: Number of decision rounds that are left in the stage.
+        is_final: Settle for the object that fits best if it is of the goal's kind, even if its relations do not hold;
+            without frontiers, for whatever may help.
 
     Returns:
         The choice and the reason for it.
@@ -139,12 +142,12 @@ def choose_candidate(
     if named:
         share, index = max(named, key=lambda pair: (pair[0], -pair[1]))
         is_last_chance = not frontiers or num_rounds_left <= config.hurry_rounds
-        if share >= config.min_relations or is_last_chance:
+        if is_final or share >= config.min_relations or is_last_chance:
             return Choice("object", index), f"{objects[index].label}, {share:.0%} of what is said fits"
     if frontiers:
         index = min(range(len(frontiers)), key=lambda i: (matcher.frontier_cost_m(goal, frontiers[i], surroundings), i))
         return Choice("frontier", index), "relations do not hold" if named else "nothing remembered fits"
     for index, candidate in enumerate(objects):
-        if matcher.label_score(goal, candidate.label) > 0.0:
+        if matcher.label_score(goal, candidate.label) > 0.0 or (is_final and matcher.may_help(goal, candidate.label)):
             return Choice("object", index), f"{candidate.label} is where the {goal.noun} should be"
     raise AnswerError("invalid", "nothing to go to")
