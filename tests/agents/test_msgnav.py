@@ -245,6 +245,28 @@ def test_verification_looks_at_five_rounds_of_seven_views_of_this_stage():
     assert second[0].num_views <= 35
 
 
+def test_verification_sees_only_what_was_seen_before_the_arrival():
+    """The original asks right after the move, before it looks around at the place."""
+    model = script(object_of("Fridge"), arrival="no")
+    agent = Noting(decision=model)
+    (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_rounds=25))
+    arrivals = [number for number, (observation, _, _) in enumerate(agent.rounds) if observation.has_arrived]
+    verified = [at for at in arrivals if record.trace[at - 1].choice.startswith("object")]
+    first = asked(model, "arrival")[0]
+    assert verified[0] < 5
+    assert first.num_views == 7 * min(5, verified[0])  # rounds before this one, which is number `verified[0]`
+
+
+def test_without_a_selection_the_choice_is_asked_among_what_is_in_view():
+    model = script("Continue Exploration", subgraph="I do not know.")
+    run(MsgNav(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=4))
+    questions = asked(model, "graph")
+    assert len(questions) == 4
+    assert all(not question.objects and not question.edges for question in questions)
+    assert all(all(image.is_egocentric for image in question.images) for question in questions)
+    assert all(len(question.images) == 7 for question in questions)
+
+
 def test_a_model_that_looks_is_shown_the_numbered_views_frontiers_and_recent_views():
     model = script(object_of("GarbageCan"), arrival="no", needs_images=True)
     run(MsgNav(decision=model), stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig(max_rounds=15))

@@ -109,11 +109,15 @@ class MsgNav(NavigatorAgent):
         """Look; go on to the committed target; on arrival, ask whether it is the goal; without a target, decide."""
         self._queries.begin_round()
         self._candidates = ()
+        is_over = observation.has_arrived or not observation.is_action_success
+        # The original asks right after the move: it shows what was seen on the way, and not from the place itself.
+        arrival = self._arrival_question(self._target, observation) if self._target is not None and is_over else None
         self._memory.observe(observation)
         target = self._followed()
-        if target is not None and (observation.has_arrived or not observation.is_action_success):
+        if target is not None and arrival is not None:
             self._target = None
-            if self._is_found(target, observation):
+            self._counters["verifications"] += 1
+            if self._queries.ask(arrival) is True:  # no valid answer counts as no
                 self._record_round(target.name, "verified", target.entry_id)
                 return Stop("verified")
             self._reject(target)
@@ -137,26 +141,22 @@ class MsgNav(NavigatorAgent):
         here = (observation.pose.x_m, observation.pose.z_m)
         return replace(target, viewpoint=self._viewpoint(target.points_m, here))
 
-    def _is_found(self, target: MsgNavTarget, observation: Observation) -> bool:
-        """Ask about all views of the last rounds; no valid answer counts as no."""
+    def _arrival_question(self, target: MsgNavTarget, observation: Observation) -> ArrivalQuestion:
+        """Return the question whether the goal is here, about the views of the rounds before this one."""
         memory, config = self._memory, self.config
         navigator = self._navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
         images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensors.needs_rgb else []
-        self._counters["verifications"] += 1
-        is_found = self._queries.ask(
-            ArrivalQuestion(
-                goal=self._goal,
-                target=target.candidate if entry is None else navigator.candidate(entry),
-                seen=memory.detections(views),
-                num_views=len(views),
-                num_frontiers=len(navigator.explorer.frontiers),
-                num_rounds_left=observation.num_rounds_left,
-                views=[image for image in images if image is not None],
-            )
+        return ArrivalQuestion(
+            goal=self._goal,
+            target=target.candidate if entry is None else navigator.candidate(entry),
+            seen=memory.detections(views),
+            num_views=len(views),
+            num_frontiers=len(navigator.explorer.frontiers),
+            num_rounds_left=observation.num_rounds_left,
+            views=[image for image in images if image is not None],
         )
-        return is_found is True
 
     def _reject(self, target: MsgNavTarget) -> None:
         """Remember a rejected target until the stage ends; the entry stays as it is."""
@@ -180,9 +180,7 @@ class MsgNav(NavigatorAgent):
         subgraph = Subgraph((), (), ())
         if nodes:
             selected = self._queries.ask(SubgraphQuestion(self._goal, nodes, here, self.config.max_selected))
-            if selected is None:
-                return self._random_frontier()
-            subgraph = memory.graph.subgraph(selected)
+            subgraph = memory.graph.subgraph(selected or ())
         question = self._graph_question(nodes, subgraph, observation)
         self._candidates = subgraph.entry_ids
         choice = self._queries.ask(question)
