@@ -82,7 +82,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plot."""
     run = load_run(out / "main")
     behaviour = behaviour_of(run)
-    main_table, relocation, first, order, differences = paper_tables(run)
+    main_table, relocation, far, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
     errors = ""
     if sweep:
@@ -93,6 +93,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "setting": setting_table(run).markdown(),
         "table-1": main_table.markdown(),
         "table-2": relocation.markdown(),
+        "table-2-far": far.markdown(),
         "stage-1": first.markdown(),
         "order": order.markdown(),
         "differences": differences.markdown(),
@@ -111,7 +112,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
 def large_parts(run_dir: Path) -> dict[str, str]:
     """The marked parts on a run of the heuristics over all houses."""
     run = load_run(run_dir)
-    main_table, relocation, first, _, differences = paper_tables(run)
+    main_table, relocation, _, first, _, differences = paper_tables(run)
     return {
         "large-setting": setting_table(run).markdown(),
         "large-1": main_table.markdown(),

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.evaluation.metrics.navigation import AgentPair
-from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.paper import tables as paper
 from evonav.report.run import load_run
 from evonav.report.tables.table import markdown_tables
@@ -72,7 +72,7 @@ def cells(table) -> dict[str, dict[str, str]]:
 
 def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     run = load_run(write_run())
-    main, relocation, first, order, differences = paper.paper_tables(run)
+    main, relocation, _, first, order, differences = paper.paper_tables(run)
     ftu = next(s for s in run.summaries if s.agent == "ftu")
     assert ftu.sr_ci95 is not None
     low, high = (100 * end for end in ftu.sr_ci95)
@@ -92,6 +92,33 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     assert pair[:2] == ("ftu minus fu", "+6.3")
     assert pair[2].startswith("+41.7 [")
     assert pair[6:] == ("a tie at this n", "no")
+
+
+def test_moved_targets_are_split_by_how_far_they_moved(tmp_path: Path) -> None:
+    def moved(task_id: str, by_m: float, state: EndState) -> StageRecord:
+        record = stage_record("fu", task_id, 2, state)
+        x_m, y_m, z_m = record.target.position_m
+        # Up and down does not count.
+        first_m = (x_m - 0.6 * by_m, y_m + 3.0, z_m + 0.8 * by_m)
+        target = record.target.model_copy(update={"is_relocated": True, "first_position_m": first_m})
+        return record.model_copy(update={"target": target})
+
+    records = [
+        stage_record("fu", "a", 1, EndState.FAILURE),  # stage 1 is in no group
+        moved("a", 2.1, EndState.SUCCESS),
+        moved("b", 1.9, EndState.FAILURE),
+        moved("c", 2.5, EndState.FAILURE),
+        moved("d", 0.2, EndState.SUCCESS),
+        moved("e", 4.0, EndState.ERRORED),  # not scored
+        moved("f", 1.0, EndState.SUCCESS),
+    ]
+    run = load_run(record_run(tmp_path / "run", records, dict.fromkeys("abcdef", 2), ["fu"]))
+    far = paper.paper_tables(run)[2]
+    assert far.columns == ("Agent", "moved more than 2 m", "moved less")
+    ((agent, more, less),) = far.rows
+    assert agent == "fu"
+    assert (more[:4], more[-6:]) == ("50.0", " n = 2")
+    assert (less[:4], less[-6:]) == ("66.7", " n = 3")
 
 
 def test_agents_that_the_paper_lacks_stand_without_its_figures(tmp_path: Path) -> None:
@@ -116,7 +143,7 @@ def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path:
     assert "Table 2: moved and not moved targets" in result.output
     text = out.read_text(encoding="utf-8")
     assert text.startswith(markdown_tables(paper.paper_tables(load_run(run_dir))))
-    assert text.count("\n| ftu |") == 3
+    assert text.count("\n| ftu |") == 4
     assert text.count("\n| ftu minus fu |") == 2
 
 

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.evaluation.agent_order import PAPER_ORDER
-from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
+from evonav.evaluation.metrics.stage_metrics import stratum_of
+from evonav.evaluation.records.schema import StageRecord
 from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
@@ -20,6 +22,8 @@ Perception = Literal["gt", "prediction"]
 
 NUM_STAGES = {"all": 365, "relocated": 109, "not_relocated": 166, "stage_1": 90}
 """Stages of the paper's 90 tasks, by the names of `AgentSummary.rates`."""
+FAR_M = 2.0
+"""Distance in metres beyond which a target counts as moved far: the success radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,7 @@ def paper_tables(run: RecordedRun, perception: Perception = "gt") -> list[Table]
     return [
         _main_table(run.summaries, paper),
         _relocation_table(run.summaries, paper),
+        _far_table(run),
         _first_stage_table(run.summaries, paper),
         _order_table(run.summaries, paper),
         _difference_table(run.pairs, paper),
@@ -155,6 +160,34 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
     return Table("Table 2: moved and not moved targets", columns, tuple(rows), (note,))
 
 
+def _far_table(run: RecordedRun) -> Table:
+    """Split moved targets by distance: who stops at the old place of one that moved a little still succeeds."""
+    rows = []
+    for agent, records in run.records_by_agent().items():
+        far: list[StageRecord] = []
+        near: list[StageRecord] = []
+        for record in records:
+            moved_m = _moved_m(record)
+            if moved_m is not None:
+                (far if moved_m > FAR_M else near).append(record)
+        rows.append((agent, _with_interval(rates(far)), _with_interval(rates(near))))
+    note = (
+        "SR % of the moved targets of Table 2, by the distance on the ground plane from the place in stage 1. Who "
+        f"stops at the old place of a target that moved less than the success radius of {FAR_M:g} m may still succeed. "
+        "The paper has no such split."
+    )
+    columns = ("Agent", f"moved more than {FAR_M:g} m", "moved less")
+    return Table("Table 2 by how far the target moved", columns, tuple(rows), (note,))
+
+
+def _moved_m(record: StageRecord) -> float | None:
+    """Return how far a moved target stands from its place in stage 1; `None` for others, and where it is unknown."""
+    first, now = record.target.first_position_m, record.target.position_m
+    if stratum_of(record) != "relocated" or first is None:
+        return None
+    return math.dist((first[0], first[2]), (now[0], now[2]))
+
+
 def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
     rows = tuple((s.agent, _theirs(paper.get(s.agent), "stage_1"), _ours(s, "stage_1")) for s in summaries)
     note = (
@@ -231,5 +264,8 @@ def _theirs(known: PaperResult | None, split: str = "all") -> str:
 
 
 def _ours(summary: AgentSummary, split: str) -> str:
-    part = summary.rates(split)
+    return _with_interval(summary.rates(split))
+
+
+def _with_interval(part: Rates) -> str:
     return NONE if part.sr is None else f"{rate(part.sr, part.sr_ci95)}, n = {part.n}"
