@@ -3,9 +3,10 @@
 import pytest
 
 from evonav._core import assets
-from evonav.generation.instructions.appearance import colour_word, size_word
+from evonav.generation.instructions.appearance import size_word
 from evonav.generation.instructions.describe import appearance_instruction, basic_instruction, unified_instruction
 from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
+from evonav.tasks.colours import colour_word
 
 SIZES_M = {category: tuple(size_m) for _, category, size_m in assets()}
 

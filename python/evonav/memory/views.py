@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav import _core
+from evonav.memory.colours import colour_shares
 from evonav.sensors.observation import Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
 JPEG_QUALITY = 90
 """Quality of stored images: about 20 KB for 300 x 300 pixels, a tenth of the raw data; an episode has hundreds."""
+
+NUM_LARGEST = 3
+"""Number of views of an entry from which its colours are taken."""
 
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom in pixels; right and bottom are exclusive."""
@@ -30,6 +34,8 @@ class Seen:
     confidence: float
     area_px: int
     box_px: Box
+    colours: tuple[float, ...] | None = None
+    """Share of each of `evonav.tasks.language.COLOURS`; `None` if the store keeps no colours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +59,17 @@ class StoredView:
 class ViewStore:
     """Views in the order of their arrival."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, names_colours: bool = False) -> None:
+        """Create an empty store.
+
+        Args:
+            names_colours: True to keep the colours of detections by name, in place of the views' images.
+        """
         self.views: list[StoredView] = []
+        self._names_colours = names_colours
         self._became: dict[int, int] = {}
-        self._best: dict[int, tuple[int, Seen]] = {}
+        self._largest: dict[int, list[tuple[int, Seen]]] = {}
+        """The views that show an entry largest, by id, with its detections there, the largest first."""
         self._latest: dict[int, int] = {}
 
     def add(self, view: View, entry_ids: Sequence[int | None], *, stage: int, round_: int) -> StoredView:
@@ -69,22 +82,21 @@ class ViewStore:
             round_: Round of the stage.
         """
         boxes = boxes_of(view.detections)
+        named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
         seen = tuple(
-            Seen(entry_id, label, float(confidence), area_px, box_px)
-            for entry_id, label, confidence, (area_px, box_px) in zip(
-                entry_ids, view.detections.labels, view.detections.confidences, boxes, strict=True
+            Seen(entry_id, label, float(confidence), area_px, box_px, colours)
+            for entry_id, label, confidence, (area_px, box_px), colours in zip(
+                entry_ids, view.detections.labels, view.detections.confidences, boxes, named, strict=True
             )
         )
-        jpeg = None if view.rgb is None else _jpeg(view.rgb)
+        jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)
         stored = StoredView(len(self.views), stage, round_, view.pose, view.intrinsics, seen, jpeg)
         self.views.append(stored)
         for one in seen:
             if one.entry_id is not None:
                 entry_id = self.resolve(one.entry_id)
                 self._latest[entry_id] = stored.id
-                best = self._best.get(entry_id)
-                if best is None or one.area_px > best[1].area_px:
-                    self._best[entry_id] = (stored.id, one)
+                self._keep_largest(entry_id, [(stored.id, one)])
         return stored
 
     def follow(self, merged: Mapping[int, int] | Sequence[tuple[int, int]]) -> None:
@@ -94,9 +106,12 @@ class ViewStore:
             target = self.resolve(new)
             if (latest := self._latest.pop(old, None)) is not None:
                 self._latest[target] = max(latest, self._latest.get(target, -1))
-            best, other = self._best.pop(old, None), self._best.get(target)
-            if best is not None and (other is None or best[1].area_px > other[1].area_px):
-                self._best[target] = best
+            self._keep_largest(target, self._largest.pop(old, []))
+
+    def _keep_largest(self, entry_id: int, found: Sequence[tuple[int, Seen]]) -> None:
+        ranked = sorted((*self._largest.get(entry_id, ()), *found), key=lambda pair: -pair[1].area_px)
+        if ranked:
+            self._largest[entry_id] = ranked[:NUM_LARGEST]
 
     def resolve(self, entry_id: int) -> int:
         """Return the entry that an entry has become."""
@@ -106,8 +121,11 @@ class ViewStore:
 
     def best(self, entry_id: int) -> tuple[StoredView, Seen] | None:
         """Return the view that shows an entry largest, and its detection there; `None` if no view shows it."""
-        found = self._best.get(self.resolve(entry_id))
-        return None if found is None else (self.views[found[0]], found[1])
+        return next(iter(self.largest(entry_id)), None)
+
+    def largest(self, entry_id: int) -> list[tuple[StoredView, Seen]]:
+        """Return the `NUM_LARGEST` views that show an entry largest, and its detections there, the largest first."""
+        return [(self.views[view_id], seen) for view_id, seen in self._largest.get(self.resolve(entry_id), ())]
 
     def seen_in(self, view: StoredView, entry_id: int) -> Seen | None:
         """Return the largest detection of an entry in a view; `None` if the view does not show it."""
