@@ -78,7 +78,7 @@ MISTAKES = {
     # a model
     f"{EVALUATE} --decision vlm": "--model is needed to ask a model (or EVONAV_VLM_MODEL",
     f"{EVALUATE} --decision vlm --model gpt-4o": "set OPENAI_API_KEY",
-    f"{EVALUATE} --decision gpt-4o": "expected text, vlm or module:name",
+    f"{EVALUATE} --decision gpt-4o": "expected text, looks, vlm or module:name",
     f"{EVALUATE} --model gpt-4o --temperature 0": "--temperature is of no use where text decides",
     "evaluate --out new --decision vlm --model m --vlm-mode replay": "no exchanges here to replay",
     f"{EVALUATE} --noise wrong=often": "--noise wrong=often: expected a number",

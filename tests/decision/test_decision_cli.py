@@ -77,9 +77,12 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     ("options", "words"),
     [
         (("--decision", "vlm"), "--model is needed"),
-        (("--decision", "gpt"), "expected text, vlm or module:name"),
+        (("--decision", "gpt"), "expected text, looks, vlm or module:name"),
         (("--tell-of-change",), "--tell-of-change is of no use"),
         (("--temperature", 0.5), "--temperature is of no use"),
+        (("--eagerness", 0.5), "--eagerness is of no use where text decides"),
+        (("--decision", "looks", "--eagerness", 2), "expected a number from 0 to 1"),
+        (("--decision", "looks", "--mistakes", -1), "expected a temperature"),
         (("--decision", "own_vlm:OwnVlm", "--max-tokens", 5), "--max-tokens is of no use"),
         (("--decision", "nothing:Here"), "nothing"),
         (("--decision", "vlm", "--model", "m"), "OPENAI_API_KEY"),

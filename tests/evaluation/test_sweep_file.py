@@ -111,7 +111,7 @@ MISTAKES = {
     "true is no seed": (SMALL + "seeds = [true]", "seeds.0 = True"),
     "bad engine": (SMALL + 'engine = "slurm"', "engine = 'slurm'"),
     "ray address without ray": (SMALL + 'ray_address = "auto"', "ray_address is for engine ray"),
-    "bad kind": (SMALL + 'decisions = "gpt4"', "decisions.gpt4.kind gpt4: expected text, vlm or module:name"),
+    "bad kind": (SMALL + 'decisions = "gpt4"', "decisions.gpt4.kind gpt4: expected text, looks, vlm or module:name"),
     "no model": (SMALL + '[decisions.a]\nkind = "vlm"', "decisions.a.model is needed"),
     "model setting for rules": (SMALL + "[decisions.a]\ntemperature = 0.5", "decisions.a.temperature is of no use"),
     "sampling out of range": (

@@ -9,12 +9,15 @@ from dataclasses import dataclass, field, replace
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
 from evonav.memory.objects import ObjectEntry
-from evonav.memory.occupancy import FREE
+from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
 from evonav.sensors.observation import MapFrame, Observation
+
+KNOWN_RADIUS_M = 1.0
+"""Radius around an entry within which `Appearance.known_share` counts cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +47,19 @@ class Target:
 class Navigator:
     """Integrates observations, and turns choices into places to go."""
 
-    def __init__(self, map_frame: MapFrame, config: NavigatorConfig) -> None:
+    def __init__(self, map_frame: MapFrame, config: NavigatorConfig, *, names_colours: bool = False) -> None:
+        """Create an empty memory.
+
+        Args:
+            map_frame: Shape and place of the map.
+            config: Parameters.
+            names_colours: True to keep what views show by name, for rules that look, in place of their images.
+        """
         self.config = config
+        self._names_colours = names_colours
         self.explorer = Explorer(map_frame, config.explorer)
         self.objects = ObjectMap(config.objects)
-        self.views = ViewStore()
+        self.views = ViewStore(names_colours=names_colours)
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
         """Views of the last round, the heading view last."""
@@ -116,7 +127,30 @@ class Navigator:
 
     def candidate(self, entry: ObjectEntry) -> ObjectCandidate:
         """Return an entry of the object memory as questions describe it, without images."""
-        return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
+        appearance = self._appearance(entry) if self._names_colours else None
+        return ObjectCandidate(
+            entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections, appearance=appearance
+        )
+
+    def _appearance(self, entry: ObjectEntry) -> Appearance | None:
+        """Return what the views of an entry show; `None` without any."""
+        largest, latest = self.views.largest(entry.id), self.views.latest(entry.id)
+        shares = [seen.colours for _, seen in largest if seen.colours is not None]
+        if not shares or latest is None:
+            return None
+        shown = (seen.entry_id for view in (*(view for view, _ in largest), latest) for seen in view.seen)
+        return Appearance(
+            colours=tuple(math.fsum(column) / len(shares) for column in zip(*shares, strict=True)),
+            shown_ids=frozenset(self.views.resolve(entry_id) for entry_id in shown if entry_id is not None),
+            known_share=self.explorer.map.known_share((entry.centre_m[0], entry.centre_m[2]), KNOWN_RADIUS_M),
+        )
+
+    def unseen_m2(self) -> float:
+        """Return the area that the map does not know; 0 if there is no frontier behind which it could lie."""
+        if not self.explorer.frontiers:
+            return 0.0
+        cells = self.explorer.map.cells
+        return float((cells == UNKNOWN).sum()) * self.explorer.map.map_frame.cell_m**2
 
     def with_images(self, candidate: ObjectCandidate) -> ObjectCandidate:
         """Return a candidate with the best crop of its entry, and the view in which the entry was last seen."""

@@ -47,7 +47,9 @@ class NavigatorAgent(ABC):
             sensors: The sensors that the agent needs, apart from colours.
         """
         model: DecisionModel = decision or TextMatch()
-        self.sensors = replace(sensors or SensorConfig(), needs_rgb=model.needs_images)
+        self._shows_images = model.needs_images
+        self._names_colours = not self._shows_images and bool(getattr(model, "needs_colours", False))
+        self.sensors = replace(sensors or SensorConfig(), needs_rgb=self._shows_images or self._names_colours)
         self._navigator_config = config
         self._queries = QuerySession(model, num_tries=num_tries)
         self._counters: Counter[str] = Counter()
@@ -60,7 +62,15 @@ class NavigatorAgent(ABC):
         self._task = task
         self._counters.clear()
         self._queries.counters.clear()
-        self._navigator = Navigator(task.map_frame, self._navigator_config)
+        self._navigator = self._new_navigator()
+
+    def _new_navigator(self) -> Navigator:
+        """Return an empty memory for the task."""
+        return Navigator(self._task.map_frame, self._navigator_config, names_colours=self._names_colours)
+
+    def _unseen_m2(self) -> float:
+        """Return the area that the map does not know, if the rules look."""
+        return self._navigator.unseen_m2() if self._names_colours else 0.0
 
     def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; the memory stays."""
@@ -74,11 +84,11 @@ class NavigatorAgent(ABC):
     def _heading_view(self) -> Pixels | None:
         """Return the heading view of the last round for a prompt, if the model looks at images."""
         view = self._navigator.round_views[-1]
-        return pixels_of(view, self._navigator.config.image_px) if self.sensors.needs_rgb else None
+        return pixels_of(view, self._navigator.config.image_px) if self._shows_images else None
 
     def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them, with images if the model looks at them."""
-        navigator, with_images = self._navigator, self.sensors.needs_rgb
+        navigator, with_images = self._navigator, self._shows_images
         return [navigator.frontier_candidate(f, here, with_images=with_images) for f in navigator.explorer.frontiers]
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:

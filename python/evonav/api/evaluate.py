@@ -16,7 +16,7 @@ from evonav.api.progress import progress_bar
 from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.components import Backend, check_decision
 from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import (
@@ -25,7 +25,6 @@ from evonav.evaluation.run.settings import (
     PerceptionSettings,
     SimulatorSettings,
     SpendingSettings,
-    check_decision,
 )
 from evonav.evaluation.run.settings_model import Settings
 
@@ -98,7 +97,7 @@ def evaluate(
     decisions.check()
     recorded = recorded_backend(folder)
     model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_workers), recorded)
-    if decisions.kind != "text":
+    if not decisions.asks_rules:
         check_decision(model, seed)
     simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
     backend = Backend(

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from evonav.decision.appearance.model import AppearanceMatch
 from evonav.decision.custom_model import CustomClient, load_custom_model
 from evonav.decision.noisy import NoiseRates, Noisy
 from evonav.decision.question import DecisionModel
@@ -38,6 +39,23 @@ def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> Decisi
         noise: Rates of mistakes, by the names of `NoiseRates`; all models accept them.
     """
     return _with_noise(TextMatch(), noise, seed)
+
+
+def appearance_match(
+    seed: int, *, eagerness: float = 0.0, mistakes: float = 0.0, noise: Mapping[str, float] | None = None
+) -> DecisionModel:
+    """Make the rules that look: see `AppearanceMatch`.
+
+    Args:
+        seed: Seed of the agent, and of the mistakes.
+        eagerness: 0 to 1.
+        mistakes: Temperature, 0 or more.
+        noise: Rates of other mistakes.
+
+    Raises:
+        InvalidArgumentError: A number is out of range.
+    """
+    return _with_noise(AppearanceMatch(eagerness=eagerness, mistakes=mistakes, seed=seed), noise, seed)
 
 
 def vlm(

@@ -15,6 +15,18 @@ Pixels = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
+class Appearance:
+    """The appearance of a remembered object in its three largest views and its latest one."""
+
+    colours: tuple[float, ...]
+    """Share of each of `evonav.tasks.language.COLOURS`, the mean over its largest views."""
+    shown_ids: frozenset[int]
+    """Ids of the entries in these views."""
+    known_share: float
+    """Share of the cells within a metre of it that the map knows."""
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectCandidate:
     """A remembered object: a label and an axis-aligned box, with images if the model looks at them."""
 
@@ -27,6 +39,8 @@ class ObjectCandidate:
     """The object, cut out of its best view."""
     view: Pixels | None = field(default=None, compare=False, repr=False)
     """The view in which the object was last seen."""
+    appearance: Appearance | None = field(default=None, compare=False, repr=False)
+    """Its appearance, if the decision model asks for colours."""
 
     @property
     def ground_m(self) -> Point2:

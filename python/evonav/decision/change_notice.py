@@ -32,7 +32,7 @@ def with_notice(prompt: Prompt, tells_of_change: bool | None) -> Prompt:
 
 def recorded_notice(path: str, options: Mapping[str, Any]) -> bool | None:
     """Return what a run told its model of changes, by the decision model's path and options in the run's header."""
-    if path.endswith(":text_match"):  # it reads no prompts
+    if path.endswith((":text_match", ":appearance_match")):  # they read no prompts
         return False
     recorded: bool | None = options.get("tells_of_change")
     return recorded

@@ -24,6 +24,11 @@ class Metered:
         """True if the measured model needs images."""
         return self.model.needs_images
 
+    @property
+    def needs_colours(self) -> bool:
+        """True if the model, without images, needs the names of the colours in them."""
+        return bool(getattr(self.model, "needs_colours", False))
+
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the measured model's answer."""
         wall_s, cpu_s = time.perf_counter(), time.process_time()

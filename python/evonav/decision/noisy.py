@@ -101,6 +101,11 @@ class Noisy:
         """True if the model needs images."""
         return self.model.needs_images
 
+    @property
+    def needs_colours(self) -> bool:
+        """True if the model, without images, needs the names of the colours in them."""
+        return bool(getattr(self.model, "needs_colours", False))
+
     def check(self) -> None:
         """Check the model."""
         check = getattr(self.model, "check", None)

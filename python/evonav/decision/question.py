@@ -129,7 +129,10 @@ class YesNoQuestion(ClosedQuestion[bool]):
 
 
 class DecisionModel(Protocol):
-    """A model that answers questions."""
+    """A model that answers questions.
+
+    One that needs no images but the names of the colours in them has an attribute `needs_colours = True`.
+    """
 
     @property
     def needs_images(self) -> bool:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # agents start fast, and few draw
 __all__ = ["BLOCKED", "FREE", "UNKNOWN", "Conflicts", "Frontier", "FrontierConfig", "OccupancyMap"]
 
 UNKNOWN, FREE, BLOCKED = 0, 1, 2
+OPEN_STEPS = 8
 """Values of `OccupancyMap.cells`."""
 EXPLORED = 3
 """Value of a free cell that was seen from near, in pictures."""
@@ -101,6 +102,32 @@ class OccupancyMap:
     def explored(self) -> NDArray[np.bool_]:
         """Explored cells, an `(R, C)` copy: `True` if the cell was seen from near."""
         return self._map.explored
+
+    def known_share(self, centre_m: tuple[float, float], radius_m: float) -> float:
+        """Return the known share of the cells around `(x, z)`; cells behind walls and furniture do not count.
+
+        An unknown cell counts if it can be reached from a free one over at most `OPEN_STEPS` unknown cells.
+        """
+        frame = self.map_frame
+        at_x, at_z = (round((centre_m[axis] - frame.corner_m[axis]) / frame.cell_m - 0.5) for axis in (0, 1))
+        reach = max(1, round(radius_m / frame.cell_m))
+        rows, cols = (slice(max(0, at - reach), max(0, at + reach + 1)) for at in (at_z, at_x))
+        cells = self._map.cells[rows, cols]
+        unknown = cells == UNKNOWN
+        reached = cells == FREE
+        num_known = int(cells.size - unknown.sum())
+        for _ in range(OPEN_STEPS):
+            grown = reached.copy()
+            grown[1:] |= reached[:-1]
+            grown[:-1] |= reached[1:]
+            grown[:, 1:] |= reached[:, :-1]
+            grown[:, :-1] |= reached[:, 1:]
+            grown &= unknown | reached
+            if (grown == reached).all():
+                break
+            reached = grown
+        num_open = int((reached & unknown).sum())
+        return num_known / (num_known + num_open) if num_known else 0.0
 
     def conflicts(self, seen: VisibleOccupancy) -> Conflicts:
         """Return the seen cells that contradict the map, which does not change."""

@@ -17,7 +17,12 @@ _PERCEPTIONS = {
     "noisy": "ground truth with errors",
     "predicted": "predicted perception",
 }
-_DECISIONS = {"text": "decisions by rules", "vlm": "decisions by a model", "own": "decisions by a model of its own"}
+_DECISIONS = {
+    "text": "decisions by rules",
+    "appearance": "decisions by rules that look",
+    "vlm": "decisions by a model",
+    "own": "decisions by a model of its own",
+}
 _COLUMNS = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "Entry", "Model", "Seed", "Date", "evonav", "File")
 
 

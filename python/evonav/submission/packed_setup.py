@@ -18,7 +18,7 @@ class PackedSetup:
     perception: str
     """Perception, as `--perception` names it."""
     decision: str
-    """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
+    """Kind of the decision model: text, looks, vlm or own; with the rates of its simulated mistakes."""
     model: str
     """The decision model's name, if it has one."""
     simulator: str
@@ -32,6 +32,7 @@ def packed_setup(header: Submission) -> PackedSetup:
     decision, perception = (_mapping(parts.get(f"{name}_options")) for name in ("decision", "perception"))
     kind = str(parts.get("decision", "")).rpartition(":")[2].removesuffix("_match")
     rates = [f"{name}={value}" for name, value in _mapping(decision.get("noise")).items()]
+    rates += [f"{name}={decision[name]}" for name in ("eagerness", "mistakes") if decision.get(name)]
     simulator = str(parts.get("simulator", ""))
     return PackedSetup(
         perception=word_of(str(parts.get("perception", "")), perception),

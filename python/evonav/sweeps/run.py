@@ -22,9 +22,9 @@ from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.components import Backend, check_decision
 from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, run_identity
-from evonav.evaluation.run.settings import DecisionResources, check_decision
+from evonav.evaluation.run.settings import DecisionResources
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
@@ -177,7 +177,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
     Raises:
         EvonavError: The model cannot be asked from here.
     """
-    if sweep.decisions[run.cell.decision].kind == "text":
+    if sweep.decisions[run.cell.decision].asks_rules:
         return run
     resources = DecisionResources(
         run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, sweep.num_workers)

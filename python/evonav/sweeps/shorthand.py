@@ -94,9 +94,9 @@ def _decision(word: str, place: str) -> tuple[str, dict[str, Any]]:
     kind, colon, rest = word.partition(":")
     if kind == "vlm" and colon:
         return rest, {"kind": "vlm", "model": rest}
-    if kind == "text" and colon:
+    if kind in ("text", "looks") and colon:
         try:
-            return word, {"kind": "text", "noise": read_rates(rest, list(NoiseRates.__dataclass_fields__))}
+            return word, {"kind": kind, "noise": read_rates(rest, list(NoiseRates.__dataclass_fields__))}
         except InvalidArgumentError as error:
             raise InvalidArgumentError(f"{place}: {word!r}: {error}") from None
     return word, {"kind": word}

@@ -98,10 +98,11 @@ class FrontierUpdate(NavigatorAgent):
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
-            objects=[navigator.with_images(entry) for entry in ranked] if self.sensors.needs_rgb else ranked,
+            objects=[navigator.with_images(entry) for entry in ranked] if self._shows_images else ranked,
             frontiers=self._frontier_candidates(here),
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,
+            unseen_m2=self._unseen_m2(),
             heading_view=self._heading_view(),
         )
         self._candidates = tuple(candidate.entry_id for candidate in question.objects)

@@ -66,7 +66,7 @@ class FailThenUpdate(FrontierUpdate):
         is_present = self._queries.ask(
             VerifyQuestion(
                 goal=self._goal,
-                entry=navigator.with_images(remembered) if self.sensors.needs_rgb else remembered,
+                entry=navigator.with_images(remembered) if self._shows_images else remembered,
                 seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
                 evidence=self._evidence(entry_id, observation.views[first:]),
                 views=[image for image in images if image is not None],

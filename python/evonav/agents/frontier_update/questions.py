@@ -31,6 +31,8 @@ class ChooseQuestion(ClosedQuestion[Choice]):
     surroundings: Sequence[ObjectCandidate]
     """Everything remembered: what the candidates' images would show around them. Not part of the prompt."""
     num_rounds_left: int
+    unseen_m2: float = 0.0
+    """Area that the map does not know, for rules that look. Not part of the prompt."""
     heading_view: Pixels | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
@@ -82,6 +84,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             self.frontiers,
             self.surroundings,
             num_rounds_left=self.num_rounds_left,
+            unseen_m2=self.unseen_m2,
         )
 
 

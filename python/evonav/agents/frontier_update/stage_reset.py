@@ -6,7 +6,6 @@ from typing import Literal
 
 from evonav.agents.agent import AgentAction, NavigateTo
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.question import DecisionModel
 from evonav.memory.occupancy import FREE
@@ -33,7 +32,7 @@ class StageReset(FrontierUpdate):
     def begin_stage(self, goal: Goal) -> None:
         """Forget entries, map, frontiers, views and ids; counters count over the whole task."""
         before = self._navigator.explorer
-        self._navigator = Navigator(self._task.map_frame, self.config.navigator)
+        self._navigator = self._new_navigator()
         explorer = self._navigator.explorer
         explorer.num_conflicts = before.num_conflicts
         explorer.num_cells_cleared = before.num_cells_cleared

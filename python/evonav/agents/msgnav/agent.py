@@ -147,7 +147,7 @@ class MsgNav(NavigatorAgent):
         navigator = self._navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
-        images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensors.needs_rgb else []
+        images = [pixels_of(view, config.navigator.image_px) for view in views] if self._shows_images else []
         return ArrivalQuestion(
             goal=self._goal,
             target=target.candidate if entry is None else navigator.candidate(entry),
@@ -210,7 +210,7 @@ class MsgNav(NavigatorAgent):
     ) -> GraphQuestion:
         """Return the main question, with as few images as show every edge."""
         memory, config = self._memory, self.config
-        images = memory.images(subgraph.view_ids, config.navigator.image_px if self.sensors.needs_rgb else None)
+        images = memory.images(subgraph.view_ids, config.navigator.image_px if self._shows_images else None)
         number_of = {image.view_id: number for number, image in enumerate(images)}
         shown = set(subgraph.entry_ids)
         edges = []
@@ -227,6 +227,7 @@ class MsgNav(NavigatorAgent):
             round=self._navigator.round,
             max_rounds=self._navigator.round + observation.num_rounds_left,
             num_frontiers=len(self._navigator.explorer.frontiers),
+            unseen_m2=self._unseen_m2(),
         )
 
     def _viewpoint(self, points_m: NDArray[np.float32], here: Point2) -> Viewpoint:

@@ -122,6 +122,8 @@ class GraphQuestion(Question[GraphChoice]):
     max_rounds: int
     num_frontiers: int
     """Number of frontiers. Not part of the prompt."""
+    unseen_m2: float = 0.0
+    """Area that the map does not know, for rules that look. Not part of the prompt."""
 
     def prompt(self) -> Prompt:
         """Show objects and edges as text, images with numbers, and earlier choices."""
@@ -199,21 +201,15 @@ class GraphQuestion(Question[GraphChoice]):
         around = [node.candidate for node in self.objects]
         rejected_ids = {past.id for past in self.history if past.kind == "object"}
         left = [candidate for candidate in around if candidate.entry_id not in rejected_ids]
-        named = [
-            (matcher.relation_share(goal, candidate, around), -index)
-            for index, candidate in enumerate(left)
-            if matcher.names_goal(goal, candidate)
-        ]
+        named = [candidate for candidate in left if matcher.names_goal(goal, candidate)]
         is_last_chance = self.num_frontiers == 0 or self.max_rounds - self.round <= config.hurry_rounds
-        best = max(named, default=None)
-        fits = best is not None and best[0] >= config.min_relations
-        if best is None or not fits:
+        best = matcher.best(goal, named, around, self.unseen_m2) if named else None
+        if best is None or not best.fits:
             image = self._unmapped(matcher, goal, around)
             if image is not None:
                 return image, f"{image.category} seen, but not in the graph"
-        if best is not None and (fits or is_last_chance):
-            candidate = left[-best[1]]
-            return GraphChoice("object", candidate.entry_id), f"{candidate.label}, {best[0]:.0%} of what is said fits"
+        if best is not None and (best.fits or is_last_chance):
+            return GraphChoice("object", named[best.index].entry_id), best.reason
         if self.num_frontiers == 0:
             scored = [(matcher.label_score(goal, candidate.label), -i) for i, candidate in enumerate(left)]
             score, index = max(scored, default=(0.0, 0))

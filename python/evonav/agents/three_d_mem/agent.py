@@ -85,6 +85,7 @@ class ThreeDMem(NavigatorAgent):
             frontiers=self._frontier_candidates(here),
             surroundings=list(remembered.values()),
             num_rounds_left=observation.num_rounds_left,
+            unseen_m2=self._unseen_m2(),
             heading_view=self._heading_view(),
         )
         self._candidates = tuple(entry_id for snapshot in shown for entry_id in snapshot.entry_ids)
@@ -120,10 +121,10 @@ class ThreeDMem(NavigatorAgent):
         navigator, view = self._navigator, snapshot.view
         objects: list[ObjectCandidate] = []
         for entry_id in snapshot.entry_ids:
-            seen = navigator.views.seen_in(view, entry_id) if self.sensors.needs_rgb else None
+            seen = navigator.views.seen_in(view, entry_id) if self._shows_images else None
             crop = None if seen is None else crop_of(view, seen.box_px)
             objects.append(replace(remembered[entry_id], crop=crop))
-        image = pixels_of(view, navigator.config.image_px) if self.sensors.needs_rgb else None
+        image = pixels_of(view, navigator.config.image_px) if self._shows_images else None
         return SnapshotCandidate(view.id, objects, image)
 
     def _go_to_object(self, chosen: ObjectCandidate, reason: str) -> AgentAction:

@@ -107,6 +107,8 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
     """Everything remembered: what the snapshots' images would show around their objects. Not part of the prompt."""
     num_rounds_left: int
     """Number of rounds that are left. Not part of the prompt."""
+    unseen_m2: float = 0.0
+    """Area that the map does not know, for rules that look. Not part of the prompt."""
     heading_view: Pixels | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
@@ -175,6 +177,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             self.frontiers,
             self.surroundings,
             num_rounds_left=self.num_rounds_left,
+            unseen_m2=self.unseen_m2,
             is_final=True,
         )
         if choice.kind == "object":

@@ -54,7 +54,8 @@ def decision_component(
         DecisionError: The model cannot be asked from here: a key or package is missing.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.evaluation.run.settings import DecisionResources, check_decision
+    from evonav.evaluation.run.components import check_decision
+    from evonav.evaluation.run.settings import DecisionResources
 
     decisions.check()
     if decisions.kind != "vlm":
@@ -63,7 +64,7 @@ def decision_component(
             raise typer.BadParameter(f"--{flag} is for --decision vlm")
     resources = None if dry_run else DecisionResources.of_run(out, spending, num_workers)
     decision = decisions.component(seed, resources, recorded)
-    if resources is not None and decisions.kind != "text":
+    if resources is not None and not decisions.asks_rules:
         check_decision(decision, seed)
     return decision
 

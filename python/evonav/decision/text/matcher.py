@@ -75,6 +75,16 @@ class TextMatchConfig:
     """Verification: or this share of the object's points lies by the remembered object's points."""
 
 
+@dataclass(frozen=True, slots=True)
+class Best:
+    """The candidate that fits a goal best."""
+
+    index: int
+    fits: bool
+    """Whether it fits well enough to end exploration."""
+    reason: str
+
+
 class Matcher:
     """Compares goals with remembered objects."""
 
@@ -102,19 +112,33 @@ class Matcher:
         sign_of = _ROOM_OF_SIGN.get(canonical(label))
         return self.label_score(goal, label) > 0.0 or (sign_of is not None and sign_of == goal.room)
 
+    def best(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
+    ) -> Best:
+        """Return which of the objects with the goal's name fits best; of equals, the first.
+
+        Args:
+            goal: The parsed instruction.
+            named: Objects with the goal's name, at least one.
+            around: Everything remembered.
+            unseen_m2: Area that the map does not know; only rules that look use it.
+        """
+        shares = [self.relation_share(goal, candidate, around) for candidate in named]
+        index = shares.index(max(shares))
+        fits = shares[index] >= self.config.min_relations
+        return Best(index, fits, f"{named[index].label}, {shares[index]:.0%} of what is said fits")
+
     def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
 
         Adjectives do not count: memory has no colours, and an object that is small for its kind may be the
         larger of two that are remembered.
         """
-        judged = [
-            self._holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES
-        ]
+        judged = [self.holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES]
         return sum(judged) / len(judged) if judged else 1.0
 
-    def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Return 1 if a relation of an entry holds, 0 if not."""
+    def holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """Return 1 if a relation of an entry holds, 0 if not, and in between for a room that is unknown."""
         if relation.kind == "in":
             room = self.room_around(entry.ground_m, around)
             return self.config.unknown_room if room is None else float(room == relation.noun)

@@ -112,6 +112,7 @@ def choose_candidate(
     surroundings: Sequence[ObjectCandidate],
     *,
     num_rounds_left: int,
+    unseen_m2: float = 0.0,
     is_final: bool = False,
 ) -> tuple[Choice, str]:
     """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near.
@@ -123,6 +124,7 @@ def choose_candidate(
         frontiers: Frontiers that can be explored.
         surroundings: Everything remembered.
         num_rounds_left: Number of decision rounds that are left in the stage.
+        unseen_m2: Area that the map does not know, for rules that look.
         is_final: Settle for the object that fits best if it is of the goal's kind, even if its relations do not hold;
             without frontiers, for whatever may help.
 
@@ -134,16 +136,12 @@ def choose_candidate(
     """
     goal = matcher.parsed(stage)
     config = matcher.config
-    named = [
-        (matcher.relation_share(goal, candidate, surroundings), index)
-        for index, candidate in enumerate(objects)
-        if matcher.names_goal(goal, candidate)
-    ]
+    named = [index for index, candidate in enumerate(objects) if matcher.names_goal(goal, candidate)]
     if named:
-        share, index = max(named, key=lambda pair: (pair[0], -pair[1]))
+        best = matcher.best(goal, [objects[index] for index in named], surroundings, unseen_m2)
         is_last_chance = not frontiers or num_rounds_left <= config.hurry_rounds
-        if is_final or share >= config.min_relations or is_last_chance:
-            return Choice("object", index), f"{objects[index].label}, {share:.0%} of what is said fits"
+        if is_final or best.fits or is_last_chance:
+            return Choice("object", named[best.index]), best.reason
     if frontiers:
         index = min(range(len(frontiers)), key=lambda i: (matcher.frontier_cost_m(goal, frontiers[i], surroundings), i))
         return Choice("frontier", index), "relations do not hold" if named else "nothing remembered fits"

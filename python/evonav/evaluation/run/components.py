@@ -175,6 +175,18 @@ def load_case(path: Path) -> EpisodeSpec:
     return episode_spec(load_task(path))
 
 
+def check_decision(decision: Component[DecisionModel], seed: int) -> None:
+    """Check before a run that its model can be asked from here, without asking it.
+
+    Raises:
+        DecisionError: A key or package is missing.
+        InvalidArgumentError: The model cannot be made.
+    """
+    check = getattr(decision.create(seed), "check", None)
+    if check is not None:
+        check()
+
+
 def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `SimulatorConfig`
     """Make evonav's own simulator, with AI2-THOR's defaults; headers of runs without a style mean `outlined`."""
     from evonav.world.embedded import EmbeddedSimulator

@@ -124,13 +124,18 @@ class PerceptionSettings(Settings):
         return found
 
 
+RULES: Mapping[str, str] = {"text": "text_match", "looks": "appearance_match"}
+"""Decision models that ask nobody, and the functions in `evonav.decision.backends` that make them."""
+
+
 class DecisionSettings(Settings):
     """The decision model that answers the agents' questions (docs/decision.md)."""
 
     kind: str = "text"
     """Decision model that answers the agents' questions.
 
-    text (rules), vlm (a vision-language model on a server) or module:name (your own)."""
+    text (rules), looks (rules that see colours and sizes), vlm (a vision-language model on a server) or
+    module:name (your own)."""
     model: str | None = None
     """VLM: name of the model on the server. Default: EVONAV_VLM_MODEL."""
     base_url: str | None = None
@@ -166,16 +171,25 @@ class DecisionSettings(Settings):
     """Tell the model in every prompt that things may have been moved; the paper's agents are not informed."""
     noise: dict[str, float] = Field(default_factory=dict)
     """Rates of simulated mistakes, between 0 and 1: wrong, unparsable, refusal, lost; and delay in seconds."""
+    eagerness: float = 0.0
+    """looks: from 0 to 1, go to objects that are less likely the goal."""
+    mistakes: float = 0.0
+    """looks: temperature at which objects are drawn by how likely they are; 0 takes the likeliest."""
+
+    @property
+    def asks_rules(self) -> bool:
+        """Whether rules decide, which need no network and have no costs."""
+        return self.kind in RULES
 
     @property
     def stage_timeout_s(self) -> float:
         """Time limit of a stage; longer where a model is asked."""
-        return STAGE_TIMEOUT_S if self.kind == "text" else VLM_STAGE_TIMEOUT_S
+        return STAGE_TIMEOUT_S if self.asks_rules else VLM_STAGE_TIMEOUT_S
 
     @property
     def answer_timeout_s(self) -> float:
         """Time limit of an agent's answer in a round; longer where a model is asked."""
-        return ANSWER_TIMEOUT_S if self.kind == "text" else VLM_ANSWER_TIMEOUT_S
+        return ANSWER_TIMEOUT_S if self.asks_rules else VLM_ANSWER_TIMEOUT_S
 
     def named_model(self) -> str:
         """Return the name of the model on the server.
@@ -203,11 +217,17 @@ class DecisionSettings(Settings):
         NoiseRates.read(self.noise)
         if self.kind == "text":
             self._refuse_all_but("model")
+        elif self.kind == "looks":
+            from evonav.decision.appearance.model import AppearanceMatch
+
+            self._refuse_all_but("model", "eagerness", "mistakes")
+            AppearanceMatch(eagerness=self.eagerness, mistakes=self.mistakes)
         elif self.kind == "vlm":
+            self._refuse_all_but(*type(self).model_fields.keys() - {"eagerness", "mistakes"})
             identity = self.identity(0)
             vlm_config(identity["model"], identity["request"], self._server(1))
         elif ":" not in self.kind:
-            raise SettingError(type(self), "kind", f"{self.kind}: expected text, vlm or module:name")
+            raise SettingError(type(self), "kind", f"{self.kind}: expected text, looks, vlm or module:name")
         else:
             self._refuse_all_but("model", "mode", "exchanges", "exchange_images", "tell_of_change")
         if self.mode == "live" and self.exchanges is not None:
@@ -222,6 +242,8 @@ class DecisionSettings(Settings):
         noise = {"noise": dict(self.noise)} if self.noise else {}
         if self.kind == "text":
             return noise
+        if self.kind == "looks":
+            return {"eagerness": self.eagerness, "mistakes": self.mistakes, **noise}
         if self.kind != "vlm":
             return {"path": self.kind, "tells_of_change": self.tell_of_change, **noise}
         from evonav.decision.backends import SAMPLING
@@ -253,8 +275,8 @@ class DecisionSettings(Settings):
         """
         self.check()
         options = self.identity(seed)
-        if self.kind == "text":
-            return Component("evonav.decision.backends:text_match", options)
+        if self.asks_rules:
+            return Component(f"evonav.decision.backends:{RULES[self.kind]}", options)
         path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'own'}"
         if not self.tell_of_change and _is_silent_on_change(recorded or {}, path):
             del options["tells_of_change"]
@@ -366,18 +388,6 @@ class DecisionResources:
     def of_run(cls, run_dir: Path, spending: SpendingSettings, num_workers: int) -> "DecisionResources":
         """Return the resources of a run that has a spending log of its own."""
         return cls(run_dir, run_dir / LEDGER_NAME, spending, num_workers=num_workers)
-
-
-def check_decision(decision: Component[DecisionModel], seed: int) -> None:
-    """Check before a run that its model can be asked from here, without asking it.
-
-    Raises:
-        DecisionError: A key or package is missing.
-        InvalidArgumentError: The model cannot be made.
-    """
-    check = getattr(decision.create(seed), "check", None)
-    if check is not None:
-        check()
 
 
 def _is_silent_on_change(recorded: Mapping[str, Any], path: str) -> bool:

@@ -1,0 +1,200 @@
+"""Decide by looks, without a network: how likely each remembered object is the goal, by all that its views show.
+
+`AppearanceMatch` stands where the paper's agents ask GPT-4o, as `TextMatch` does, but it sees: the colours of an object
+in the agent's own views, its size and proportions, and what these views show around it. Each of these is a likelihood
+ratio, the probability of what is seen for the goal over that for another object of its type. Their product and the
+number of objects of the type that the unseen part of the home should hold give a posterior probability; the agent goes
+to an object that is likely enough. What cannot be seen counts 1: materials, details, corners.
+"""
+
+import hashlib
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evonav.decision.appearance.statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
+from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
+from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
+from evonav.tasks.language import COLOURS
+
+_WALL_THINGS = {"painting", "window", "doorway"}
+"""Things on or in walls, which views show less often than what stands on the floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class AppearanceConfig:
+    """Numbers of the rules."""
+
+    threshold: float = 0.5
+    """Probability from which an object is believed to be the goal."""
+    eager_threshold: float = 0.2
+    """The same at full eagerness."""
+    colour_floor: float = 0.05
+    """Added to the share of a colour and to the word's prior: a colour that is not seen may be in the shade."""
+    colour_range: tuple[float, float] = (0.1, 6.0)
+    """Smallest and largest ratio of a colour."""
+    form_ratio: float = 3.0
+    """Largest ratio of a size or of a form; its inverse is the smallest."""
+    form_slope: float = 0.15
+    """Width of the step between a word and its opposite, in natural logarithms of sizes or proportions."""
+    min_sightings: int = 3
+    """Number of detections from which a box counts as complete."""
+    on: float = 0.95
+    """Probability that the goal's views show what it is said to stand on."""
+    near: float = 0.85
+    """The same for what stands beside it."""
+    near_wall_thing: float = 0.75
+    """The same for a painting, a window or a door."""
+    room: float = 0.9
+    """The same for the room."""
+    min_known_share: float = 0.7
+    """Known share of the surroundings from which a relation that is not seen counts as violated."""
+
+
+class AppearanceMatcher(Matcher):
+    """Compares goals with remembered objects by what their views show."""
+
+    def __init__(self, config: AppearanceConfig | None = None, *, eagerness: float = 0.0) -> None:
+        """Create a matcher.
+
+        Args:
+            config: Numbers of the rules.
+            eagerness: 0 believes an object at `threshold`, 1 at `eager_threshold`.
+        """
+        super().__init__(TextMatchConfig())
+        self.numbers = config or AppearanceConfig()
+        self._threshold = self.numbers.threshold + eagerness * (self.numbers.eager_threshold - self.numbers.threshold)
+
+    def best(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
+    ) -> Best:
+        """Return which of the objects with the goal's name is most likely the goal; of equals, the first."""
+        shares = self.posterior(goal, named, around, unseen_m2)
+        index = shares.index(max(shares))
+        return self._best(index, named, shares[index], fits=shares[index] >= self._threshold)
+
+    def _best(self, index: int, named: Sequence[ObjectCandidate], share: float, *, fits: bool) -> Best:
+        return Best(index, fits, f"{named[index].label}, {share:.0%} likely the one described")
+
+    def posterior(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
+    ) -> list[float]:
+        """Return the probability that each object is the goal; the rest is that of "not seen yet".
+
+        Args:
+            goal: The parsed instruction.
+            named: Objects with the goal's name.
+            around: Everything remembered; of it, only what an object's own views show counts.
+            unseen_m2: Area that the map does not know.
+        """
+        ratios = [self._colour_ratio(goal, one) * self._form_ratio(goal, one) for one in named]
+        for relation in goal.relations:
+            for index, ratio in enumerate(self._relation_ratios(relation, named, around)):
+                ratios[index] *= ratio
+        unseen = PER_100_M2.get(goal.noun, UNKNOWN_PER_100_M2) * unseen_m2 / 100.0
+        total = math.fsum(ratios) + unseen
+        return [ratio / total for ratio in ratios]
+
+    def _colour_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
+        """Return the ratio of the named colours; 1 if none is named, or none was seen."""
+        if one.appearance is None:
+            return 1.0
+        low, high = self.numbers.colour_range
+        ratio = 1.0
+        for word in goal.adjectives:
+            if word in COLOUR_PRIOR:
+                share = one.appearance.colours[COLOURS.index(word)] + self.numbers.colour_floor
+                ratio *= min(max(share / (COLOUR_PRIOR[word] + self.numbers.colour_floor), low), high)
+        return ratio
+
+    def _form_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
+        """Return the ratio of the named size and proportions; 1 for a box that may be a part of the object."""
+        usual = usual_size(canonical(one.label))
+        if usual is None or one.num_detections < self.numbers.min_sightings or min(one.size_m) <= 0.0:
+            return 1.0
+        width_m, height_m, depth_m = one.size_m
+        size = math.log(math.cbrt(width_m * height_m * depth_m) / usual[0])
+        upright = math.log(height_m / max(width_m, depth_m))
+        top = math.log(min(width_m, depth_m) / max(width_m, depth_m))
+        over = {  # how far beyond the describer's limit, in natural logarithms
+            "small": math.log(0.8) - size,
+            "large": size - math.log(1.25),
+            "tall": upright - max(math.log(1.3), math.log(1.3 * usual[1])),
+            "wide": min(math.log(0.9), math.log(usual[1] / 1.3)) - upright,
+            "square": top - math.log(0.92),
+            "long": math.log(0.45) - top,
+        }
+        ratio = 1.0
+        for word in goal.adjectives:
+            if word in over:
+                ratio *= self.numbers.form_ratio ** math.tanh(over[word] / (2.0 * self.numbers.form_slope))
+        return ratio
+
+    def _relation_ratios(
+        self, relation: Relation, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate]
+    ) -> list[float]:
+        """Return the ratio of one relation for each object; other objects have it by their Laplace share."""
+        seen = [self._is_seen(relation, one, around) for one in named]
+        truth = self._probability(relation)
+        ratios = []
+        for index, holds in enumerate(seen):
+            others = [other for number, other in enumerate(seen) if number != index and other is not None]
+            share = (sum(others) + 1.0) / (len(others) + 2.0)
+            ratios.append(1.0 if holds is None else truth / share if holds else (1.0 - truth) / (1.0 - share))
+        return ratios
+
+    def _probability(self, relation: Relation) -> float:
+        """Return the probability that the goal's views show a relation."""
+        if relation.kind == "near":
+            return self.numbers.near_wall_thing if relation.noun in _WALL_THINGS else self.numbers.near
+        return self.numbers.on if relation.kind == "on" else self.numbers.room
+
+    def _is_seen(self, relation: Relation, one: ObjectCandidate, around: Sequence[ObjectCandidate]) -> bool | None:
+        """Return whether the views of an object show a relation; `None` if they cannot tell."""
+        if one.appearance is None:
+            return None
+        shown = [other for other in around if other.entry_id in one.appearance.shown_ids]
+        if relation.kind == "in":
+            room = self.room_around(one.ground_m, shown)
+            return None if room is None else room == relation.noun
+        if self.holds(relation, one, shown):
+            return True
+        is_ever_detected = any(similarity(relation.noun, other.label) >= 1.0 for other in around)
+        is_known = one.appearance.known_share >= self.numbers.min_known_share
+        return False if is_known and (is_ever_detected or relation.noun not in _WALL_THINGS | {"corner"}) else None
+
+
+class MistakenMatcher(AppearanceMatcher):
+    """Draws what is believed from the posterior: like a model that is often, but not always, right."""
+
+    def __init__(self, temperature: float, seed: int, *, eagerness: float = 0.0) -> None:
+        """Create a matcher.
+
+        Args:
+            temperature: Above 0; at 1 each object and "not seen yet" is drawn as often as it is likely.
+            seed: Seed of the episode's agent.
+            eagerness: See `AppearanceMatcher`; it counts where the draw is "not seen yet".
+        """
+        super().__init__(eagerness=eagerness)
+        self._temperature = temperature
+        self._seed = seed
+        self._num_drawn = 0
+
+    def best(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
+    ) -> Best:
+        """Return an object drawn by its probability; it does not fit if "not seen yet" was drawn."""
+        shares = self.posterior(goal, named, around, unseen_m2)
+        unseen = max(0.0, 1.0 - math.fsum(shares))
+        self._num_drawn += 1
+        name = f"looks\0{self._seed}\0{self._num_drawn}"
+        draws = random.Random(hashlib.sha256(name.encode()).digest())  # noqa: S311 - not for secrets
+        top = max(*shares, unseen)
+        weights = [(share / top) ** (1.0 / self._temperature) for share in (*shares, unseen)]
+        (index,) = draws.choices(range(len(weights)), weights)
+        if index == len(named):
+            likeliest = shares.index(max(shares))
+            return self._best(likeliest, named, shares[likeliest], fits=False)
+        return self._best(index, named, shares[index], fits=True)

@@ -1,0 +1,47 @@
+"""The decision model that looks: see `evonav.decision.appearance.matcher`."""
+
+import math
+from typing import TypeVar
+
+from evonav.decision.appearance.matcher import AppearanceMatcher, MistakenMatcher
+from evonav.decision.question import Question, Reply
+from evonav.errors import InvalidArgumentError
+
+A = TypeVar("A")
+
+
+class AppearanceMatch:
+    """Answers every question by the question's own rule, which asks the matcher how likely each object is."""
+
+    needs_images = False
+    needs_colours = True
+
+    def __init__(self, *, eagerness: float = 0.0, mistakes: float = 0.0, seed: int = 0) -> None:
+        """Create a model.
+
+        Args:
+            eagerness: 0 to 1; more ends exploration for an object that is less likely the goal.
+            mistakes: Temperature, 0 or more, at which objects are drawn from the posterior; 0 draws none.
+            seed: Seed of these draws.
+
+        Raises:
+            InvalidArgumentError: A number is out of range.
+        """
+        if not 0.0 <= eagerness <= 1.0:
+            raise InvalidArgumentError(f"eagerness = {eagerness!r}: expected a number from 0 to 1")
+        if not (math.isfinite(mistakes) and mistakes >= 0.0):
+            raise InvalidArgumentError(f"mistakes = {mistakes!r}: expected a temperature, 0 or more")
+        if mistakes > 0.0:
+            self.matcher: AppearanceMatcher = MistakenMatcher(mistakes, seed, eagerness=eagerness)
+        else:
+            self.matcher = AppearanceMatcher(eagerness=eagerness)
+
+    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
+        """Return the rule's answer.
+
+        Raises:
+            AnswerError: Nothing fits, and there is nothing to choose.
+            DecisionError: The question has no rule.
+        """
+        answer, reason = question.by_rule(self.matcher)
+        return Reply(answer, f"{question.answer_text(answer)}\n{reason}")
