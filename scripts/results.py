@@ -2,9 +2,10 @@
 
     python scripts/results.py --out out/results --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/attr:40
 
-evaluates all six agents on all tasks of the folders (the first 40 of the last), then those of a subset with decisions
-that go wrong at stated rates, and writes tables and a plot. Run it again to resume; `--write-only` runs nothing. A
-folder of results holds one version of the code: give another version another folder.
+evaluates all six agents on all tasks of the folders (the first 40 of the last), then agents that depart from the
+originals or from the paper, then five agents on a subset with decisions that go wrong at stated rates, and writes
+tables and a plot. Run it again to resume; `--write-only` runs nothing. A folder of results holds one version of the
+code: give another version another folder.
 """
 
 import argparse
@@ -21,11 +22,14 @@ from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
+from evonav.perception.shorthand import read_word
+from evonav.report.compare.compare import compare
+from evonav.report.compare.selection import ComparedAgent
 from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import RecordedRun, load_run
-from evonav.report.tables.numbers import NONE, rate
+from evonav.report.tables.numbers import NONE, percent, points, rate
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import Table
 from evonav.statistics import wilson
@@ -34,8 +38,18 @@ from evonav.tasks.listing import TaskFile, task_files
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "results.md", ROOT / "docs" / "results-perception.md"
 PLOT = ROOT / "docs" / "images" / "decision-errors.svg"
+HEADLINE = "noisy:perfect,features=true"
+"""Perception of the main runs: true masks and labels, and image features by which entries are ranked, as the paper's
+agents rank them by CLIP (Sec. C.4)."""
 RATES = (0.0, 0.05, 0.1, 0.2, 0.4)
 """Shares of decisions that are another valid answer than the model's own."""
+RANKING_AGENTS = ("fu", "stage-reset", "ftu")
+"""Agents that rank entries by image features, and by labels where there are none."""
+DEPARTURES = (
+    *(("our fallback for frontiers", ("plus", f"{agent}+"), ("main", agent)) for agent in ("3d-mem", "msgnav")),
+    *(("entries ranked by labels", ("labels", agent), ("main", agent)) for agent in RANKING_AGENTS),
+)
+"""What is different, and folder and agent of the runs with and without it."""
 ROOM_GROUPS = ((2, 3), (4, 5), (6, 10))
 
 
@@ -46,7 +60,9 @@ def main() -> None:
     agents = asked.agents.split(",")
     subset = spread(tasks, asked.sweep)
     if not asked.write_only:
-        run_agents(asked.out / "main", agents, tasks, Backend(), asked)
+        run_agents(asked.out / "main", agents, tasks, Backend(perception=read_word(HEADLINE)), asked)
+        run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, Backend(perception=read_word(HEADLINE)), asked)
+        run_agents(asked.out / "labels", RANKING_AGENTS, tasks, Backend(), asked)
         for rate in RATES:
             run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
     found = parts(asked.out, agents)
@@ -74,7 +90,8 @@ def spread(tasks: Sequence[TaskFile], num: int) -> list[TaskFile]:
 def noisy_backend(rate: float) -> Backend:
     """The text matcher, of whose answers a share is another valid one."""
     return Backend(
-        decision=Component("evonav.decision.backends:text_match", {"noise": {"wrong": rate}} if rate else {})
+        perception=read_word(HEADLINE),
+        decision=Component("evonav.decision.backends:text_match", {"noise": {"wrong": rate}} if rate else {}),
     )
 
 
@@ -98,6 +115,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "order": order.markdown(),
         "differences": differences.markdown(),
         "rooms": room_table(run).markdown(),
+        "departures": departure_table(out, agents).markdown(),
         "causes": "\n".join(
             f"**{title.capitalize()}**\n\n{cause_share_table(run, stratum).markdown()}"
             for stratum, title in STRATA.items()
@@ -192,6 +210,24 @@ def room_table(run: RecordedRun) -> Table:
     rows = tuple((agent, *(_rate(found[name].get(agent, (0, 0))) for name in names)) for agent in run.agents)
     note = "SR %, Wilson's 95% interval."
     return Table("By size of the house", ("Agent", *names), rows, (note,))
+
+
+def departure_table(out: Path, agents: Sequence[str]) -> Table:
+    """What our departures from the originals and from the paper are worth to the agents that have them."""
+    rows = []
+    for words, ours, theirs in DEPARTURES:
+        if theirs[1] not in agents or not (out / ours[0]).exists():
+            continue
+        folders = [
+            ComparedAgent(name, load_run(out / name), agent, (i, 0)) for i, (name, agent) in enumerate((ours, theirs))
+        ]
+        (found,) = compare(folders, allow_differences=True)
+        part = found.parts[0]
+        success, spl = part.effects["success"], part.effects["spl"]
+        rates_of = (percent(success.mean_a), percent(success.mean_b))
+        rows.append((words, theirs[1], *rates_of, points(success), points(spl)))
+    columns = ("Departure", "agent", "SR % without", "SR % with", "SR, points", "SPL, points")
+    return Table("Departures", columns, tuple(rows), ("With minus without, 95% bootstrap over houses, paired.",))
 
 
 def sensitivity_table(sweep: dict[float, RecordedRun], agents: Sequence[str]) -> Table:

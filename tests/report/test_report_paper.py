@@ -251,6 +251,20 @@ def test_the_script_replaces_marked_parts_alone(script) -> None:
         script.with_part(page, "z", "")
 
 
+def test_departures_are_with_minus_without(script, tmp_path: Path) -> None:
+    def run_of(name: str, agent: str, successes: str) -> None:
+        states = {task: EndState.SUCCESS if task in successes else EndState.FAILURE for task in "abcdef"}
+        records = [stage_record(agent, task, 1, state, num_stages=1) for task, state in states.items()]
+        record_run(tmp_path / name, records, dict.fromkeys("abcdef", 1), [agent])
+
+    run_of("main", "3d-mem", "ab")
+    run_of("plus", "3d-mem+", "abcde")
+    table = script.departure_table(tmp_path, ["3d-mem"])
+    ((words, agent, without, with_it, success, _),) = table.rows
+    assert (words, agent, without, with_it) == ("our fallback for frontiers", "3d-mem", "33.3", "83.3")
+    assert success.startswith("+50.0 [")
+
+
 def test_the_pages_have_every_part_that_the_scripts_write(script, write_run: WriteRun, monkeypatch) -> None:
     run_dir = write_run("main")
     monkeypatch.setattr(script, "PLOT", run_dir.parent / "plot.svg")
