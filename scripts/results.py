@@ -25,6 +25,7 @@ from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.perception.shorthand import read_word
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import ComparedAgent
+from evonav.report.paper.reweighted import reweighted_table
 from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
@@ -112,6 +113,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "table-2": relocation.markdown(),
         "table-2-far": far.markdown(),
         "stage-1": first.markdown(),
+        "reweighted": reweighted_table(run, "procthor-10k").markdown(),
         "order": order.markdown(),
         "differences": differences.markdown(),
         "rooms": room_table(run).markdown(),

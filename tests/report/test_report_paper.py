@@ -9,14 +9,17 @@ import numpy as np
 import perception_results
 import pytest
 from behaviour_tables import behaviour_of, cause_share_table, counter_table, end_table, success_by_group
-from made_up_run import WriteRun, entry, record_run, stage_record
+from made_up_run import WriteRun, entry, record_run, stage_map, stage_record
 from scipy import stats
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentPair
 from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.report.paper import tables as paper
+from evonav.report.paper.reweighted import reweighted_table
 from evonav.report.run import load_run
 from evonav.report.tables.table import markdown_tables
 from evonav.statistics import paired_effect
@@ -121,6 +124,36 @@ def test_moved_targets_are_split_by_how_far_they_moved(tmp_path: Path) -> None:
     assert (less[:4], less[-6:]) == ("66.7", " n = 3")
 
 
+def test_reweighted_rates_are_means_of_groups_by_their_share_of_the_mix(tmp_path: Path) -> None:
+    """Two, three and four rooms have weights 4, 2 and 5 in the mix; 2 succeeds in 1 of 2, 3 in 0 of 1, 4 in 3 of 4."""
+    num_rooms = {"a": 2, "b": 2, "c": 3, "d": 4, "e": 4, "f": 1}
+    failed = EndState.FAILURE
+    states = {"a": [EndState.SUCCESS], "b": [failed], "c": [failed], "d": [EndState.SUCCESS] * 2}
+    states |= {"e": [EndState.SUCCESS, failed], "f": [failed]}  # one room is in no house of the mix
+    records = [
+        stage_record("fu", task, stage, state)
+        for task, ends in states.items()
+        for stage, state in enumerate(ends, start=1)
+    ]
+    with RunStore(tmp_path / "run", create=True) as store:
+        for task, count in num_rooms.items():
+            plan = stage_map(task, 1)
+            plan = plan.model_copy(update={"rooms": tuple(plan.rooms[:1]) * count})
+            store.add_floor_plan(task, 1, plan.model_dump_json())
+    run_dir = record_run(tmp_path / "run", records, dict.fromkeys("abcdef", 2), ["fu"])
+    table = reweighted_table(load_run(run_dir), "procthor-10k")
+    (row,) = cells(table).values()
+    # A house's weight is that of its group by the number of houses; a house counts with all its stages.
+    mean = (4 / 2 * 1 + 2 / 1 * 0 + 5 / 2 * 3) / (4 / 2 * 2 + 2 / 1 * 1 + 5 / 2 * 4)
+    assert row["SR %"].startswith(f"{100 * mean:.1f}")
+    assert row["SR % paper"] == "61.1"
+    later = (5 / 2 * 1) / (5 / 2 * 2)
+    assert row["SR % moved"].startswith(f"{100 * later:.1f}")
+    assert row["SR % not moved"] == "–"
+    with pytest.raises(InvalidArgumentError, match="procthor-10k"):
+        reweighted_table(load_run(run_dir), "procthor")
+
+
 def test_agents_that_the_paper_lacks_stand_without_its_figures(tmp_path: Path) -> None:
     records = [stage_record(agent, "task", 1, EndState.SUCCESS) for agent in ("mine", "fu")]
     run = load_run(record_run(tmp_path / "run", records, {"task": 1}, ["mine", "fu"]))
@@ -138,12 +171,14 @@ def test_order_tells_ties_and_leaves_out_what_has_no_rate() -> None:
 
 def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path: Path) -> None:
     run_dir, out = write_run(), tmp_path / "paper.md"
-    result = CliRunner().invoke(app, ["paper", str(run_dir), "--out", str(out)], env={"COLUMNS": "200"})
+    arguments = ["paper", str(run_dir), "--out", str(out), "--reweight", "procthor-10k"]
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
     assert "Table 2: moved and not moved targets" in result.output
     text = out.read_text(encoding="utf-8")
     assert text.startswith(markdown_tables(paper.paper_tables(load_run(run_dir))))
-    assert text.count("\n| ftu |") == 4
+    assert text.count("\n| ftu |") == 5
+    assert "## Reweighted to the rooms of procthor-10k" in text
     assert text.count("\n| ftu minus fu |") == 2
 
 

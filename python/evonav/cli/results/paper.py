@@ -37,6 +37,13 @@ def paper(
             metavar="RUN", help="RecordedRun with predicted perception, which fills the lower half of the LaTeX tables."
         ),
     ] = None,
+    reweight: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DATASET",
+            help="Also weight tasks so that their houses have the room counts of a dataset: procthor-10k.",
+        ),
+    ] = None,
 ) -> None:
     """Show a run beside the paper's Tables 1 and 2.
 
@@ -44,6 +51,7 @@ def paper(
     """
     from evonav.errors import StoreError
     from evonav.report.paper.latex import paper_latex
+    from evonav.report.paper.reweighted import reweighted_table
     from evonav.report.paper.tables import paper_tables, power_table
     from evonav.report.run import load_run
     from evonav.report.tables.table import markdown_tables
@@ -52,6 +60,8 @@ def paper(
     if not any(summary.n for summary in loaded.summaries):
         raise StoreError(f"{run}: no stage is scored yet; `evonav evaluate` with the same options resumes the run")
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
+    if reweight is not None:
+        tables.append(reweighted_table(loaded, reweight, perception.value))
     show_tables(tables)
     runs: dict[Perception, RecordedRun] = {perception.value: loaded}
     if latex is not None and prediction is not None:

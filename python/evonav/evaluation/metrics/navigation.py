@@ -101,7 +101,7 @@ def rates(records: Sequence[StageRecord]) -> Rates:
     scored = [record for record in records if record.is_scored]
     if not scored:
         return Rates(n=0, sr=None, spl=None)
-    values = _success_and_spl(scored)
+    values = success_and_spl(scored)
     sr, spl = ClusterBootstrap([house_of(record) for record in scored]).column_means(values)
     return Rates(
         n=len(scored),
@@ -156,7 +156,7 @@ def agent_pairs(records_by_agent: Mapping[str, Sequence[StageRecord]]) -> list[A
 
 
 def _agent_pair(a: str, b: str, stages: Sequence[tuple[StageRecord, StageRecord]]) -> AgentPair:
-    values_a, values_b = (_success_and_spl(records) for records in zip(*stages, strict=True))
+    values_a, values_b = (success_and_spl(records) for records in zip(*stages, strict=True))
     sr, spl = paired_effects(values_a, values_b, [house_of(record) for record, _ in stages])
     return AgentPair(
         a=a,
@@ -211,7 +211,8 @@ def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
     return dict(sorted(splits.items()))
 
 
-def _success_and_spl(scored: Sequence[StageRecord]) -> NDArray[np.float64]:
+def success_and_spl(scored: Sequence[StageRecord]) -> NDArray[np.float64]:
+    """Return `(N, 2)` success, 0 or 1, and SPL of scored stages."""
     rows = [(float(record.state is EndState.SUCCESS), record.spl or 0.0) for record in scored]
     return np.array(rows, dtype=np.float64)
 

@@ -1,0 +1,87 @@
+"""Weight a run's houses so that they have the room counts of the paper's houses."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from evonav.evaluation.metrics.navigation import house_of, success_and_spl
+from evonav.evaluation.metrics.stage_metrics import stratum_of
+from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.store import RunStore
+from evonav.generation.statistics.room_mix import Reweighting, reweight
+from evonav.report.paper.tables import PAPER, Perception
+from evonav.report.run import RecordedRun
+from evonav.report.tables.numbers import NONE, percent, rate
+from evonav.report.tables.table import Table
+from evonav.statistics import ClusterBootstrap, Estimate
+
+COLUMNS = {
+    "SR %": None,
+    "SPL %": None,
+    "SR % stage 1": "stage_1",
+    "SR % moved": "relocated",
+    "SR % not moved": "not_relocated",
+}
+"""Columns by the stratum of the stages that count; `None` for all."""
+
+
+def reweighted_table(run: RecordedRun, mix: str, perception: Perception = "gt") -> Table:
+    """Return SR and SPL with the weights that give the run's houses the room counts of a data set.
+
+    Args:
+        run: A run whose maps are recorded.
+        mix: Name of the data set: `procthor-10k`, the rooms of the published generator's houses with two rooms or more.
+        perception: The half of the paper's tables beside it.
+
+    Raises:
+        InvalidArgumentError: The mix is unknown, or has none of the houses.
+        StoreError: The run cannot be read.
+    """
+    tasks = list(run.num_stages)
+    weighting = reweight(mix, _num_rooms(run, tasks), [None] * len(tasks))
+    rows = []
+    for agent, records in run.records_by_agent().items():
+        scored = [record for record in records if record.is_scored]
+        cells = []
+        for name, stratum in COLUMNS.items():
+            part = [record for record in scored if stratum is None or stratum_of(record) == stratum]
+            found = _estimate(part, tasks, weighting, is_spl=name.startswith("SPL"))
+            cells.append(NONE if found.value is None else rate(found.value, found.ci95))
+        paper = PAPER[perception].get(agent)
+        theirs = (NONE, NONE) if paper is None else (percent(paper.sr()), percent(paper.spl))
+        rows.append((agent, theirs[0], cells[0], theirs[1], *cells[1:]))
+    record = weighting.record
+    names = tuple(COLUMNS)
+    columns = ("Agent", "SR % paper", names[0], "SPL % paper", *names[1:])
+    note = (
+        f"Weighted by {record.by} to {mix}: equals {record.effective_num_tasks:.0f} equally weighted tasks of "
+        f"{len(tasks)}, covers {100 * record.covered_share:.0f}% of the mix, leaves out {record.num_left_out}. 95% "
+        "bootstrap over houses within each number of rooms."
+    )
+    return Table(f"Reweighted to the rooms of {mix}", columns, tuple(rows), (note,))
+
+
+def _num_rooms(run: RecordedRun, tasks: Sequence[str]) -> list[int]:
+    """Return the number of rooms of each task's house; 0 where its map is not recorded."""
+    with RunStore(run.run_dir) as store:
+        maps = (next(iter(store.maps(task)), None) for task in tasks)
+        return [0 if plan is None else len(plan.rooms) for plan in maps]
+
+
+def _estimate(
+    records: Sequence[StageRecord], tasks: Sequence[str], weighting: Reweighting, *, is_spl: bool
+) -> Estimate:
+    """Return the weighted mean over the stages of some tasks."""
+    index_of = {task: index for index, task in enumerate(tasks)}
+    indices = np.array([index_of[record.task_id] for record in records], np.int64)
+    weights = weighting.weights[indices]
+    is_counted = weights > 0.0
+    chosen = [record for record, counts in zip(records, is_counted, strict=True) if counts]
+    if not chosen:
+        return Estimate(None, None, 0, 0)
+    success, spl = success_and_spl(chosen).T
+    values = spl if is_spl else success
+    strata = weighting.task_strata[indices][is_counted]
+    bootstrap = ClusterBootstrap([house_of(record) for record in chosen], strata=strata)
+    sums = bootstrap.sums(np.column_stack([weights[is_counted] * values, weights[is_counted]]))
+    return bootstrap.ratio(sums[:, 0], sums[:, 1], len(chosen))
