@@ -16,9 +16,9 @@ import numpy as np
 
 from evonav._core import assets
 from evonav.errors import HouseError
-from evonav.generation.statistics.room_mix import reweight
 from evonav.house import House, stream_houses
 from evonav.statistics import weighted_quantiles
+from evonav.tasks.room_mix import reweight
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
 SALIENT = 0

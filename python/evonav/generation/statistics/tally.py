@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.generation.statistics.metrics import RATIOS
-from evonav.generation.statistics.room_mix import Reweighting
 from evonav.generation.statistics.task_summary import TaskSummary
+from evonav.tasks.room_mix import Reweighting
 
 
 @dataclass

@@ -8,12 +8,12 @@ from evonav.evaluation.metrics.navigation import house_of, success_and_spl
 from evonav.evaluation.metrics.stage_metrics import stratum_of
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.generation.statistics.room_mix import Reweighting, reweight
 from evonav.report.paper.tables import PAPER, Perception
 from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import NONE, percent, rate
 from evonav.report.tables.table import Table
 from evonav.statistics import ClusterBootstrap, Estimate
+from evonav.tasks.room_mix import Reweighting, reweight
 
 COLUMNS = {
     "SR %": None,
