@@ -18,7 +18,7 @@ from evonav._core import assets
 from evonav.errors import HouseError
 from evonav.house import House, stream_houses
 from evonav.statistics import weighted_quantiles
-from evonav.tasks.room_mix import reweight
+from evonav.tasks.statistics import reweight
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
 SALIENT = 0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from evonav.errors import InvalidArgumentError
-from evonav.tasks.room_mix import PROCTHOR_10K_PLANS, reweight
+from evonav.tasks.statistics import PROCTHOR_10K_PLANS, reweight
 
 
 def test_the_mix_is_eighteen_twenty_seconds_of_the_published_one() -> None:

@@ -23,14 +23,16 @@ from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, Task
 from evonav.statistics import ClusterBootstrap, chi_square, effective_size, weighted_quantiles, wilson
 from evonav.tasks.dataset import DATASET_NAME, read_dataset
 from evonav.tasks.listing import task_roots
-from evonav.tasks.room_mix import Reweighting, check_mix, reweight
 from evonav.tasks.statistics import (
     Distribution,
     Estimate,
     Metric,
     Quantity,
+    Reweighting,
     TaskStatistics,
     Test,
+    check_mix,
+    reweight,
 )
 
 NUM_RESAMPLES = 2000
@@ -50,7 +52,7 @@ def statistics_of(
     Args:
         summaries: Summary of each task.
         sources: Names of the sources, recorded in the result.
-        mix: Data set to whose rooms the tasks are also reweighted (`evonav.tasks.room_mix`).
+        mix: Data set to whose rooms the tasks are also reweighted (`evonav.tasks.statistics`).
         house_rejections: Number of houses without a task, by reason.
 
     Raises:

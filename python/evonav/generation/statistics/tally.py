@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav.generation.statistics.metrics import RATIOS
 from evonav.generation.statistics.task_summary import TaskSummary
-from evonav.tasks.room_mix import Reweighting
+from evonav.tasks.statistics import Reweighting
 
 
 @dataclass

@@ -13,7 +13,7 @@ from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import NONE, percent, rate
 from evonav.report.tables.table import Table
 from evonav.statistics import ClusterBootstrap, Estimate
-from evonav.tasks.room_mix import Reweighting, reweight
+from evonav.tasks.statistics import Reweighting, reweight
 
 COLUMNS = {
     "SR %": None,
