@@ -117,7 +117,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "order": order.markdown(),
         "differences": differences.markdown(),
         "rooms": room_table(run).markdown(),
-        "departures": departure_table(out, agents).markdown(),
+        "departures": departures.markdown() if (departures := departure_table(out, agents)).rows else "",
         "causes": "\n".join(
             f"**{title.capitalize()}**\n\n{cause_share_table(run, stratum).markdown()}"
             for stratum, title in STRATA.items()
@@ -144,8 +144,8 @@ def large_parts(run_dir: Path) -> dict[str, str]:
 
 
 def write_parts(parts: Mapping[str, str]) -> None:
-    """Replace marked parts of the pages of results."""
-    for name, text in parts.items():
+    """Replace marked parts of the pages of results; one whose runs are not there stays as it was."""
+    for name, text in ((name, text) for name, text in parts.items() if text):
         page = next((page for page in PAGES if _mark(name) in page.read_text(encoding="utf-8")), PAGES[0])
         page.write_text(with_part(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
 
