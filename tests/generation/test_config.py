@@ -36,6 +36,18 @@ def test_a_file_gives_some_fields_and_options_win(tmp_path: Path) -> None:
     assert (won.evolve_probability, won.num_stages, won.extensions) == (1.0, (6, 8), read.extensions)
 
 
+def test_the_literal_reading_differs_in_four_values() -> None:
+    literal, ours = read_parameters(Path(__file__).parents[2] / "examples" / "literal.toml"), GenerationParameters()
+    values = {name: (getattr(ours, name), getattr(literal, name)) for name in GenerationParameters.model_fields}
+    differing = {name: pair for name, pair in values.items() if pair[0] != pair[1]}
+    assert differing == {
+        "changed_room_window": (1, 2),
+        "goal_room_window": (1, 2),
+        "moved_children_multiplier": (9.0, 1.0),
+        "goals_on_walls": (False, True),
+    }
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [

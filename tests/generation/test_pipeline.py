@@ -2,6 +2,7 @@ import json
 import re
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -64,6 +65,19 @@ def test_a_house_without_a_task_says_why(houses: list[House]) -> None:
     assert caught.value.reason == "no_start"
     with pytest.raises(HouseError, match="no_such_asset"):
         generate_task(broken[1], seed=0)
+
+
+def test_goal_rooms_within_the_window_are_less_likely(houses: list[House]) -> None:
+    config = GenerationParameters(num_stages=(5,), previous_goal_room_multiplier=0.0, goal_room_window=2)
+    large = [house for house in houses if len(house.rooms) >= 4]
+    tasks = []
+    for house in large:
+        with suppress(TaskRejectedError):
+            tasks.append(generate_task(house, seed=0, config=config))
+    assert len(tasks) >= 3
+    for task in tasks:
+        rooms = [stage.target.room_id for stage in task.oracle_stages]
+        assert all(room not in rooms[max(0, k - 2) : k] for k, room in enumerate(rooms)), rooms
 
 
 def test_a_bad_parameter_is_named(houses: list[House]) -> None:

@@ -71,6 +71,11 @@ class GenerationParameters(Record):
     full_shuffle_probability: Probability = _DEFAULTS["full_shuffle_probability"]
     changed_room_multiplier: NonNegativeFloat = _DEFAULTS["changed_room_multiplier"]
     previous_goal_room_multiplier: NonNegativeFloat = _DEFAULTS["previous_goal_room_multiplier"]
+    goal_room_window: Annotated[int, Field(ge=1, le=64)] = _DEFAULTS["goal_room_window"]
+    """Number of stages back whose goal rooms have that multiplier, once for each.
+
+    The paper's Sec. A.2 says 2, its Sec. 3.2 "the previous stage".
+    """
     moved_object_multiplier: NonNegativeFloat = _DEFAULTS["moved_object_multiplier"]
     moved_children_multiplier: NonNegativeFloat = _DEFAULTS["moved_children_multiplier"]
     """Multiplier for objects that stood on the salient object and moved with it.
@@ -98,10 +103,11 @@ class GenerationParameters(Record):
     extensions: Extensions = Extensions()
 
     @model_serializer(mode="wrap")
-    def _without_outlined(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out the style of files that were written before there were several, so that their bytes stay."""
+    def _as_in_older_files(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out values of files that were written before there were others, so that their bytes stay."""
         fields: dict[str, Any] = serialize(self)
-        return {key: value for key, value in fields.items() if key != "reference_style" or value != OUTLINED}
+        only = {"reference_style": OUTLINED, "goal_room_window": 1}
+        return {key: value for key, value in fields.items() if key not in only or value != only[key]}
 
 
 def _as_recorded(parameters: GenerationParameters, info: ValidationInfo) -> GenerationParameters:

@@ -26,8 +26,11 @@ pub struct Parameters {
     pub full_shuffle_probability: f64,
     /// Factor on the goal weight of the room that just changed.
     pub changed_room_multiplier: f64,
-    /// Factor on the goal weight of the previous stage's goal room.
+    /// Factor on the goal weight of a goal room within `goal_room_window`.
     pub previous_goal_room_multiplier: f64,
+    /// Number of past stages whose goal rooms have `previous_goal_room_multiplier`, once for each.
+    #[serde(default = "goal_room_window_of_older_files")]
+    pub goal_room_window: usize,
     /// Weight of the salient object that just moved; other objects of its room have weight 1.
     pub moved_object_multiplier: f64,
     /// Weight of each object that stood on the salient object and moved with it.
@@ -58,6 +61,10 @@ pub struct Parameters {
     pub extensions: Extensions,
 }
 
+fn goal_room_window_of_older_files() -> usize {
+    1
+}
+
 impl Default for Parameters {
     fn default() -> Self {
         Self {
@@ -71,6 +78,7 @@ impl Default for Parameters {
             full_shuffle_probability: 0.1,
             changed_room_multiplier: 9.0,
             previous_goal_room_multiplier: 0.2,
+            goal_room_window: goal_room_window_of_older_files(),
             moved_object_multiplier: 9.0,
             moved_children_multiplier: 9.0,
             goals_on_walls: false,
@@ -145,6 +153,8 @@ impl Parameters {
         Error::require("reference_max_m", self.reference_max_m, expected, |v| v >= least)?;
         let is_tries = |v: usize| (1..=100_000).contains(&v);
         Error::require("placement_tries", self.placement_tries, "in 1..=100000", is_tries)?;
+        let is_window = |v: usize| (1..=64).contains(&v);
+        Error::require("goal_room_window", self.goal_room_window, "in 1..=64", is_window)?;
         let is_tries = |v: usize| (1..=1000).contains(&v);
         Error::require("modification_tries", self.modification_tries, "in 1..=1000", is_tries)?;
         self.extensions.check()

@@ -127,8 +127,7 @@ fn scores_tell_unique_categories_from_common_ones() {
     let of = |category, room| Candidate { category, room };
     let candidates = [of("Mug", 0), of("Bed", 1), of("Bed", 2), of("Book", 1), of("Book", 1)];
     assert_eq!(target_scores(&candidates), [2.0, 1.5, 1.5, 1.0, 1.0]);
-    let bias =
-        GoalBias { changed_room: Some(1), previous_goal_room: Some(2), ..GoalBias::default() };
+    let bias = GoalBias { changed_room: Some(1), previous_goal_rooms: &[2], ..GoalBias::default() };
     let weights = goal_room_weights(
         &candidates,
         &target_scores(&candidates),
@@ -137,6 +136,15 @@ fn scores_tell_unique_categories_from_common_ones() {
         &Parameters::default(),
     );
     assert_eq!(weights, [2.0, 31.5, 1.5 * 0.2]);
+    let bias = GoalBias { previous_goal_rooms: &[2, 0, 2], ..GoalBias::default() };
+    let weights = goal_room_weights(
+        &candidates,
+        &target_scores(&candidates),
+        3,
+        bias,
+        &Parameters::default(),
+    );
+    assert_eq!(weights, [2.0 * 0.2, 3.5, 1.5 * 0.2 * 0.2]);
 }
 
 #[test]
@@ -149,7 +157,7 @@ fn goals_are_drawn_room_first_and_what_moved_as_often_as_its_weight_says() {
         let parameters = Parameters { moved_children_multiplier, ..Parameters::default() };
         let bias = GoalBias {
             changed_room: Some(1),
-            previous_goal_room: Some(0),
+            previous_goal_rooms: &[0],
             moved_object: Some(2),
             moved_children: &[4],
         };

@@ -34,10 +34,9 @@ pub fn target_scores(candidates: &[Candidate<'_>]) -> Vec<f64> {
 pub struct GoalBias<'a> {
     /// Room that was modified for this stage.
     pub changed_room: Option<usize>,
-    /// Goal room of the previous stage. Only that one counts, though the generation state has two
-    /// (paper, Sec. 3.2 against Sec. A.2): with a penalty on both the published share of relocated
-    /// goals is missed.
-    pub previous_goal_room: Option<usize>,
+    /// Goal rooms of the last [`Parameters::goal_room_window`] stages. By default only the previous
+    /// one counts, though the generation state has two (paper, Sec. 3.2 against Sec. A.2).
+    pub previous_goal_rooms: &'a [usize],
     /// Candidate that `SALIENT_OBJECT` moved for this stage.
     pub moved_object: Option<usize>,
     /// Candidates that stood on the moved object and moved with it.
@@ -63,7 +62,7 @@ pub fn goal_room_weights(
         if bias.changed_room == Some(room) {
             *weight *= parameters.changed_room_multiplier;
         }
-        if bias.previous_goal_room == Some(room) {
+        for _ in bias.previous_goal_rooms.iter().filter(|&&earlier| earlier == room) {
             *weight *= parameters.previous_goal_room_multiplier;
         }
     }

@@ -55,10 +55,11 @@ pub(crate) fn sample_stage_task(
         })
         .unzip();
     let moved_children = moved_with_salient(house, &indices, evolution);
+    let window = generator.parameters.goal_room_window;
     let bias = GoalBias {
         moved_children: &moved_children,
         changed_room: state.changed.last().copied().flatten(),
-        previous_goal_room: state.goals.last().copied(),
+        previous_goal_rooms: &state.goals[state.goals.len().saturating_sub(window)..],
         moved_object: indices
             .iter()
             .position(|&i| Some(&house.objects[i].id) == evolution.salient_id.as_ref()),
