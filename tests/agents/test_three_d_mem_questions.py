@@ -46,7 +46,7 @@ FRONTIERS = (
 
 def snapshot_question(*snapshots, frontiers=FRONTIERS, rounds=40, stage=MUG_GOAL):
     views = [SnapshotCandidate(10 + i, objects, pixels(100 + i)) for i, objects in enumerate(snapshots)]
-    return SnapshotQuestion(stage, (0.0, 0.0), views, frontiers, ALL, rounds, pixels(1))
+    return SnapshotQuestion(stage, (0.0, 0.0), views, frontiers, ALL, rounds, heading_view=pixels(1))
 
 
 SHOWN = snapshot_question([MUG_ON_TABLE], [COUNTER, MUG_ON_COUNTER])
