@@ -70,11 +70,17 @@ def test_a_relation_counts_by_how_rare_it_is_among_namesakes() -> None:
     assert also_on < on
 
 
-def test_surroundings_that_the_map_does_not_know_violate_no_relation() -> None:
-    def second(known_share: float) -> float:
-        return odds("mug on the dining table", [TWO_MUGS[0], mug(2, 5.0, appearance_of("red", (), known_share))])[1]
+def second(text: str, known_share: float) -> float:
+    """Return the probability of a mug that is far from the table, while another is on it."""
+    return odds(text, [TWO_MUGS[0], mug(2, 5.0, appearance_of("red", (), known_share))])[1]
 
-    assert second(0.6) > 2.0 * second(0.8)
+
+def test_surroundings_that_the_map_does_not_know_violate_no_relation() -> None:
+    assert second("mug near the dining table", 0.6) > 2.0 * second("mug near the dining table", 0.8)
+
+
+def test_what_an_object_stands_on_is_seen_with_it_whatever_the_map_knows() -> None:
+    assert second("mug on the dining table", 0.0) == second("mug on the dining table", 1.0) < 0.1
 
 
 def test_only_what_the_views_of_an_object_show_counts() -> None:
@@ -101,6 +107,22 @@ def test_it_explores_until_an_object_is_likely_enough() -> None:
     assert ask(AppearanceMatch(), 100.0).startswith("Frontier 0")
     assert ask(AppearanceMatch(), 1.0).startswith("Object 0\nMug, ")
     assert ask(AppearanceMatch(), 100.0, [mug(1, 0.0, appearance_of("red"))]).startswith("Object 0\nMug, 88% likely")
+
+
+def test_it_does_not_explore_to_tell_apart_what_it_has_seen() -> None:
+    alike = [mug(number, float(number), appearance_of("red")) for number in range(5)]
+    assert max(odds("red mug", alike, unseen_m2=10.0)) < 0.25
+    assert ask(AppearanceMatch(), 10.0, alike).startswith("Object 0")
+
+
+@pytest.mark.parametrize(("second_m", "chosen"), [(5.0, "Frontier 0"), (3.0, "Frontier 1")])
+def test_it_goes_on_to_a_frontier_unless_another_is_a_fifth_nearer(second_m: float, chosen: str) -> None:
+    frontiers = [
+        FrontierCandidate(1, (0.0, 6.0), 6.0, is_current=True),
+        FrontierCandidate(2, (0.0, second_m), second_m),
+    ]
+    question = ChooseQuestion(GOAL, (0.0, 0.0), [], frontiers, [], 40, 0.0)
+    assert AppearanceMatch().answer(question).text.startswith(chosen)
 
 
 def test_eagerness_believes_earlier() -> None:

@@ -67,6 +67,21 @@ def test_assumed_cells_cause_no_conflict() -> None:
     assert memory.cells[10, 10] == 0
 
 
+def test_ways_go_around_walls_over_free_cells() -> None:
+    memory = OccupancyMap(FRAME)
+    rows, cols = np.mgrid[0:9, 0:9].reshape(2, -1).astype(np.int32)
+    is_wall = (cols == 4) & (rows > 0)
+    floor = np.stack([rows, cols], 1)
+    memory.integrate(seen(floor[~is_wall], floor[is_wall]), (0.0, 2.0))
+    left, right, unknown = (-0.65, 2.85), (-0.45, 2.85), (2.0, 5.0)
+    ways_m = memory.distances_m(left, np.array([left, right, unknown]))
+    assert ways_m.tolist() == [0.0, pytest.approx(1.8, abs=1e-5), math.inf]
+    with pytest.raises(InvalidArgumentError, match="start_m"):
+        memory.distances_m((math.nan, 0.0), np.zeros((1, 2)))
+    with pytest.raises(InvalidArgumentError, match="targets_m"):
+        memory.distances_m(left, np.zeros((1, 3)))
+
+
 def test_exploring_by_frontiers_sees_every_room() -> None:
     blocked = np.zeros((40, 60), np.uint8)
     blocked[[0, -1]] = blocked[:, [0, -1]] = 1

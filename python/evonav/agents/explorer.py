@@ -133,6 +133,10 @@ class Explorer:
         ahead = (x_m + math.sin(frontier.direction_rad), z_m + math.cos(frontier.direction_rad))
         return frontier.position_m, ahead
 
+    def is_going_to(self, frontier: Frontier) -> bool:
+        """Return whether the agent last went to this frontier and is not there yet."""
+        return self._last is not None and self._last.id == frontier.id
+
     def stop_exploring(self) -> None:
         """Note that the agent goes elsewhere: its arrival says nothing about a frontier."""
         self._last = None

@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
@@ -161,11 +163,26 @@ class Navigator:
             view=None if latest is None else pixels_of(latest, self.config.image_px),
         )
 
-    def frontier_candidate(self, frontier: Frontier, here: Point2, *, with_images: bool = False) -> FrontierCandidate:
-        """Return a frontier as questions describe it."""
-        x_m, z_m = frontier.position_m
-        image = self.frontier_image(frontier) if with_images else None
-        return FrontierCandidate(frontier.id, (x_m, z_m), math.dist((x_m, z_m), here), image)
+    def frontier_candidates(self, here: Point2, *, with_images: bool = False) -> list[FrontierCandidate]:
+        """Return all frontiers as questions describe them."""
+        frontiers = self.explorer.frontiers
+        distances_m = [math.dist(frontier.position_m, here) for frontier in frontiers]
+        if self._names_colours and frontiers:
+            positions_m = np.array([frontier.position_m for frontier in frontiers])
+            ways_m = self.explorer.map.distances_m(here, positions_m).tolist()
+            distances_m = [
+                way if math.isfinite(way) else straight for way, straight in zip(ways_m, distances_m, strict=True)
+            ]
+        return [
+            FrontierCandidate(
+                frontier.id,
+                frontier.position_m,
+                distance_m,
+                self.frontier_image(frontier) if with_images else None,
+                is_current=self.explorer.is_going_to(frontier),
+            )
+            for frontier, distance_m in zip(frontiers, distances_m, strict=True)
+        ]
 
     def frontier_image(self, frontier: Frontier) -> Pixels | None:
         """Return a frontier as the agent saw it: the stored view whose axis points most nearly at it.

@@ -88,8 +88,7 @@ class NavigatorAgent(ABC):
 
     def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them, with images if the model looks at them."""
-        navigator, with_images = self._navigator, self._shows_images
-        return [navigator.frontier_candidate(f, here, with_images=with_images) for f in navigator.explorer.frontiers]
+        return self._navigator.frontier_candidates(here, with_images=self._shows_images)
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:
         """Commit to a target and continue towards it."""

@@ -55,9 +55,11 @@ class FrontierCandidate:
     frontier_id: int
     position_m: Point2
     travel_m: float
-    """Distance from the agent."""
+    """Distance from the agent: along its map for rules that look, else straight."""
     image: Pixels | None = field(default=None, compare=False, repr=False)
     """The view towards the frontier."""
+    is_current: bool = False
+    """Whether the agent is on its way there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,6 +129,21 @@ class OccupancyMap:
         num_open = int((reached & unknown).sum())
         return num_known / (num_known + num_open) if num_known else 0.0
 
+    def distances_m(self, start_m: tuple[float, float], targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the lengths of the shortest ways over free cells.
+
+        Args:
+            start_m: Start, `(x, z)`.
+            targets_m: Targets, `(N, 2)` float64.
+
+        Returns:
+            Metres, `(N,)` float64; `inf` for targets that no free cells connect with the start.
+
+        Raises:
+            InvalidArgumentError: A coordinate is not finite.
+        """
+        return self._map.distances_m(start_m, targets_m)
+
     def conflicts(self, seen: VisibleOccupancy) -> Conflicts:
         """Return the seen cells that contradict the map, which does not change."""
         return Conflicts(*self._map.conflicts(seen.free, seen.blocked))

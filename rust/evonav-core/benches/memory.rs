@@ -180,6 +180,10 @@ fn bench_occupancy(c: &mut Criterion) {
     c.bench_function("occupancy/frontiers_400x400", |b| {
         b.iter(|| extract(black_box(&map)));
     });
+    let targets_m: Vec<_> = found.iter().map(|frontier| frontier.position_m).collect();
+    c.bench_function("occupancy/distances_to_frontiers_400x400", |b| {
+        b.iter(|| map.distances_m(black_box([14.0, 9.9]), &targets_m).expect("finite places"));
+    });
 }
 
 criterion_group!(benches, bench_objects, bench_occupancy);

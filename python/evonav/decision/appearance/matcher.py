@@ -3,18 +3,19 @@
 `AppearanceMatch` stands where the paper's agents ask GPT-4o, as `TextMatch` does, but it sees: the colours of an object
 in the agent's own views, its size and proportions, and what these views show around it. Each of these is a likelihood
 ratio, the probability of what is seen for the goal over that for another object of its type. Their product and the
-number of objects of the type that the unseen part of the home should hold give a posterior probability; the agent goes
-to an object that is likely enough. What cannot be seen counts 1: materials, details, corners.
+number of objects of the type that the unseen part of the home should hold give a posterior probability. The agent goes
+to the likeliest object if that is likely enough against "not seen yet": exploring does not tell apart two objects that
+were both seen. What cannot be seen counts 1: materials, details, corners.
 """
 
 import hashlib
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from evonav.decision.appearance.statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
-from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
 from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
 from evonav.tasks.language import COLOURS
@@ -28,7 +29,7 @@ class AppearanceConfig:
     """Numbers of the rules."""
 
     threshold: float = 0.5
-    """Probability from which an object is believed to be the goal."""
+    """Probability from which an object is believed to be the goal, if it is either that object or not seen yet."""
     eager_threshold: float = 0.2
     """The same at full eagerness."""
     colour_floor: float = 0.05
@@ -49,8 +50,13 @@ class AppearanceConfig:
     """The same for a painting, a window or a door."""
     room: float = 0.9
     """The same for the room."""
+    keep: float = 0.2
+    """Share by which another frontier must be nearer than the one to which the agent goes."""
     min_known_share: float = 0.7
-    """Known share of the surroundings from which a relation that is not seen counts as violated."""
+    """Known share of the surroundings from which a neighbour or a room that is not seen counts as violated.
+
+    What an object stands on is seen with it.
+    """
 
 
 class AppearanceMatcher(Matcher):
@@ -73,7 +79,9 @@ class AppearanceMatcher(Matcher):
         """Return which of the objects with the goal's name is most likely the goal; of equals, the first."""
         shares = self.posterior(goal, named, around, unseen_m2)
         index = shares.index(max(shares))
-        return self._best(index, named, shares[index], fits=shares[index] >= self._threshold)
+        unseen = max(0.0, 1.0 - math.fsum(shares))
+        fits = shares[index] >= self._threshold * (shares[index] + unseen)
+        return self._best(index, named, shares[index], fits=fits)
 
     def _best(self, index: int, named: Sequence[ObjectCandidate], share: float, *, fits: bool) -> Best:
         return Best(index, fits, f"{named[index].label}, {share:.0%} likely the one described")
@@ -145,6 +153,13 @@ class AppearanceMatcher(Matcher):
             ratios.append(1.0 if holds is None else truth / share if holds else (1.0 - truth) / (1.0 - share))
         return ratios
 
+    def frontier_cost_m(
+        self, goal: ParsedGoal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]
+    ) -> float:
+        """Return the cost of `Matcher`, of a way that is shorter for the frontier to which the agent already goes."""
+        travel_m = frontier.travel_m * (1.0 - self.numbers.keep * frontier.is_current)
+        return super().frontier_cost_m(goal, replace(frontier, travel_m=travel_m), around)
+
     def _probability(self, relation: Relation) -> float:
         """Return the probability that the goal's views show a relation."""
         if relation.kind == "near":
@@ -162,7 +177,7 @@ class AppearanceMatcher(Matcher):
         if self.holds(relation, one, shown):
             return True
         is_ever_detected = any(similarity(relation.noun, other.label) >= 1.0 for other in around)
-        is_known = one.appearance.known_share >= self.numbers.min_known_share
+        is_known = relation.kind == "on" or one.appearance.known_share >= self.numbers.min_known_share
         return False if is_known and (is_ever_detected or relation.noun not in _WALL_THINGS | {"corner"}) else None
 
 

@@ -3,6 +3,7 @@
 pub mod bits;
 pub mod components;
 pub mod dilate;
+pub mod fast_marching;
 mod spec;
 
 pub use spec::{GridSpec, MAX_CELLS};

@@ -3,7 +3,11 @@
 use crate::{
     Error,
     geometry::Vec2,
-    grid::{GridSpec, bits::BitGrid},
+    grid::{
+        GridSpec,
+        bits::BitGrid,
+        fast_marching::{Until, Window, march},
+    },
     sensors::visible_cells::VisibleCells,
 };
 
@@ -205,6 +209,36 @@ impl OccupancyMap {
             }
         }
         Ok(())
+    }
+
+    /// Return the lengths of the shortest ways over free cells from a start to targets.
+    ///
+    /// # Returns
+    /// Metres between the cells' centres; infinite for targets that free cells do not connect with
+    /// the start, and for all if the start is off the map.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a coordinate is not finite.
+    ///
+    /// # Complexity
+    /// O(n log n) for n free cells that are nearer than the farthest target.
+    pub fn distances_m(&self, start_m: Vec2, targets_m: &[Vec2]) -> Result<Vec<f64>, Error> {
+        Error::require_finite("start_m", &start_m)?;
+        Error::require_finite("targets_m", targets_m.as_flattened())?;
+        let cells: Vec<_> = targets_m.iter().map(|&target_m| self.spec.cell_of(target_m)).collect();
+        let mut start = BitGrid::new(self.spec.rows, self.spec.cols);
+        if let Some([row, col]) = self.spec.cell_of(start_m) {
+            start.insert(row, col);
+        }
+        let ends: Vec<_> = cells.iter().flatten().copied().collect();
+        let window = Window { first: [0, 0], shape: [self.spec.rows, self.spec.cols] };
+        let field = march(&self.free, &start, window, Until::All(&ends));
+        let cells_from_start =
+            |cell: Option<[usize; 2]>| cell.map_or(f32::INFINITY, |c| field.at(c));
+        Ok(cells
+            .into_iter()
+            .map(|cell| f64::from(cells_from_start(cell)) * self.spec.cell_m)
+            .collect())
     }
 
     /// Return one value per cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].

@@ -3,10 +3,8 @@
 use crate::{
     Error,
     geometry::{Vec2, Vec3},
-    grid::{GridSpec, bits::BitGrid, dilate::dilate_disk},
-    unigoal::{
-        bev_config::BevConfig, depth_view::DepthView, fast_marching::Window, voxel_columns::Block,
-    },
+    grid::{GridSpec, bits::BitGrid, dilate::dilate_disk, fast_marching::Window},
+    unigoal::{bev_config::BevConfig, depth_view::DepthView, voxel_columns::Block},
 };
 
 /// The bird's-eye map of one task. Cells that were once seen are never cleared.

@@ -1,11 +1,13 @@
 //! Choose where to explore: frontier cells, scored by their distance.
 
 use crate::{
-    grid::{bits::BitGrid, components::take_groups, dilate::dilate_disk},
-    unigoal::{
-        bev_map::BevMap,
+    grid::{
+        bits::BitGrid,
+        components::take_groups,
+        dilate::dilate_disk,
         fast_marching::{Until, march},
     },
+    unigoal::bev_map::BevMap,
 };
 
 /// Parameters of frontiers and their scores; the defaults are UniGoal's constants.

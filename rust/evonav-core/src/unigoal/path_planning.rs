@@ -3,11 +3,12 @@
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
-    grid::{bits::BitGrid, dilate::dilate_disk},
-    unigoal::{
-        bev_map::BevMap,
+    grid::{
+        bits::BitGrid,
+        dilate::dilate_disk,
         fast_marching::{Field, Until, Window, flood, march},
     },
+    unigoal::bev_map::BevMap,
 };
 
 /// The cell that the agent should move to next.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
 mod depth_evidence;
+mod distances;
 mod masks;
 mod objects;
 mod occupancy;

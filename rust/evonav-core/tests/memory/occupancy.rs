@@ -24,7 +24,7 @@ fn extract(
     Frontiers::default().update(map, agent_m, config).map(<[_]>::to_vec)
 }
 
-fn spec(rows: usize, cols: usize) -> GridSpec {
+pub(super) fn spec(rows: usize, cols: usize) -> GridSpec {
     GridSpec { rows, cols, cell_m: 0.1, corner_m: [-1.0, 0.5] }
 }
 
@@ -145,7 +145,7 @@ proptest! {
 }
 
 /// A floor plan and a walk over it, seen through real visibility.
-fn walked(seed: u64, num_steps: usize, side: usize) -> (OccupancyMap, [f64; 2]) {
+pub(super) fn walked(seed: u64, num_steps: usize, side: usize) -> (OccupancyMap, [f64; 2]) {
     let mut stream = evonav_core::rng::Stream::new(seed, &["walk"]);
     let spec = spec(side, side);
     let mut blocked = vec![0_u8; spec.len()];

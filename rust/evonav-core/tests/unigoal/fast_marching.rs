@@ -4,11 +4,15 @@ use std::collections::{BTreeSet, VecDeque};
 
 use evonav_core::{
     geometry::Pose,
-    grid::{GridSpec, bits::BitGrid, dilate::dilate_disk},
+    grid::{
+        GridSpec,
+        bits::BitGrid,
+        dilate::dilate_disk,
+        fast_marching::{Field, Until, Window, flood, march},
+    },
     unigoal::{
         collision_strip::{Strip, strip_cells},
         exploration::keep_large,
-        fast_marching::{Field, Until, Window, flood, march},
         path_planning::short_term_goal,
     },
 };

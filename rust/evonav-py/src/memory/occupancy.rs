@@ -8,7 +8,7 @@ use evonav_core::{
     },
     sensors::visible_cells::VisibleCells,
 };
-use numpy::{PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::{arrays, error};
@@ -113,6 +113,17 @@ impl OccupancyMap {
 
     fn forget(&mut self, cells: PyReadonlyArray2<'_, i32>) -> PyResult<()> {
         self.map.forget(&arrays::cells("cells", &cells)?).map_err(error::to_py)
+    }
+
+    fn distances_m<'py>(
+        &self,
+        py: Python<'py>,
+        start_m: [f64; 2],
+        targets_m: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let targets_m = arrays::rows("targets_m", &targets_m)?;
+        let lengths_m = py.detach(|| self.map.distances_m(start_m, targets_m));
+        Ok(lengths_m.map_err(error::to_py)?.into_pyarray(py))
     }
 
     fn clear(&mut self) {

@@ -77,7 +77,7 @@ const ACCEPTED: u8 = 2;
 ///
 /// # Examples
 /// ```
-/// # use evonav_core::{grid::bits::BitGrid, unigoal::fast_marching::{Until, Window, march}};
+/// # use evonav_core::{grid::{bits::BitGrid, fast_marching::{Until, Window, march}}};
 /// let mut passable = BitGrid::new(3, 9);
 /// (0..3).for_each(|row| passable.insert_run(row, 0, 9));
 /// let mut seeds = BitGrid::new(3, 9);
