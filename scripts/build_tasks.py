@@ -1,26 +1,30 @@
-"""Makes the tasks that come with evonav: `python scripts/build_tasks.py [--check]`.
+"""Makes the tasks that come with evonav: `python scripts/build_tasks.py [--check]`, in about half a minute.
 
 The first houses with test assets of each number of rooms, seed 0, the paper's parameters. The output is a function of
 this list, of `python/evonav/data/houses.jsonl.gz` and of the code; `--check` says whether it is what is there.
+`--style outlined --out FOLDER` makes the tasks with their former reference images and digests.
 """
 
 import argparse
 import hashlib
+import io
 import shutil
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import get_args
+
+from PIL import Image
 
 from evonav.generation import GenerationParameters, TaskRejectedError, generate_task
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_dataset
+from evonav.world.simulator import Style
 
 ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
 HOUSES = ROOT.parent / "houses.jsonl.gz"
 SEED = 0
-PARAMETERS = GenerationParameters(reference_style="outlined")
-"""Another style would give the tasks other digests, so runs and packs of earlier versions would be of other tasks."""
 FIRST_TEST_HOUSE = 84
 """Line of the first house with test assets."""
 NUM_TASKS = {2: 5, 3: 4, 4: 4, 5: 4, 6: 3, 7: 2, 8: 1, 10: 1}
@@ -40,12 +44,13 @@ def chosen_houses() -> list[House]:
     return chosen
 
 
-def build_tasks() -> list[Task]:
-    """The tasks, in order of task id."""
+def build_tasks(style: Style = "default") -> list[Task]:
+    """The tasks with reference images in a style, in order of task id."""
+    parameters = GenerationParameters(reference_style=style)
     tasks = []
     for house in chosen_houses():
         try:
-            tasks.append(generate_task(house, seed=SEED, config=PARAMETERS, dataset="evonav-mini", split="test"))
+            tasks.append(generate_task(house, seed=SEED, config=parameters, dataset="evonav-mini", split="test"))
         except TaskRejectedError as error:
             sys.stderr.write(f"left out: {error}\n")
     return sorted(tasks, key=lambda task: task.task_id)
@@ -71,25 +76,38 @@ def record_of(tasks: list[Task]) -> DatasetRecord:
     )
 
 
+def compress(path: Path) -> None:
+    """Writes an image again, as small as Pillow can without loss."""
+    content = io.BytesIO()
+    with Image.open(path) as image:
+        image.save(content, "PNG", optimize=True)
+    path.write_bytes(content.getvalue())
+
+
 def main() -> int:
     """Writes the tasks, or compares them with those there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="compare only; 1 if they differ")
-    tasks = build_tasks()
-    if parser.parse_args().check:
-        there = {task.task_id: task.header for task in load_tasks(ROOT)}
+    parser.add_argument("--style", choices=get_args(Style), default="default", help="style of the reference images")
+    parser.add_argument("--out", type=Path, default=ROOT, help="folder of the tasks; what is there is removed")
+    arguments = parser.parse_args()
+    root = arguments.out
+    tasks = build_tasks(arguments.style)
+    if arguments.check:
+        there = {task.task_id: task.header for task in load_tasks(root)}
         differing = {task.task_id for task in tasks if there.pop(task.task_id, None) != task.header} | there.keys()
         for task_id in sorted(differing):
             sys.stderr.write(f"differs: {task_id}\n")
         return int(bool(differing))
-    if ROOT.exists():
-        shutil.rmtree(ROOT)
+    if root.exists():
+        shutil.rmtree(root)
     for task in tasks:
-        write_task(task, ROOT)
-    write_dataset(record_of(tasks), ROOT)
-    num_bytes = sum(path.stat().st_size for path in ROOT.rglob("*") if path.is_file())
+        for image in (write_task(task, root) / "public").glob("*.png"):
+            compress(image)
+    write_dataset(record_of(tasks), root)
+    num_bytes = sum(path.stat().st_size for path in root.rglob("*") if path.is_file())
     num_stages = sum(task.num_stages for task in tasks)
-    sys.stdout.write(f"{len(tasks)} tasks, {num_stages} stages, {num_bytes / 1e6:.2f} MB in {ROOT}\n")
+    sys.stdout.write(f"{len(tasks)} tasks, {num_stages} stages, {num_bytes / 1e6:.2f} MB in {root}\n")
     return 0
 
 

@@ -20,7 +20,10 @@ from evonav.generation import (
 )
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks
+from evonav.tasks.bundled import bundled_tasks, former_digest, is_former
+from evonav.tasks.dataset import entry_of
 from evonav.tasks.language import COLOURS, MATERIALS, SHAPES, SIZES, noun_of, plural_of, with_article
+from evonav.tasks.listing import task_files
 
 
 @pytest.fixture(scope="module")
@@ -179,6 +182,16 @@ def test_bundled_tasks_are_what_the_script_makes() -> None:
         assert {task.header.house.num_rooms for task in there.values()} >= {2, 3, 4, 5, 6, 7, 8, 10}
 
 
+def test_former_reference_images_give_the_former_digests() -> None:
+    """Runs and packs hold these digests, and the tasks of that time can still be made."""
+    with bundled_tasks() as directory:
+        there = {task.task_id: task for task in task_files(directory)}
+    for former in build_tasks("outlined"):
+        digest = entry_of(former).sha256
+        assert former_digest(there[former.task_id]) == digest != there[former.task_id].digest
+        assert is_former(former.task_id, digest)
+
+
 def test_bundled_tasks_are_small() -> None:
     with as_file(files("evonav") / "data" / "tasks") as directory:
-        assert sum(path.stat().st_size for path in directory.rglob("*") if path.is_file()) < 6_000_000
+        assert sum(path.stat().st_size for path in directory.rglob("*") if path.is_file()) < 7_500_000

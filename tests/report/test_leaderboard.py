@@ -20,7 +20,7 @@ from evonav.evaluation.run.run import evaluate
 from evonav.submission.leaderboard import Leaderboard, TaskSet, Unranked, packed_files, rank
 from evonav.submission.leaderboard_page import write_leaderboard
 from evonav.submission.pack import About, pack
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.bundled import FORMER_IMAGES, bundled_tasks
 from evonav.tasks.listing import task_files
 
 HERE = Path(__file__).parent
@@ -86,7 +86,9 @@ def test_an_entry_tells_the_day_on_which_its_run_began(board: Leaderboard, folde
 
 
 def test_a_pack_of_an_early_version_is_ranked_with_its_names_and_without_a_day(tasks: TaskSet) -> None:
+    """It has a table of its own, since reference images were others then."""
     ((conditions, entries),) = rank([OLDER_PACK], [tasks], scores_only=True).tables.items()
+    assert (conditions.task_set, conditions.reference_images) == (tasks.sha256, FORMER_IMAGES)
     assert (conditions.perception, conditions.decision, conditions.simulator) == ("gt", "text", "")
     assert [(entry.summary.agent, entry.date) for entry in entries] == [("ftu", None), ("fu", None)]
 

@@ -10,6 +10,7 @@ from evonav.evaluation.metrics.navigation import AgentSummary, summarise
 from evonav.submission.pack import SUFFIX, Submission, SubmissionError, SubmissionFile
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import Verdict, read_records, verify
+from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
 from evonav.tasks.listing import TaskFile
 
 
@@ -44,6 +45,8 @@ class Conditions:
     """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
     simulator: str
     """Simulator, unless it is the usual one."""
+    reference_images: str = ""
+    """Kind of the tasks' reference images, unless they are the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +134,8 @@ def rank(
         except SubmissionError as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
-        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator)
+        images = FORMER_IMAGES if any(is_former(task.task_id, task.digest) for task in header.tasks) else ""
+        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, images)
         for sha256, entry in entries:
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
                 detail = f"{entry.summary.agent} has the same records as in {first}"
@@ -151,13 +155,20 @@ def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
         SubmissionError: No set has any.
     """
     packed = {(task.task_id, task.digest) for task in header.tasks}
-    common = [len(packed & {(task.task_id, task.digest) for task in one.tasks}) for one in task_sets]
+    digests = [{(task.task_id, digest) for task in one.tasks for digest in _digests(task)} for one in task_sets]
+    common = [len(packed & there) for there in digests]
     if not any(common):
         raise SubmissionError("its tasks are not among those to verify with: name their folder with --tasks")
     fewest = min(len(one.tasks) for one, number in zip(task_sets, common, strict=True) if number == max(common))
     return next(
         one for one, number in zip(task_sets, common, strict=True) if number == max(common) and len(one.tasks) == fewest
     )
+
+
+def _digests(task: TaskFile) -> set[str]:
+    """Return the digests under which a task is known."""
+    former = former_digest(task)
+    return {task.digest} if former is None else {task.digest, former}
 
 
 def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -> Unranked | None:

@@ -64,6 +64,7 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> 
             ("perception", short(conditions.perception)),
             ("decision", short(conditions.decision)),
             *([("simulator", short(conditions.simulator))] if conditions.simulator else []),
+            *([("reference images", conditions.reference_images)] if conditions.reference_images else []),
         ],
         "rows": [_row(entry) for entry in entries],
     }

@@ -23,6 +23,7 @@ from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
+from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
@@ -92,7 +93,7 @@ def verify(
     known = {task.task_id: task for task in tasks}
     required = list(known)[:limit]
     checks.append(_check("protocol", _protocol_findings(header), "the benchmark's"))
-    checks.append(_check("tasks", _task_findings(header, known, required), f"{len(header.tasks)}, all known"))
+    checks.append(_check("tasks", _task_findings(header, known, required), _known_tasks(header)))
     checks.append(_check("complete", _gaps(header, records), "every stage once, and scored"))
     if all(check.is_passed for check in checks):
         scored = (finding for mine in records.values() for record in mine for finding in score_findings(record, header))
@@ -202,7 +203,7 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         there = known.get(task.task_id)
         if there is None:
             yield f"{task.task_id} is not among the tasks to verify with"
-        elif (there.digest, there.num_stages) != (task.digest, task.num_stages):
+        elif there.num_stages != task.num_stages or task.digest not in (there.digest, former_digest(there)):
             yield f"{task.task_id} is another task than the one of this name"
     packed = {task.task_id for task in header.tasks}
     missing = set(required) - packed
@@ -211,6 +212,11 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         return
     for name in sorted(missing):
         yield f"{name} is missing"
+
+
+def _known_tasks(header: Submission) -> str:
+    num_former = sum(is_former(task.task_id, task.digest) for task in header.tasks)
+    return f"{len(header.tasks)}, all known" + (f"; {num_former} with {FORMER_IMAGES}" if num_former else "")
 
 
 def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.errors import InvalidArgumentError
+from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -23,6 +23,7 @@ from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import open_pool
 from evonav.parallel.worker import Workforce
+from evonav.tasks.bundled import FORMER, former_digest
 from evonav.tasks.listing import TaskFile
 
 __all__ = [
@@ -261,9 +262,13 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "seed": config.seed,
         "protocol": asdict(config.protocol),
         "backend": config.backend.identity(),
-        "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
+        "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
     }
+
+
+def _digest_of(tasks: Sequence[TaskFile]) -> str:
+    return hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest()
 
 
 def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
@@ -294,6 +299,12 @@ def _claim(store: RunStore, request: RunRequest) -> None:
     wanted = run_identity(request.tasks, request.config)
     stored = store.meta("config")
     if stored is not None:
+        former = [replace(task, digest=former_digest(task) or task.digest) for task in request.tasks]
+        if stored["tasks"] != wanted["tasks"] and stored["tasks"] == _digest_of(former):
+            raise StoreError(
+                f"{request.run_dir} holds a run on {FORMER}; use another folder, or resume it on those tasks "
+                "(docs/tasks.md says how to make them)"
+            )
         check_same_run(stored, wanted, request.run_dir)
     store.set_header(
         {

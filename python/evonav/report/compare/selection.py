@@ -11,6 +11,8 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import FILE_NAME
 from evonav.json_diff import json_differences
 from evonav.report.run import RecordedRun, load_run
+from evonav.report.tables.run_metadata import task_digests
+from evonav.tasks.bundled import FORMER, is_former
 
 
 @dataclass(frozen=True)
@@ -115,5 +117,15 @@ def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[st
     def text(value: Any) -> str:  # noqa: ANN401 - JSON
         return "-" if value is None else str(value)
 
-    found = sorted(json_differences(a.run.config, b.run.config), key=lambda one: one.path)
-    return {one.path: (text(one.left), text(one.right)) for one in found}
+    differing = sorted(json_differences(a.run.config, b.run.config), key=lambda one: one.path)
+    found = {one.path: (text(one.left), text(one.right)) for one in differing}
+    if "tasks" in found:
+        left, right = found["tasks"]
+        found["tasks"] = (left + _about_images(a.run), right + _about_images(b.run))
+    return found
+
+
+def _about_images(run: RecordedRun) -> str:
+    """Say whether a run's tasks are the bundled ones as they were before their reference images were drawn anew."""
+    is_any_former = any(is_former(task_id, digest) for task_id, digest in task_digests(run).items())
+    return f" ({FORMER})" if is_any_former else ""
