@@ -74,7 +74,7 @@ class RunReplay:
             models = store.meta("models_dir")
         try:
             self.seed = int(config["seed"])
-            self.protocol = ProtocolConfig(**config["protocol"])
+            self.protocol = ProtocolConfig.from_header(config["protocol"])
             backend = Backend.from_identity(config["backend"])
         except (KeyError, TypeError, ValueError) as error:
             raise StoreError(f"{run_dir}: header of the run: {type(error).__name__}: {error}") from error

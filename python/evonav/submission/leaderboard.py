@@ -7,6 +7,7 @@ from pathlib import Path
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentSummary, summarise
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.submission.pack import SUFFIX, Submission, SubmissionError, SubmissionFile
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import Verdict, read_records, verify
@@ -47,6 +48,8 @@ class Conditions:
     """Simulator, unless it is the usual one."""
     reference_images: str = ""
     """Kind of the tasks' reference images, unless they are the usual ones."""
+    reference_path: str = ""
+    """Kind of the reference paths, unless they end in the target's room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +138,9 @@ def rank(
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
         images = FORMER_IMAGES if any(is_former(task.task_id, task.digest) for task in header.tasks) else ""
-        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, images)
+        is_in_room = ProtocolConfig.from_header(header.config["protocol"]).reference_in_room
+        end = "" if is_in_room else "to the nearest free point, also behind a wall"
+        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, images, end)
         for sha256, entry in entries:
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
                 detail = f"{entry.summary.agent} has the same records as in {first}"

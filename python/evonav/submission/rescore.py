@@ -140,7 +140,7 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """
     values = json.loads(settings)
     simulators: Component[Simulator] = Component(values["simulator"])
-    protocol = ProtocolConfig(**values["protocol"])
+    protocol = ProtocolConfig.from_header(values["protocol"])
     simulator = simulators.create()
 
     def answer(text: str) -> str:

@@ -187,10 +187,13 @@ def read_records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]
 
 
 def _protocol_findings(header: Submission) -> Iterator[str]:
-    expected, claimed = asdict(ProtocolConfig()), header.config.get("protocol")
+    claimed = header.config.get("protocol")
     if not isinstance(claimed, dict):
         yield "the header has no protocol"
         return
+    # Packs of earlier versions have other reference paths, and no entry for them.
+    is_earlier = "reference_in_room" not in claimed
+    expected = ProtocolConfig(reference_in_room=not is_earlier).header()
     for name in expected.keys() | claimed.keys():
         if claimed.get(name) != expected.get(name):
             yield f"{name} is {claimed.get(name)}, the benchmark's is {expected.get(name)}"

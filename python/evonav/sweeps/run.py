@@ -135,7 +135,7 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
     Args:
         sweep: The file.
         cell: One of its cells.
-        out: Folder of the sweep. If the sweep has begun, a simulator keeps its style.
+        out: Folder of the sweep. If the sweep has begun, simulators keep their styles, and the protocol its paths.
         resources: Files for answers and costs.
 
     Raises:
@@ -147,7 +147,17 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
         perception=sweep.perceptions[cell.perception].component(),
         decision=decision.component(cell.seed, resources, _recorded_backend(out, "decision", cell.decision)),
     )
-    return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
+    protocol = sweep.protocol.config()
+    if sweep.protocol.reference_in_room is None and _is_of_earlier_version(out):
+        protocol = replace(protocol, reference_in_room=False)
+    return sweep.config(cell.seed, backend, decision, protocol)
+
+
+def _is_of_earlier_version(out: Path) -> bool:
+    """Return true if a sweep was begun before reference paths had to end in the target's room."""
+    if not (out / SWEEP_NAME).exists():
+        return False
+    return any("reference_in_room" not in cell["run"]["protocol"] for cell in read_claim(out)["cells"].values())
 
 
 def _recorded_backend(out: Path, axis: str, name: str) -> Mapping[str, Any] | None:

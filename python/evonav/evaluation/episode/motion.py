@@ -1,9 +1,9 @@
 """Carry out an agent's answer with planner waypoints and teleports, as in the paper (Sec. C.3)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,6 +135,23 @@ class Planner:
         if len(corners) == 0:
             corners = self._path_near(target_m)
         return [(float(x), float(z)) for x, _, z in corners]
+
+    def path_into_m(self, target_m: Point2, is_in_room: Callable[[Point2], bool]) -> list[Point2]:
+        """Return corners from the agent to the free point of a target's room that is nearest to the target.
+
+        The nearest free point of the house may lie behind a wall. Where no path leads into the room, this is `path_m`.
+        """
+        path_m = self.path_m(target_m)
+        if not path_m or is_in_room(path_m[-1]):
+            return path_m
+        pose = self._simulator.pose
+        free_m, _ = _by_distance(_free_cells_m(self._simulator.occupancy()), target_m)
+        in_room = ((x_m, z_m) for x_m, z_m in free_m.tolist() if is_in_room((x_m, z_m)))
+        for x_m, z_m in islice(in_room, MAX_TRIES):
+            corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
+            if len(corners) and is_in_room((float(corners[-1][0]), float(corners[-1][2]))):
+                return [(float(x), float(z)) for x, _, z in corners]
+        return path_m
 
     def _path_near(self, target_m: Point2) -> NDArray[np.float64]:
         """Return `(M, 3)` corners to the nearest place that can be reached; `(0, 3)` when there is none."""

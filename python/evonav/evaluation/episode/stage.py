@@ -191,8 +191,12 @@ class Stage:
 
     def _path_to_target_m(self) -> list[motion.Point2]:
         """Return the planner's path from the agent to the target; empty if there is none."""
-        x_m, _, z_m = self._stage.target.position_m
-        return self._planner.path_m((x_m, z_m))
+        target = self._stage.target
+        x_m, _, z_m = target.position_m
+        if not self._protocol.reference_in_room:
+            return self._planner.path_m((x_m, z_m))
+        house = self._spec.parsed_house(self._record.stage)
+        return self._planner.path_into_m((x_m, z_m), lambda point_m: house.room_of(*point_m) == target.room_id)
 
     def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
         """Count steps from here; without a reference path, the stage has no score."""

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +163,7 @@ def evaluate_all(
 
 def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> RunJobs:
     """Claim a run's folder and return the jobs that are left."""
+    request = _as_begun(request)
     config = request.config
     hosting = _hosting(request, num_workers)
     worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
@@ -260,7 +261,7 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
     return {
         "evonav": __version__,
         "seed": config.seed,
-        "protocol": asdict(config.protocol),
+        "protocol": config.protocol.header(),
         "backend": config.backend.identity(),
         "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
@@ -282,6 +283,18 @@ def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
     with RunStore(run_dir) as store:
         config = store.meta("config")
     return config.get("backend") if isinstance(config, dict) else None
+
+
+def _as_begun(request: RunRequest) -> RunRequest:
+    """Return a request whose run, where an earlier version began it, keeps that version's reference paths."""
+    if not (request.run_dir / FILE_NAME).is_file():
+        return request
+    with RunStore(request.run_dir) as store:
+        stored = store.meta("config")
+    if stored is None or "reference_in_room" in stored["protocol"]:
+        return request
+    protocol = replace(request.config.protocol, reference_in_room=False)
+    return replace(request, config=replace(request.config, protocol=protocol))
 
 
 def _claim_models(store: RunStore, request: RunRequest) -> None:

@@ -1,0 +1,98 @@
+"""The reference path ends in the target's room, in runs of earlier versions at the nearest free point of the house."""
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from evonav.evaluation.episode.motion import Planner
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import embedded_simulator, load_case
+from evonav.evaluation.run.run import RunConfig, evaluate, run_identity
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
+from evonav.world.pose import Pose
+from evonav.world.simulator import OccupancyGrid
+
+
+class TwoRooms:
+    """A simulator of a corridor that a wall at x = 3 divides, with a sofa at x = 2 to 3; the agent is at the right.
+
+    The free place nearest to the sofa's middle is behind the wall. Ways lead through a door elsewhere: two legs.
+    """
+
+    SOFA = (2.6, 0.9, 0.5)
+
+    def __init__(self, has_door=True):
+        self.pose = Pose(4.5, 0.9, 0.5, 0.0)
+        self.has_door = has_door
+
+    def shortest_path(self, start, target):
+        x_m = 3.25 if target == self.SOFA else target[0]
+        if x_m > 3.0:
+            return np.array([start, (x_m, 0.9, 0.5)])
+        return np.array([start, (3.0, 0.9, 6.0), (x_m, 0.9, 0.5)]) if self.has_door else np.empty((0, 3))
+
+    def occupancy(self):
+        cells = np.zeros((1, 10), dtype=np.uint8)
+        cells[0, 4:6] = 1
+        return OccupancyGrid(cells=cells, cell_m=0.5, corner_m=(0.0, 0.25))
+
+
+def test_the_path_leads_into_the_room_of_a_target_behind_a_wall():
+    def is_left(point_m):
+        return point_m[0] < 3.0
+
+    target_m = (2.6, 0.5)
+    planner = Planner(TwoRooms())
+    assert planner.path_m(target_m) == [(4.5, 0.5), (3.25, 0.5)]
+    assert planner.path_into_m(target_m, is_left) == [(4.5, 0.5), (3.0, 6.0), (1.75, 0.5)]
+    assert planner.path_into_m(target_m, lambda _: True) == planner.path_m(target_m)
+    assert Planner(TwoRooms(has_door=False)).path_into_m(target_m, is_left) == planner.path_m(target_m)
+
+
+def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
+    simulator = embedded_simulator()
+    elsewhere, longer_m = 0, []
+    with bundled_tasks() as directory:
+        for task in task_files(directory):
+            spec = load_case(task.path)
+            for number, stage in enumerate(spec.stages, 1):
+                house = spec.parsed_house(number)
+                simulator.reset(stage.house_json, spec.start)
+                planner, (x_m, _, z_m) = Planner(simulator), stage.target.position_m
+
+                def is_in_room(point_m, house=house, room_id=stage.target.room_id):
+                    return house.room_of(*point_m) == room_id
+
+                nearest, path = planner.path_m((x_m, z_m)), planner.path_into_m((x_m, z_m), is_in_room)
+                assert is_in_room(path[-1]), (task.task_id, number)
+                if not is_in_room(nearest[-1]):
+                    elsewhere += 1
+                    longer_m.append(math.dist(path[-1], (x_m, z_m)) - math.dist(nearest[-1], (x_m, z_m)))
+    assert elsewhere > 3
+    assert min(longer_m) > -0.18  # the nearest place may be one of a grid of 0.25 m
+
+
+def test_headers_of_earlier_versions_mean_earlier_paths():
+    earlier = {key: value for key, value in asdict(ProtocolConfig()).items() if key != "reference_in_room"}
+    assert ProtocolConfig.from_header(earlier) == ProtocolConfig(reference_in_room=False)
+    for protocol in (ProtocolConfig(), ProtocolConfig(reference_in_room=False, max_rounds=3)):
+        assert ProtocolConfig.from_header(protocol.header()) == protocol
+    assert ProtocolConfig(reference_in_room=False).header() == earlier
+    with pytest.raises(TypeError, match="max_round"):
+        ProtocolConfig.from_header({"max_round": 3})
+
+
+def test_a_run_of_an_earlier_version_keeps_its_paths(tmp_path):
+    earlier = RunConfig(protocol=ProtocolConfig(max_rounds=1, reference_in_room=False))
+    with bundled_tasks() as directory:
+        tasks = task_files(directory)[:1]
+        evaluate(("stay-still",), tasks, tmp_path, config=earlier, num_workers=0)
+        now = RunConfig(protocol=ProtocolConfig(max_rounds=1))
+        evaluate(("stay-still", "random-walk"), tasks, tmp_path, config=now, num_workers=0)
+    with RunStore(tmp_path) as store:
+        assert store.meta("config") == run_identity(tasks, earlier) != run_identity(tasks, now)
+        assert {agent for agent, _, _ in store.states()} == {"stay-still", "random-walk"}
