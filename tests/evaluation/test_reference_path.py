@@ -41,16 +41,26 @@ class TwoRooms:
         return OccupancyGrid(cells=cells, cell_m=0.5, corner_m=(0.0, 0.25))
 
 
-def test_the_path_leads_into_the_room_of_a_target_behind_a_wall():
-    def is_left(point_m):
-        return point_m[0] < 3.0
+class Rooms:
+    """A house whose rooms the wall divides."""
 
+    @staticmethod
+    def room_of(x_m, _z_m):
+        return "left" if x_m < 3.0 else "right"
+
+
+def test_the_path_leads_into_the_room_of_a_target_behind_a_wall():
     target_m = (2.6, 0.5)
     planner = Planner(TwoRooms())
     assert planner.path_m(target_m) == [(4.5, 0.5), (3.25, 0.5)]
-    assert planner.path_into_m(target_m, is_left) == [(4.5, 0.5), (3.0, 6.0), (1.75, 0.5)]
-    assert planner.path_into_m(target_m, lambda _: True) == planner.path_m(target_m)
-    assert Planner(TwoRooms(has_door=False)).path_into_m(target_m, is_left) == planner.path_m(target_m)
+    assert planner.into_room_m(planner.path_m(target_m), target_m, Rooms, "left") == [
+        (4.5, 0.5),
+        (3.0, 6.0),
+        (1.75, 0.5),
+    ]
+    assert planner.into_room_m(planner.path_m(target_m), target_m, Rooms, "right") == planner.path_m(target_m)
+    closed = Planner(TwoRooms(has_door=False))
+    assert closed.into_room_m(closed.path_m(target_m), target_m, Rooms, "left") == planner.path_m(target_m)
 
 
 def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
@@ -63,13 +73,11 @@ def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
                 house = spec.parsed_house(number)
                 simulator.reset(stage.house_json, spec.start)
                 planner, (x_m, _, z_m) = Planner(simulator), stage.target.position_m
-
-                def is_in_room(point_m, house=house, room_id=stage.target.room_id):
-                    return house.room_of(*point_m) == room_id
-
-                nearest, path = planner.path_m((x_m, z_m)), planner.path_into_m((x_m, z_m), is_in_room)
-                assert is_in_room(path[-1]), (task.task_id, number)
-                if not is_in_room(nearest[-1]):
+                room_id = stage.target.room_id
+                nearest = planner.path_m((x_m, z_m))
+                path = planner.into_room_m(nearest, (x_m, z_m), house, room_id)
+                assert house.room_of(*path[-1]) == room_id, (task.task_id, number)
+                if house.room_of(*nearest[-1]) != room_id:
                     elsewhere += 1
                     longer_m.append(math.dist(path[-1], (x_m, z_m)) - math.dist(nearest[-1], (x_m, z_m)))
     assert elsewhere > 3

@@ -268,7 +268,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         simulator = at.world.entered(look)
         start = simulator.enter(pose)
         self._batch.place(index, simulator.core, start, at.world.labels)
-        if path_m := self._batch.plan_one(index, at.target_m):
+        if path_m := at.reference_path_m(simulator, self._batch.plan_one(index, at.target_m)):
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
         if self.render_mode is not None and self.config.render_view == "map":
             self._maps[index] = MapView(self.config, at, start)

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError
+from evonav.evaluation.episode.motion import Planner
 from evonav.gym.config import NavConfig
 from evonav.gym.spaces import MAX_STAGES, body_labels
+from evonav.house import House
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task
 from evonav.tasks.listing import task_roots
@@ -90,6 +92,7 @@ class World:
 
     simulator: EmbeddedSimulator
     """A simulator whose agent must not move; `entered` returns one for an agent."""
+    house: House
     labels: NDArray[np.uint8]
     num_bytes: int
 
@@ -114,6 +117,13 @@ class StageWorld:
         """The target's `(x, z)`: oracle data."""
         x_m, _, z_m = self.task.oracle(self.stage).target.position_m
         return (x_m, z_m)
+
+    def reference_path_m(
+        self, simulator: EmbeddedSimulator, path_m: list[tuple[float, float]]
+    ) -> list[tuple[float, float]]:
+        """Return the evaluator's path to the target, from one to the nearest free point of the house: oracle data."""
+        room_id = self.task.oracle(self.stage).target.room_id
+        return Planner(simulator).into_room_m(path_m, self.target_m, self.world.house, room_id)
 
 
 class WorldLoader:
@@ -177,4 +187,9 @@ class WorldLoader:
         # Finds all edges of the house's visibility graph, which later paths and distances use.
         _core.GeodesicField(simulator.core, (start.x_m, start.z_m))
         self.num_built += 1
-        return World(simulator, body_labels(simulator.core.bodies()), BYTES_PER_HOUSE_BYTE * len(house_json))
+        return World(
+            simulator,
+            House(house_json, name=name),
+            body_labels(simulator.core.bodies()),
+            BYTES_PER_HOUSE_BYTE * len(house_json),
+        )

@@ -1,7 +1,7 @@
 """Carry out an agent's answer with planner waypoints and teleports, as in the paper (Sec. C.3)."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
+from evonav.house import House
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, OccupancyGrid, Simulator
 
@@ -136,20 +137,24 @@ class Planner:
             corners = self._path_near(target_m)
         return [(float(x), float(z)) for x, _, z in corners]
 
-    def path_into_m(self, target_m: Point2, is_in_room: Callable[[Point2], bool]) -> list[Point2]:
-        """Return corners from the agent to the free point of a target's room that is nearest to the target.
+    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: House, room_id: str) -> list[Point2]:
+        """Return corners to the free point of a target's room that is nearest to the target.
 
-        The nearest free point of the house may lie behind a wall. Where no path leads into the room, this is `path_m`.
+        Args:
+            path_m: Path to the nearest free point of the house, which may lie behind a wall. It is returned if it ends
+                in the room, or if no path leads there.
+            target_m: Position of the target.
+            house: House of the stage.
+            room_id: Room of the target.
         """
-        path_m = self.path_m(target_m)
-        if not path_m or is_in_room(path_m[-1]):
+        if not path_m or house.room_of(*path_m[-1]) == room_id:
             return path_m
         pose = self._simulator.pose
         free_m, _ = _by_distance(_free_cells_m(self._simulator.occupancy()), target_m)
-        in_room = ((x_m, z_m) for x_m, z_m in free_m.tolist() if is_in_room((x_m, z_m)))
+        in_room = ((x_m, z_m) for x_m, z_m in free_m.tolist() if house.room_of(x_m, z_m) == room_id)
         for x_m, z_m in islice(in_room, MAX_TRIES):
             corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
-            if len(corners) and is_in_room((float(corners[-1][0]), float(corners[-1][2]))):
+            if len(corners) and house.room_of(float(corners[-1][0]), float(corners[-1][2])) == room_id:
                 return [(float(x), float(z)) for x, _, z in corners]
         return path_m
 

@@ -193,10 +193,11 @@ class Stage:
         """Return the planner's path from the agent to the target; empty if there is none."""
         target = self._stage.target
         x_m, _, z_m = target.position_m
+        path_m = self._planner.path_m((x_m, z_m))
         if not self._protocol.reference_in_room:
-            return self._planner.path_m((x_m, z_m))
+            return path_m
         house = self._spec.parsed_house(self._record.stage)
-        return self._planner.path_into_m((x_m, z_m), lambda point_m: house.room_of(*point_m) == target.room_id)
+        return self._planner.into_room_m(path_m, (x_m, z_m), house, target.room_id)
 
     def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
         """Count steps from here; without a reference path, the stage has no score."""
