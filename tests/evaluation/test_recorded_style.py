@@ -1,6 +1,10 @@
-"""A run that is resumed keeps the style in which it was begun."""
+"""A run that is resumed keeps the style and the camera with which it was begun."""
+
+import math
+from typing import Literal
 
 import pytest
+from pydantic import ValidationError
 
 from evonav.evaluation.run.settings import SimulatorSettings
 from evonav.world.simulator import SimulatorConfig
@@ -17,3 +21,22 @@ def test_a_resumed_run_keeps_the_style_that_its_header_means(options: dict[str, 
     assert SimulatorSettings().component(lit).identity("simulator") == lit
     assert SimulatorSettings(style="default").component(recorded).options == {"style": "default"}
     assert SimulatorSettings().component().create().config.style == SimulatorConfig().style
+
+
+def test_a_resumed_run_keeps_its_camera() -> None:
+    wide = SimulatorSettings(hfov_deg=120.0, width_px=400).component()
+    assert wide.options == {"style": "default", "hfov_deg": 120.0, "width_px": 400}
+    recorded = wide.identity("simulator")
+    assert SimulatorSettings().component(recorded) == wide
+    assert SimulatorSettings(style="plain").component(recorded).options == {**wide.options, "style": "plain"}
+    assert SimulatorSettings(hfov_deg=90.0, width_px=300).component(recorded).options == {"style": "default"}
+    assert SimulatorSettings(hfov_deg=90.0, height_px=300).component() == SimulatorSettings().component()
+
+
+@pytest.mark.parametrize("kind", ["embedded", "ai2thor"])
+def test_the_camera_of_a_run_is_what_was_asked_for(kind: Literal["embedded", "ai2thor"]) -> None:
+    config = SimulatorSettings(kind=kind, hfov_deg=120.0, width_px=400, height_px=200).component().create().config
+    assert (config.width_px, config.height_px) == (400, 200)
+    assert config.intrinsics.focal_px == pytest.approx(200.0 / math.tan(math.radians(60.0)))
+    with pytest.raises(ValidationError, match="hfov_deg"):
+        SimulatorSettings(kind=kind, hfov_deg=170.0)

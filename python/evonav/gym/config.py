@@ -1,6 +1,5 @@
 """Define the settings of an environment: camera, actions, observations, reward."""
 
-import math
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -10,7 +9,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.appearance import Change, Colors, Lighting, Materials
-from evonav.world.simulator import Action, SimulatorConfig, Style
+from evonav.world.simulator import Action, SimulatorConfig, Style, vertical_fov_deg
 
 ActionMode = Literal["actions", "waypoints"]
 WaypointFrame = Literal["relative", "polar", "start"]
@@ -114,14 +113,10 @@ class NavConfig(BaseModel):
     @property
     def simulator(self) -> SimulatorConfig:
         """Camera, body and steps."""
-        vertical_fov_deg = self.hfov_deg
-        if self.width_px != self.height_px:
-            slope = math.tan(math.radians(self.hfov_deg) / 2.0) * self.height_px / self.width_px
-            vertical_fov_deg = math.degrees(2.0 * math.atan(slope))
         return SimulatorConfig(
             width_px=self.width_px,
             height_px=self.height_px,
-            vertical_fov_deg=vertical_fov_deg,
+            vertical_fov_deg=vertical_fov_deg(self.hfov_deg, self.width_px, self.height_px),
             move_m=self.move_m,
             turn_deg=self.turn_deg,
             style=self.style,

@@ -1,10 +1,11 @@
 """Read under which perception, decision model and simulator a packed run was made."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from evonav.evaluation.records.former_paths import with_current_paths
-from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.components import USUAL_CAMERA, Backend
 from evonav.perception.shorthand import word_of
 from evonav.submission.pack import Submission
 
@@ -22,7 +23,13 @@ class PackedSetup:
     model: str
     """The decision model's name, if it has one."""
     simulator: str
-    """Simulator, unless it is the usual one."""
+    """Simulator and camera, unless they are the usual ones."""
+
+
+def camera_of(backend: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of a packed run's camera that are not the usual ones."""
+    options = _mapping(backend.get("simulator_options"))
+    return {key: options[key] for key in USUAL_CAMERA if key in options}
 
 
 def packed_setup(header: Submission) -> PackedSetup:
@@ -34,11 +41,12 @@ def packed_setup(header: Submission) -> PackedSetup:
     rates = [f"{name}={value}" for name, value in _mapping(decision.get("noise")).items()]
     rates += [f"{name}={decision[name]}" for name in ("eagerness", "mistakes") if decision.get(name)]
     simulator = str(parts.get("simulator", ""))
+    camera = [f"{key}={value}" for key, value in camera_of(parts).items()]
     return PackedSetup(
         perception=word_of(str(parts.get("perception", "")), perception),
         decision=",".join([kind, *rates]),
         model=str(decision.get("model", decision.get("path", ""))),
-        simulator="" if simulator == _SIMULATOR else simulator,
+        simulator=",".join([simulator, *camera] if camera or simulator != _SIMULATOR else []),
     )
 
 

@@ -136,10 +136,10 @@ def _checkable(record: StageRecord) -> str:
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the work of a worker: a job holds a task's folder and records, its answer the differences.
 
-    `settings` has `protocol` and `simulator`, as JSON.
+    `settings` has `protocol`, `simulator` and `camera` (its options), as JSON.
     """
     values = json.loads(settings)
-    simulators: Component[Simulator] = Component(values["simulator"])
+    simulators: Component[Simulator] = Component(values["simulator"], values["camera"])
     protocol = ProtocolConfig.from_header(values["protocol"])
     simulator = simulators.create()
 

@@ -23,6 +23,7 @@ from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
+from evonav.submission.packed_setup import camera_of
 from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
 from evonav.tasks.listing import TaskFile
 
@@ -281,7 +282,7 @@ def _rescore(
     if module != Backend.__module__ or name not in _OUR_SIMULATORS:
         yield f"simulator {simulator!r}: actions can be replayed only in evonav's own simulator (see --scores-only)"
         return
-    settings = {"protocol": header.config["protocol"], "simulator": simulator}
+    settings = {"protocol": header.config["protocol"], "simulator": simulator, "camera": camera_of(backend)}
     episodes: dict[tuple[str, str], list[StageRecord]] = {}
     for agent, mine in records.items():
         for record in mine:

@@ -41,6 +41,13 @@ class Intrinsics:
         return self.height_px / 2.0 / float(np.tan(self.vertical_fov_rad / 2.0))
 
 
+def vertical_fov_deg(horizontal_deg: float, width_px: int, height_px: int) -> float:
+    """Return the vertical field of view, in degrees, of an image with a horizontal one."""
+    if width_px == height_px:
+        return horizontal_deg
+    return math.degrees(2.0 * math.atan(math.tan(math.radians(horizontal_deg) / 2.0) * height_px / width_px))
+
+
 Style = Literal["outlined", "plain", "default"]
 """A way to draw colours.
 

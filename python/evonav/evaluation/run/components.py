@@ -1,7 +1,7 @@
 """Name the parts of a run by import path, so that workers build them for themselves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -16,7 +16,7 @@ from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import check_importable
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
-from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style
+from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style, vertical_fov_deg
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
 
@@ -26,6 +26,8 @@ def drawn_in(style: Style) -> dict[str, Style]:
     return {} if style == OUTLINED else {"style": style}
 
 
+USUAL_CAMERA = {"width_px": 300, "height_px": 300, "hfov_deg": 90.0}
+"""The camera of runs whose headers do not say another one: options of simulators, with AI2-THOR's defaults."""
 EMBEDDED: Component[Simulator] = Component(
     "evonav.evaluation.run.components:embedded_simulator", drawn_in(SimulatorConfig().style)
 )
@@ -187,22 +189,28 @@ def check_decision(decision: Component[DecisionModel], seed: int) -> None:
         check()
 
 
-def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `SimulatorConfig`
+def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA`
     """Make evonav's own simulator, with AI2-THOR's defaults; headers of runs without a style mean `outlined`."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(SimulatorConfig(style=style, **camera))
+    return EmbeddedSimulator(_config(style=style, **camera))
 
 
-def lenient_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `SimulatorConfig`
+def lenient_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA`
     """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(SimulatorConfig(style=style, **camera), allow_unknown_assets=True)
+    return EmbeddedSimulator(_config(style=style, **camera), allow_unknown_assets=True)
 
 
-def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - fields of `Ai2ThorOptions`
+def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA` and `Ai2ThorOptions`
     """Make AI2-THOR's simulator, which is run through its client."""
     from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 
-    return Ai2ThorSimulator(options=Ai2ThorOptions(**options))
+    camera = {key: options.pop(key) for key in USUAL_CAMERA if key in options}
+    return Ai2ThorSimulator(_config(**camera), Ai2ThorOptions(**options))
+
+
+def _config(hfov_deg: float = USUAL_CAMERA["hfov_deg"], **values: Any) -> SimulatorConfig:  # noqa: ANN401 - its fields
+    config = SimulatorConfig(**values)
+    return replace(config, vertical_fov_deg=vertical_fov_deg(hfov_deg, config.width_px, config.height_px))

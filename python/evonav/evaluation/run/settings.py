@@ -17,7 +17,7 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.run.components import drawn_in
+from evonav.evaluation.run.components import USUAL_CAMERA, drawn_in
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
@@ -47,6 +47,12 @@ class SimulatorSettings(Settings):
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     style: Style | None = None
     """Embedded: style of colours: outlined, plain or default. Default: default; a resumed run keeps its own."""
+    width_px: int | None = Field(default=None, ge=32, le=4096)
+    """Width of camera images in pixels. Default: 300; a resumed run keeps its own."""
+    height_px: int | None = Field(default=None, ge=32, le=4096)
+    """Height of camera images in pixels. Default: 300; a resumed run keeps its own."""
+    hfov_deg: float | None = Field(default=None, ge=30.0, le=150.0)
+    """Horizontal field of view of the camera in degrees. Default: 90; a resumed run keeps its own."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None
@@ -67,32 +73,40 @@ class SimulatorSettings(Settings):
         """Return the component of this simulator; options that are not given keep its own defaults.
 
         Args:
-            recorded: Header of the parts of a run that is resumed (`recorded_backend`). It keeps its style, unless
-                another is asked for.
+            recorded: Header of the parts of a run that is resumed (`recorded_backend`). It keeps its style and camera,
+                unless others are asked for.
 
         Raises:
             SettingError: An option does not apply to the simulator.
         """
-        given = self.model_dump(exclude={"kind", "allow_unknown_assets"}, exclude_none=True)
+        name = "ai2thor" if self.kind == "ai2thor" else "lenient" if self.allow_unknown_assets else "embedded"
+        path = f"{_COMPONENTS}:{name}_simulator"
+        stored = None
+        if recorded is not None and recorded.get("simulator") == path:
+            stored = recorded.get("simulator_options", {})
+        shared = {"kind", "allow_unknown_assets", "style", *USUAL_CAMERA}
+        given = self.model_dump(exclude=shared, exclude_none=True)
         if self.kind == "ai2thor":
             # AI2-THOR has a catalogue of its own, so that allow_unknown_assets changes nothing.
             if self.style is not None:
                 raise SettingError(type(self), "style", "is for simulator embedded")
             host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
-            return Component(f"{_COMPONENTS}:ai2thor_simulator", given, host_options)
-        given.pop("style", None)
+            return Component(path, {**given, **self._camera(stored or {})}, host_options)
         if given:
             raise SettingError(type(self), next(iter(given)), "is for simulator ai2thor")
-        path = f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator"
-        return Component(path, self._drawing(path, recorded or {}))
+        return Component(path, {**self._drawing(stored), **self._camera(stored or {})})
 
-    def _drawing(self, path: str, recorded: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _drawing(self, stored: Mapping[str, Any] | None) -> Mapping[str, Any]:
         """Return the options of the drawing: without a style, a header says `outlined`."""
-        if recorded.get("simulator") == path:
-            options: Mapping[str, Any] = recorded.get("simulator_options", {})
-            if self.style in (None, options.get("style", OUTLINED)):
-                return options
+        if stored is not None and self.style in (None, stored.get("style", OUTLINED)):
+            return {key: value for key, value in stored.items() if key == "style"}
         return drawn_in(self.style or SimulatorConfig().style)
+
+    def _camera(self, stored: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the options of the camera, where they are not the usual ones."""
+        given = self.model_dump(include=set(USUAL_CAMERA), exclude_none=True)
+        camera = {key: given.get(key, stored.get(key, usual)) for key, usual in USUAL_CAMERA.items()}
+        return {key: value for key, value in camera.items() if value != USUAL_CAMERA[key]}
 
 
 class PerceptionSettings(Settings):
