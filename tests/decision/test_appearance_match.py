@@ -36,7 +36,7 @@ TWO_MUGS = [mug(1, 0.0, appearance_of("red", (10,))), mug(2, 5.0, appearance_of(
 def odds(text: str, mugs: list[ObjectCandidate] | None = None, unseen_m2: float = 0.0) -> list[float]:
     """Return the probability of each mug."""
     mugs = mugs or TWO_MUGS
-    return AppearanceMatcher().posterior(parse_goal(f"Find the {text}."), mugs, [*mugs, TABLE], unseen_m2)
+    return AppearanceMatcher().scores(parse_goal(f"Find the {text}."), mugs, [*mugs, TABLE], unseen_m2)
 
 
 def test_a_colour_that_is_seen_tells_namesakes_apart() -> None:
@@ -140,7 +140,7 @@ def test_mistakes_are_drawn_from_the_posterior_and_are_the_same_for_a_seed() -> 
     assert first == answers(1.0, 0) != answers(1.0, 1)
     wrong = first.count("Object 1") / 200
     assert wrong == pytest.approx(
-        AppearanceMatcher().posterior(parse_goal("Find the red mug."), TWO_MUGS, [], 0.0)[1], abs=0.05
+        AppearanceMatcher().scores(parse_goal("Find the red mug."), TWO_MUGS, [], 0.0)[1], abs=0.05
     )
     assert answers(3.0, 0).count("Object 1") > first.count("Object 1")
     assert set(answers(0.01, 0)) == {"Object 0"}

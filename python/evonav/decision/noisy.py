@@ -12,10 +12,11 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
+from evonav.decision.text.matcher import Matcher
 from evonav.errors import InvalidArgumentError
 
 A = TypeVar("A")
@@ -42,6 +43,8 @@ class NoiseRates:
     """Share of refusals."""
     lost: float = 0.0
     """Share of lost answers."""
+    confused: float = 0.0
+    """Share of answers that take another object of the goal's class for the goal, by the score of the model's rules."""
     delay: float = 0.0
     """Seconds added to every try; they change no answer."""
 
@@ -75,7 +78,13 @@ class NoiseRates:
 
 
 class Noisy:
-    """A decision model with mistakes. It counts questions, so each episode needs its own."""
+    """A decision model with mistakes. It counts questions, so each episode needs its own.
+
+    A confused answer goes to another remembered object of the goal's class, each as likely as the model's rules score
+    it, and all alike if they score none. Without another object, an answer that goes to one explores instead, as if
+    the goal was not seen yet. Else, and where the question offers no objects, the answer stays. The records count
+    these as `confused_objects`, `confused_unseen` and `confused_kept`.
+    """
 
     def __init__(
         self, model: DecisionModel, rates: NoiseRates, seed: int, *, sleep: Callable[[float], None] = time.sleep
@@ -87,7 +96,16 @@ class Noisy:
             rates: Shares of the mistakes.
             seed: Seed of the episode's agent.
             sleep: Waits for a number of seconds.
+
+        Raises:
+            InvalidArgumentError: Answers are to be confused, but the model has no rules whose scores tell how likely.
         """
+        matcher: Matcher | None = getattr(model, "matcher", None)
+        if rates.confused and not isinstance(matcher, Matcher):
+            raise InvalidArgumentError(
+                f"noise confused = {rates.confused:g}: needs a model that scores objects by rules, text or looks"
+            )
+        self._matcher = matcher
         self.model = model
         self.rates = rates
         self.counts: Counter[str] = Counter()
@@ -135,11 +153,13 @@ class Noisy:
             garbage = draws.choice(GARBAGE)
             return Reply(question.parse(garbage), garbage)
         reply = self.model.answer(question, attempt)
+        if mistake == "confused":
+            return self._confused(question, reply, draws)
         return reply if mistake is None else self._wrong(question, reply, draws)
 
     def _mistake(self, share: float) -> str | None:
         """Return the mistake of a try, if there is one."""
-        for name in ("lost", "refusal", "unparsable", "wrong"):
+        for name in ("lost", "refusal", "unparsable", "wrong", "confused"):
             rate: float = getattr(self.rates, name)
             if share < rate:
                 return name
@@ -154,9 +174,25 @@ class Noisy:
         other = others[draws.randrange(len(others))]
         return Reply(other, f"{question.answer_text(other)}\nA wrong answer on purpose (noise).")
 
+    def _confused(self, question: Question[A], reply: Reply[A], draws: random.Random) -> Reply[A]:
+        assert self._matcher is not None, "checked when it was made"
+        rated = question.look_alikes(reply.answer, self._matcher)
+        if rated:
+            answers, scores = zip(*rated, strict=True)
+            (other,) = draws.choices(answers, scores if any(scores) else None)
+            return _mistaken(question, other, "confused_objects")
+        unseen = question.exploring(reply.answer, self._matcher)
+        if unseen is not None:
+            return _mistaken(question, unseen, "confused_unseen")
+        return replace(reply, counter="confused_kept")
+
     def _draws(self, kind: str, attempt: int) -> random.Random:
         name = f"noise\0{self._seed}\0{kind}\0{self._num_asked[kind]}\0{attempt}"
         return random.Random(hashlib.sha256(name.encode()).digest())  # noqa: S311 - not for secrets
+
+
+def _mistaken(question: Question[A], answer: A, counter: str) -> Reply[A]:
+    return Reply(answer, f"{question.answer_text(answer)}\nA confusion on purpose (noise).", counter)
 
 
 def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:

@@ -26,7 +26,7 @@ class QuerySession:
 
     Counters, cumulative over a task: `decisions` (tries), `invalid_answers`, `refusals`, `lost_answers` (timeouts, lost
     connections, a server's errors), `failed_decisions` (questions without a valid answer in any try: the agent then
-    follows its fallback).
+    follows its fallback), and answers by their `Reply.counter`.
     """
 
     def __init__(self, model: DecisionModel, *, num_tries: int = 3) -> None:
@@ -64,6 +64,8 @@ class QuerySession:
                 self.counters[_COUNTERS[error.fault]] += 1
                 self.log.append(QueryLogEntry(question, error.text or str(error), error.fault))
                 continue
+            if reply.counter is not None:
+                self.counters[reply.counter] += 1
             self.log.append(QueryLogEntry(question, reply.text, "answered"))
             return reply.answer
         self.counters["failed_decisions"] += 1

@@ -47,6 +47,8 @@ class Reply(Generic[A]):
     answer: A
     text: str
     """The whole text: the line that was parsed, then reasons."""
+    counter: str | None = None
+    """Name under which the records count this answer, such as that of a mistake on purpose."""
 
 
 class Question(ABC, Generic[A]):
@@ -79,6 +81,23 @@ class Question(ABC, Generic[A]):
     def alternatives(self, answer: A) -> Sequence[A]:
         """Return the other valid answers, in a fixed order: those that a mistaken model could give."""
         return ()
+
+    def look_alikes(self, answer: A, matcher: "Matcher") -> Sequence[tuple[A, float]]:
+        """Return the answers that go to other remembered objects of the goal's class, each with the matcher's score.
+
+        Args:
+            answer: The answer that is left out, and with it all answers that go to the same object.
+            matcher: Compares goals with what the agent remembers.
+        """
+        return ()
+
+    def exploring(self, answer: A, matcher: "Matcher") -> A | None:
+        """Return the answer that explores in place of one that goes to an object, as if the goal was not seen yet.
+
+        Returns:
+            `None` if the answer explores already, or there is nothing to explore.
+        """
+        return None
 
     def by_rule(self, matcher: "Matcher") -> tuple[A, str]:
         """Return the text matcher's answer and the reason for it.

@@ -10,7 +10,7 @@ from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
-from evonav.decision.text.ranking import choose_candidate
+from evonav.decision.text.ranking import best_frontier, choose_candidate
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.tasks.public import Goal
 
@@ -74,6 +74,20 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             *(Choice("object", index) for index in range(len(self.objects))),
             *(Choice("frontier", index) for index in range(len(self.frontiers))),
         ]
+
+    def look_alikes(self, answer: Choice, matcher: Matcher) -> Sequence[tuple[Choice, float]]:
+        """Return the other objects with the goal's name."""
+        goal = matcher.parsed(self.goal)
+        indices = [index for index, one in enumerate(self.objects) if matcher.names_goal(goal, one)]
+        named = [self.objects[index] for index in indices]
+        scores = matcher.scores(goal, named, self.surroundings, self.unseen_m2)
+        rated = [(Choice("object", index), score) for index, score in zip(indices, scores, strict=True)]
+        return [(choice, score) for choice, score in rated if choice != answer]
+
+    def exploring(self, answer: Choice, matcher: Matcher) -> Choice | None:
+        """Return the frontier that the rule would choose."""
+        index = best_frontier(matcher, self.goal, self.frontiers, self.surroundings)
+        return None if index is None or answer.kind == "frontier" else Choice("frontier", index)
 
     def by_rule(self, matcher: Matcher) -> tuple[Choice, str]:
         """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near."""

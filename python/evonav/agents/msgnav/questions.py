@@ -191,6 +191,23 @@ class GraphQuestion(Question[GraphChoice]):
         what = "an image that is not shown now" if number is None else f"image {number}"
         return f"Round {choice.round + 1}: chose {what}, {choice.category} - not correct."
 
+    def look_alikes(self, answer: GraphChoice, matcher: Matcher) -> Sequence[tuple[GraphChoice, float]]:
+        """Return the other objects with the goal's name that were not rejected."""
+        goal = matcher.parsed(self.goal)
+        named = [candidate for candidate in self._not_rejected() if matcher.names_goal(goal, candidate)]
+        scores = matcher.scores(goal, named, [node.candidate for node in self.objects], self.unseen_m2)
+        rated = [(GraphChoice("object", one.entry_id), score) for one, score in zip(named, scores, strict=True)]
+        return [(choice, score) for choice, score in rated if choice != answer]
+
+    def exploring(self, answer: GraphChoice, matcher: Matcher) -> GraphChoice | None:
+        """Return `Continue Exploration`, if there is a frontier."""
+        return GraphChoice("explore") if self.num_frontiers and answer.kind != "explore" else None
+
+    def _not_rejected(self) -> list[ObjectCandidate]:
+        """Return the objects that were not chosen and found to be wrong in this stage."""
+        rejected_ids = {past.id for past in self.history if past.kind == "object"}
+        return [node.candidate for node in self.objects if node.entry_id not in rejected_ids]
+
     def by_rule(self, matcher: Matcher) -> tuple[GraphChoice, str]:
         """Choose a fitting object that was not rejected; else one that only an image shows; else explore.
 
@@ -199,8 +216,7 @@ class GraphQuestion(Question[GraphChoice]):
         """
         goal, config = matcher.parsed(self.goal), matcher.config
         around = [node.candidate for node in self.objects]
-        rejected_ids = {past.id for past in self.history if past.kind == "object"}
-        left = [candidate for candidate in around if candidate.entry_id not in rejected_ids]
+        left = self._not_rejected()
         named = [candidate for candidate in left if matcher.names_goal(goal, candidate)]
         is_last_chance = self.num_frontiers == 0 or self.max_rounds - self.round <= config.hurry_rounds
         best = matcher.best(goal, named, around, self.unseen_m2) if named else None

@@ -9,7 +9,7 @@ from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixel
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
-from evonav.decision.text.ranking import choose_candidate, rank_entries
+from evonav.decision.text.ranking import best_frontier, choose_candidate, rank_entries
 from evonav.tasks.public import Goal
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
@@ -160,6 +160,26 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             ),
             *(SnapshotChoice(None, index) for index in range(len(self.frontiers))),
         ]
+
+    def look_alikes(self, answer: SnapshotChoice, matcher: Matcher) -> Sequence[tuple[SnapshotChoice, float]]:
+        """Return the other objects with the goal's name, each in the first snapshot that has it."""
+        goal = matcher.parsed(self.goal)
+        chosen = None if answer.snapshot is None else self.snapshots[answer.snapshot].objects[answer.index]
+        found: dict[int, tuple[SnapshotChoice, ObjectCandidate]] = {}
+        for number, snapshot in enumerate(self.snapshots):
+            for index, one in enumerate(snapshot.objects):
+                if matcher.names_goal(goal, one):
+                    found.setdefault(one.entry_id, (SnapshotChoice(number, index), one))
+        named = [one for _, one in found.values()]
+        scores = matcher.scores(goal, named, self.surroundings, self.unseen_m2)
+        rated = zip(found.items(), scores, strict=True)
+        chosen_id = None if chosen is None else chosen.entry_id
+        return [(choice, score) for (entry_id, (choice, _)), score in rated if entry_id != chosen_id]
+
+    def exploring(self, answer: SnapshotChoice, matcher: Matcher) -> SnapshotChoice | None:
+        """Return the frontier that the rule would choose."""
+        index = best_frontier(matcher, self.goal, self.frontiers, self.surroundings)
+        return None if index is None or answer.snapshot is None else SnapshotChoice(None, index)
 
     def by_rule(self, matcher: Matcher) -> tuple[SnapshotChoice, str]:
         """Choose the object of the goal's kind that fits best, whether or not all that is said of it holds.

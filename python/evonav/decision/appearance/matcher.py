@@ -77,7 +77,7 @@ class AppearanceMatcher(Matcher):
         self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
     ) -> Best:
         """Return which of the objects with the goal's name is most likely the goal; of equals, the first."""
-        shares = self.posterior(goal, named, around, unseen_m2)
+        shares = self.scores(goal, named, around, unseen_m2)
         index = shares.index(max(shares))
         unseen = max(0.0, 1.0 - math.fsum(shares))
         fits = shares[index] >= self._threshold * (shares[index] + unseen)
@@ -86,7 +86,7 @@ class AppearanceMatcher(Matcher):
     def _best(self, index: int, named: Sequence[ObjectCandidate], share: float, *, fits: bool) -> Best:
         return Best(index, fits, f"{named[index].label}, {share:.0%} likely the one described")
 
-    def posterior(
+    def scores(
         self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
     ) -> list[float]:
         """Return the probability that each object is the goal; the rest is that of "not seen yet".
@@ -201,7 +201,7 @@ class MistakenMatcher(AppearanceMatcher):
         self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
     ) -> Best:
         """Return an object drawn by its probability; it does not fit if "not seen yet" was drawn."""
-        shares = self.posterior(goal, named, around, unseen_m2)
+        shares = self.scores(goal, named, around, unseen_m2)
         unseen = max(0.0, 1.0 - math.fsum(shares))
         self._num_drawn += 1
         name = f"looks\0{self._seed}\0{self._num_drawn}"

@@ -123,10 +123,16 @@ class Matcher:
             around: Everything remembered.
             unseen_m2: Area that the map does not know; only rules that look use it.
         """
-        shares = [self.relation_share(goal, candidate, around) for candidate in named]
+        shares = self.scores(goal, named, around, unseen_m2)
         index = shares.index(max(shares))
         fits = shares[index] >= self.config.min_relations
         return Best(index, fits, f"{named[index].label}, {shares[index]:.0%} of what is said fits")
+
+    def scores(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
+    ) -> list[float]:
+        """Return how well each object with the goal's name fits, from 0 to 1; for the arguments see `best`."""
+        return [self.relation_share(goal, candidate, around) for candidate in named]
 
     def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.

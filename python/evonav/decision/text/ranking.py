@@ -104,6 +104,15 @@ def similarity_of_label(instruction: str, label: str) -> float:
     return round(float(text_feature(instruction) @ text_feature(canonical(label))), _DECIMALS)
 
 
+def best_frontier(
+    matcher: Matcher, goal: Goal, frontiers: Sequence[FrontierCandidate], surroundings: Sequence[ObjectCandidate]
+) -> int | None:
+    """Return the index of the frontier that costs least, of equals the first; `None` without any."""
+    parsed = matcher.parsed(goal)
+    costs_m = [matcher.frontier_cost_m(parsed, frontier, surroundings) for frontier in frontiers]
+    return costs_m.index(min(costs_m)) if costs_m else None
+
+
 def choose_candidate(
     matcher: Matcher,
     stage: Goal,
@@ -142,8 +151,8 @@ def choose_candidate(
         is_last_chance = not frontiers or num_rounds_left <= config.hurry_rounds
         if is_final or best.fits or is_last_chance:
             return Choice("object", named[best.index]), best.reason
-    if frontiers:
-        index = min(range(len(frontiers)), key=lambda i: (matcher.frontier_cost_m(goal, frontiers[i], surroundings), i))
+    index = best_frontier(matcher, stage, frontiers, surroundings)
+    if index is not None:
         return Choice("frontier", index), "relations do not hold" if named else "nothing remembered fits"
     for index, candidate in enumerate(objects):
         if matcher.label_score(goal, candidate.label) > 0.0 or (is_final and matcher.may_help(goal, candidate.label)):

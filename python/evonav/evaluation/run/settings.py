@@ -184,7 +184,7 @@ class DecisionSettings(Settings):
     tell_of_change: bool = False
     """Tell the model in every prompt that things may have been moved; the paper's agents are not informed."""
     noise: dict[str, float] = Field(default_factory=dict)
-    """Rates of simulated mistakes, between 0 and 1: wrong, unparsable, refusal, lost; and delay in seconds."""
+    """Rates of simulated mistakes, from 0 to 1: wrong, confused, unparsable, refusal, lost; and delay in seconds."""
     eagerness: float = 0.0
     """looks: from 0 to 1, go to objects that are less likely the goal."""
     mistakes: float = 0.0
@@ -228,7 +228,8 @@ class DecisionSettings(Settings):
         from evonav.decision.backends import vlm_config
         from evonav.decision.noisy import NoiseRates
 
-        NoiseRates.read(self.noise)
+        if NoiseRates.read(self.noise).confused and not self.asks_rules:
+            raise SettingError(type(self), "noise", "confused needs the scores of rules: decision text or looks")
         if self.kind == "text":
             self._refuse_all_but("model")
         elif self.kind == "looks":
