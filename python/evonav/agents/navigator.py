@@ -44,6 +44,8 @@ class Target:
     goal_m: Point2
     """The place to stand."""
     centre_m: Point2
+    keeps_place: bool = False
+    """Whether the place to stand is kept when the middle of the entry shifts."""
 
 
 class Navigator:
@@ -120,7 +122,7 @@ class Navigator:
         """Update the target's place: the first view of a table may have shown only its corner."""
         target = self.target
         entry = None if target is None else self.objects.entry(target.entry_id)
-        if target is None or entry is None:
+        if target is None or target.keeps_place or entry is None:
             return
         centre_m = (entry.centre_m[0], entry.centre_m[2])
         if math.dist(centre_m, target.centre_m) > self.config.aim_again_m:

@@ -27,6 +27,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.frontier_update.fail_then_update:FailThenUpdate",
         "Frontier-Update that checks its target on arrival",
     ),
+    "ftu-relook": (
+        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateRelook",
+        "Fail-then-Update with a second look from another side",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

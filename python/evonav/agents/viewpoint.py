@@ -52,6 +52,50 @@ def observation_point(
     return (float(x_m[best]), float(z_m[best]))
 
 
+def places_around(
+    is_free: NDArray[np.bool_],
+    frame: MapFrame,
+    object_m: Point2,
+    first_m: Point2,
+    *,
+    distance_m: float,
+    min_turn_rad: float,
+    num_directions: int = 24,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return free places around an object on other sides of it than a first place.
+
+    Args:
+        is_free: `(R, C)`, cells known to be free.
+        frame: Frame of the map.
+        object_m: `(x, z)` of the object's middle.
+        first_m: `(x, z)` of the first place.
+        distance_m: Wanted distance from the object. Places may be up to two cells farther away.
+        min_turn_rad: Smallest angle at the object between the first place and another.
+        num_directions: Number of directions around the object. For each, the free cell nearest to the point at
+            `distance_m` counts.
+
+    Returns:
+        `(N, 2)` middles of cells, `(x, z)`, without repetitions, by row and column; `(N,)` angles at the object between
+        them and the first place, radians, 0 to pi.
+    """
+    max_distance_m = distance_m + 2 * frame.cell_m
+    window, offset = _window(is_free, frame, object_m, max_distance_m)
+    rows, cols = np.nonzero(window)
+    x_m = (cols + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0] - object_m[0]
+    z_m = (rows + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1] - object_m[1]
+    first_rad = math.atan2(first_m[0] - object_m[0], first_m[1] - object_m[1])
+    turns_rad = np.abs((np.arctan2(x_m, z_m) - first_rad + math.pi) % math.tau - math.pi)
+    is_on_other_side = (turns_rad >= min_turn_rad) & (np.hypot(x_m, z_m) <= max_distance_m)
+    x_m, z_m, turns_rad = x_m[is_on_other_side], z_m[is_on_other_side], turns_rad[is_on_other_side]
+    if len(x_m) == 0:
+        return np.empty((0, 2)), np.empty(0)
+    bearings_rad = np.arange(num_directions) * (math.tau / num_directions)
+    wanted_x_m, wanted_z_m = distance_m * np.sin(bearings_rad), distance_m * np.cos(bearings_rad)
+    gaps_m = np.hypot(x_m[:, None] - wanted_x_m, z_m[:, None] - wanted_z_m)
+    chosen = np.unique(gaps_m.argmin(axis=0))
+    return np.stack([x_m[chosen] + object_m[0], z_m[chosen] + object_m[1]], axis=1), turns_rad[chosen]
+
+
 def _window(
     is_free: NDArray[np.bool_], frame: MapFrame, centre_m: Point2, reach_m: float
 ) -> tuple[NDArray[np.bool_], tuple[int, int]]:

@@ -35,6 +35,11 @@ class DepthEvidence:
         return self.num_see_through + self.num_supported + self.num_occluded
 
     @property
+    def num_not_hidden(self) -> int:
+        """Number of points at which the image shows whether something is there."""
+        return self.num_see_through + self.num_supported
+
+    @property
     def see_through_share(self) -> float:
         """Share of the points in view that are seen through; 0 without any."""
         return self.num_see_through / max(1, self.num_in_view)

@@ -65,10 +65,9 @@ class FrontierUpdate(NavigatorAgent):
         navigator.observe(observation)
         if reached is not None:
             navigator.target = None
-            entry_id = navigator.views.resolve(reached.entry_id)
-            if self._is_confirmed(entry_id, observation):
-                return self._stop("verified", entry_id)
-            self._reject(entry_id)
+            action = self._act_at_place(navigator.views.resolve(reached.entry_id), observation)
+            if action is not None:
+                return action
         if navigator.target is not None:
             navigator.aim()
             return self._approach(navigator.target)
@@ -78,12 +77,9 @@ class FrontierUpdate(NavigatorAgent):
         """Return whether arriving at an entry's place ends the stage without another look."""
         return True
 
-    def _is_confirmed(self, entry_id: int, observation: Observation) -> bool:
-        """Return whether the object of an entry whose place was reached is there."""
-        return True
-
-    def _reject(self, entry_id: int) -> None:
-        """Revise an entry that was not confirmed."""
+    def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
+        """Act at the reached place of an entry, after a look; `None` to decide anew."""
+        return self._stop("verified", entry_id)
 
     def _decide(self, observation: Observation) -> AgentAction:
         """Ask where to go: to one of the best entries, or to a frontier."""

@@ -5,12 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
-from evonav.decision.candidates import Point3
+from evonav.agents.frontier_update.relook import FirstLook, RelookConfig, place_from_another_side
+from evonav.agents.navigator import Target
+from evonav.decision.candidates import Pixels, Point3
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
-from evonav.memory.presence import DepthEvidence
+from evonav.memory.presence import DepthEvidence, Presence
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
@@ -30,6 +33,9 @@ class FailThenUpdateConfig(FrontierUpdateConfig):
     hide_after_rejections: int | None = None
     """A safeguard: an entry that was rejected this often at one place in a stage is no candidate for the rest of it.
     `None`: it is offered again."""
+    relook: RelookConfig | None = None
+    """Where neither detections nor depth tell whether the object is there, look once more from another side before the
+    question is asked, at most once an entry and stage. `None`: never."""
 
 
 class FailThenUpdate(FrontierUpdate):
@@ -39,45 +45,99 @@ class FailThenUpdate(FrontierUpdate):
         self._verification = config or FailThenUpdateConfig()
         super().__init__(self._verification, decision)
         self._rejected: list[tuple[int, str, Point3]] = []
+        self._first_looks: list[FirstLook] = []
+        """Looks of this stage that told nothing and led to a second one."""
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
         super().begin_task(task)
         self._counters.update(verifications=0, rejected_entries=0)
+        if self._verification.relook is not None:
+            self._counters.update(relooks=0, relooks_yes=0, relooks_no=0, relooks_unknown=0, relooks_without_place=0)
 
     def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; entries rejected in the last stage are no longer in memory."""
         super().begin_stage(goal)
         self._rejected.clear()
+        self._first_looks.clear()
         self._details = {}
 
     def _stops_at_sight_of_place(self) -> bool:
         return False
 
-    def _is_confirmed(self, entry_id: int, observation: Observation) -> bool:
+    def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
         navigator = self._navigator
         entry = navigator.objects.entry(entry_id)
         if entry is None:
-            return False
-        remembered = navigator.candidate(entry)
-        first = 0 if self._verification.verify_views == "all" else -1
-        images = [pixels_of(view, navigator.config.image_px) for view in navigator.round_views[first:]]
+            return None
+        first_look = next((it for it in self._first_looks if navigator.views.resolve(it.entry_id) == entry_id), None)
+        question = self._verify_question(entry, observation, first_look)
+        presence, why = question.presence(self._matcher)
+        if presence is Presence.UNKNOWN and first_look is None:
+            action = self._look_again(entry, observation, why)
+            if action is not None:
+                return action
         self._counters["verifications"] += 1
-        is_present = self._queries.ask(
-            VerifyQuestion(
-                goal=self._goal,
-                entry=navigator.with_images(remembered) if self._shows_images else remembered,
-                seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
-                evidence=self._evidence(entry_id, observation.views[first:]),
-                views=[image for image in images if image is not None],
-            )
+        answer = self._queries.ask(question)
+        is_present = self._verification.unanswered_means == "yes" if answer is None else answer
+        if first_look is not None:
+            outcome = "no" if not is_present else "unknown" if presence is Presence.UNKNOWN else "yes"
+            self._counters[f"relooks_{outcome}"] += 1
+        if is_present:
+            return self._stop("verified", entry_id)
+        self._reject(entry)
+        return None
+
+    def _verify_question(
+        self, entry: ObjectEntry, observation: Observation, first_look: FirstLook | None
+    ) -> VerifyQuestion:
+        """Ask about an entry by what is in view now, and by what the first look at its place showed."""
+        navigator = self._navigator
+        remembered = navigator.candidate(entry)
+        views, images = self._views_to_verify(observation), self._images_to_verify()
+        if first_look is not None:
+            views, images = [*first_look.views, *views], [*first_look.images, *images]
+        return VerifyQuestion(
+            goal=self._goal,
+            entry=navigator.with_images(remembered) if self._shows_images else remembered,
+            seen=[sighting for view in views for sighting in self._sightings(entry.id, view)],
+            evidence=self._evidence(entry.id, views),
+            views=images,
         )
-        return self._verification.unanswered_means == "yes" if is_present is None else is_present
+
+    def _views_to_verify(self, observation: Observation) -> Sequence[View]:
+        """Return the views of a round that verification looks at."""
+        return observation.views if self._verification.verify_views == "all" else observation.views[-1:]
+
+    def _images_to_verify(self) -> list[Pixels]:
+        """Return the images of these views, if the model looks at images."""
+        navigator = self._navigator
+        views = navigator.round_views if self._verification.verify_views == "all" else navigator.round_views[-1:]
+        images = (pixels_of(view, navigator.config.image_px) for view in views)
+        return [image for image in images if image is not None]
+
+    def _look_again(self, entry: ObjectEntry, observation: Observation, why: str) -> AgentAction | None:
+        """Go to another side of an entry that the first look told nothing about; `None` if there is no such place."""
+        config = self._verification.relook
+        if config is None:
+            return None
+        max_way_m = min(config.max_way_m, (observation.num_rounds_left - 2) * self.sensors.max_travel_m)
+        views = self._views_to_verify(observation)
+        place = place_from_another_side(self._navigator, entry, views[-1].pose, max_way_m, config)
+        if place is None:
+            self._counters["relooks_without_place"] += 1
+            return None
+        self._counters["relooks"] += 1
+        self._first_looks.append(FirstLook(entry.id, tuple(views), tuple(self._images_to_verify())))
+        self._details = {**self._details, "relooks": [look.entry_id for look in self._first_looks]}
+        centre_m = (entry.centre_m[0], entry.centre_m[2])
+        reason = f"a second look from {place.turn_deg:.0f} degrees around, {place.way_m:.1f} m away: {why}"
+        return self._approach(Target(entry.id, place.position_m, centre_m, keeps_place=True), reason)
 
     def _evidence(self, entry_id: int, views: Sequence[View]) -> DepthEvidence:
-        """Return what the view with the most of an entry's points in it shows of them."""
+        """Return what the view that hides least of an entry shows of it."""
         found = [evidence for view in views for evidence in self._navigator.objects.depth_evidence([entry_id], view)]
-        return max(found, key=lambda evidence: evidence.num_in_view)
+        return max(found, key=lambda evidence: (evidence.num_not_hidden, evidence.num_in_view))
 
     def _sightings(self, entry_id: int, view: View) -> list[Sighting]:
         compared = self._navigator.objects.compare(entry_id, view)
@@ -88,14 +148,12 @@ class FailThenUpdate(FrontierUpdate):
             )
         ]
 
-    def _reject(self, entry_id: int) -> None:
-        entry = self._navigator.objects.entry(entry_id)
-        if entry is None:
-            return
-        self._navigator.objects.remove(entry_id)
+    def _reject(self, entry: ObjectEntry) -> None:
+        """Delete an entry whose object is not at its place."""
+        self._navigator.objects.remove(entry.id)
         self._counters["rejected_entries"] += 1
-        self._rejected.append((entry_id, entry.label, entry.centre_m))
-        self._details = {"rejected": [rejected_id for rejected_id, _, _ in self._rejected]}
+        self._rejected.append((entry.id, entry.label, entry.centre_m))
+        self._details = {**self._details, "rejected": [rejected_id for rejected_id, _, _ in self._rejected]}
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
         limit = self._verification.hide_after_rejections
@@ -106,3 +164,10 @@ class FailThenUpdate(FrontierUpdate):
             for _, label, centre_m in self._rejected
         )
         return times < limit
+
+
+class FailThenUpdateRelook(FailThenUpdate):
+    """Fail-then-Update that looks once more, from another side, where its look on arrival does not tell."""
+
+    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
+        super().__init__(config or FailThenUpdateConfig(relook=RelookConfig()), decision)

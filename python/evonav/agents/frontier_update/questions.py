@@ -140,12 +140,17 @@ class VerifyQuestion(YesNoQuestion):
 
     def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
         """Answer no only if the object's place is seen through, and nothing with its label is detected there."""
+        presence, reason = self.presence(matcher)
+        return presence is not Presence.NO, reason
+
+    def presence(self, matcher: Matcher) -> tuple[Presence, str]:
+        """Judge by detections and depth whether the object is there, and say why."""
         is_detected = any(self._is_entry(seen, matcher) for seen in self.seen)
         evidence = self.evidence
         presence = judge_presence(evidence, is_detected=is_detected)
         if is_detected:
-            return True, f"{self.entry.label} detected at the remembered place"
-        return presence is not Presence.NO, (
+            return presence, f"{self.entry.label} detected at the remembered place"
+        return presence, (
             f"{presence.value}: of {evidence.num_in_view} points in view, {evidence.num_see_through} seen through, "
             f"{evidence.num_supported} on a surface, {evidence.num_occluded} hidden"
         )
