@@ -71,8 +71,8 @@ def places_around(
         first_m: `(x, z)` of the first place.
         distance_m: Wanted distance from the object. Places may be up to two cells farther away.
         min_turn_rad: Smallest angle at the object between the first place and another.
-        num_directions: Number of directions around the object. For each, the free cell nearest to the point at
-            `distance_m` counts.
+        num_directions: Number of directions around the object. For each on another side, the free cell nearest to the
+            point at `distance_m` counts.
 
     Returns:
         `(N, 2)` middles of cells, `(x, z)`, without repetitions, by row and column; `(N,)` angles at the object between
@@ -83,17 +83,25 @@ def places_around(
     rows, cols = np.nonzero(window)
     x_m = (cols + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0] - object_m[0]
     z_m = (rows + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1] - object_m[1]
+    min_turn_rad -= 1e-9  # the least angle itself counts, however it is rounded
     first_rad = math.atan2(first_m[0] - object_m[0], first_m[1] - object_m[1])
-    turns_rad = np.abs((np.arctan2(x_m, z_m) - first_rad + math.pi) % math.tau - math.pi)
+    turns_rad = _angles_between(np.arctan2(x_m, z_m), first_rad)
     is_on_other_side = (turns_rad >= min_turn_rad) & (np.hypot(x_m, z_m) <= max_distance_m)
     x_m, z_m, turns_rad = x_m[is_on_other_side], z_m[is_on_other_side], turns_rad[is_on_other_side]
     if len(x_m) == 0:
         return np.empty((0, 2)), np.empty(0)
     bearings_rad = np.arange(num_directions) * (math.tau / num_directions)
+    bearings_rad = bearings_rad[_angles_between(bearings_rad, first_rad) >= min_turn_rad]
     wanted_x_m, wanted_z_m = distance_m * np.sin(bearings_rad), distance_m * np.cos(bearings_rad)
     gaps_m = np.hypot(x_m[:, None] - wanted_x_m, z_m[:, None] - wanted_z_m)
     chosen = np.unique(gaps_m.argmin(axis=0))
     return np.stack([x_m[chosen] + object_m[0], z_m[chosen] + object_m[1]], axis=1), turns_rad[chosen]
+
+
+def _angles_between(bearings_rad: NDArray[np.float64], other_rad: float) -> NDArray[np.float64]:
+    """Return the angles between bearings and another one, 0 to pi."""
+    angles_rad: NDArray[np.float64] = np.abs((bearings_rad - other_rad + math.pi) % math.tau - math.pi)
+    return angles_rad
 
 
 def _window(
