@@ -1,4 +1,4 @@
-"""The memory at the size of one observation, against OpenCV and Open3D with faiss."""
+"""The memory at the size of one observation, against NumPy, OpenCV, SciPy, and Open3D with faiss."""
 
 import math
 from collections.abc import Callable
@@ -9,9 +9,12 @@ import faiss
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from benches.table import Row, compare
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
+from evonav.memory.presence import DepthEvidence
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.pose import Pose
@@ -19,10 +22,15 @@ from evonav.world.simulator import Intrinsics, OccupancyGrid
 
 NOTES = """Visibility: one view of 90 degrees and 3 m on 0.1 m cells; the peer casts 300 rays in steps of half a cell
 with NumPy and misses what lies between them. Frontiers: a 400x400 map; the peer finds the agent's island, the cells
-with 8 unexplored neighbours and their components with OpenCV (checked to be the same regions), but no directions and
-view positions. Object memory: one 300x300 frame with 20 masks against 100 entries of about 7,000 points at 3D-Mem's
-voxel of 0.01 m: unproject, voxel filter, DBSCAN, overlap, association and merge; the peer does so as ConceptGraphs and
-3D-Mem do, with Open3D clouds and a flat faiss index an entry, and its associations are checked to be the same.
+with 8 unexplored neighbours and their components with OpenCV (checked to be the same regions), but no
+directions and view positions. Distances to frontiers: from one place over the free cells of that map to its
+frontiers, by fast marching; the peer goes from cell to cell in 8 directions (checked to be within 10%), on a
+graph that it makes of the map in each call, since the map changes in each round. Object memory: one 300x300
+frame with 20 masks against 100 entries of about 7,000 points at 3D-Mem's voxel of 0.01 m: unproject, voxel
+filter, DBSCAN, overlap, association and merge; the peer does so as ConceptGraphs and 3D-Mem do, with Open3D
+clouds and a flat faiss index an entry, and its associations are checked to be the same. Depth evidence: 256
+points of each of the 100 entries in that frame's depth image; the peer projects the points of all entries at
+once, and its counts are checked to be the same.
 """
 
 SIDE_PX = 300
@@ -32,8 +40,8 @@ _INTRINSICS = Intrinsics(SIDE_PX, SIDE_PX, math.pi / 2)
 
 
 def run() -> list[Row]:
-    """Times visibility, frontiers and one frame of object memory."""
-    return [*_visibility(), *_frontiers(), *_object_frame()]
+    """Times visibility, frontiers, one frame of object memory and its comparison with depth."""
+    return [*_visibility(), *_frontiers(), *_distances(), *_object_frame(), *_depth_evidence()]
 
 
 # Occupancy
@@ -73,7 +81,8 @@ def _visibility() -> list[Row]:
     return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, len(poses), repeats=20)
 
 
-def _frontiers() -> list[Row]:
+def _explored_floor() -> OccupancyMap:
+    """A part of the floor as an agent that walked through it knows it."""
     grid = _floor()
     seen = OccupancyMap(MapFrame(400, 400, grid.cell_m, grid.corner_m))
     for step in range(60):
@@ -81,18 +90,25 @@ def _frontiers() -> list[Row]:
         for quarter in range(4):
             pose = _place(x_m, z_m, quarter * math.pi / 2)
             seen.integrate(visible_occupancy(grid, pose, _INTRINSICS, 3.0), (x_m, z_m))
-    agent_m = (14.0, 9.9)
+    return seen
+
+
+_AGENT_M, _AGENT_CELL = (14.0, 9.9), (99, 140)
+
+
+def _frontiers() -> list[Row]:
+    seen = _explored_floor()
     free, unexplored = (seen.cells == 1).astype(np.uint8), (~seen.explored).astype(np.uint8)
 
     def ours(_: int) -> object:
         seen.clear_frontiers()
-        return seen.update_frontiers(agent_m)
+        return seen.update_frontiers(_AGENT_M)
 
     def peer(_: int) -> list[frozenset[tuple[int, int]]]:
-        return _frontiers_opencv(free, unexplored, (99, 140))
+        return _frontiers_opencv(free, unexplored, _AGENT_CELL)
 
-    regions = _frontiers_opencv(free, unexplored, (99, 140), cells=True)
-    found = {tuple(cell) for frontier in seen.update_frontiers(agent_m) for cell in frontier.cells.tolist()}
+    regions = _frontiers_opencv(free, unexplored, _AGENT_CELL, cells=True)
+    found = {tuple(cell) for frontier in seen.update_frontiers(_AGENT_M) for cell in frontier.cells.tolist()}
     if {cell for region in regions for cell in region} != found:
         raise AssertionError("the peer found other frontiers")
     return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, 200)
@@ -112,6 +128,42 @@ def _frontiers_opencv(
     count, regions, statistics, _ = cv2.connectedComponentsWithStats(inner, connectivity=4)
     large = [i for i in range(1, count) if statistics[i, cv2.CC_STAT_AREA] >= 20] if edges.any() else []
     return [frozenset(map(tuple, np.argwhere(regions == i).tolist())) for i in large] if cells else []
+
+
+def _distances() -> list[Row]:
+    seen = _explored_floor()
+    targets_m = np.array([frontier.position_m for frontier in seen.update_frontiers(_AGENT_M)])
+    is_free, cell_m = seen.cells == 1, seen.map_frame.cell_m
+    cells = np.floor(targets_m / cell_m).astype(np.int64)[:, ::-1]
+
+    def ours(_: int) -> NDArray[np.float64]:
+        return seen.distances_m(_AGENT_M, targets_m)
+
+    def peer(_: int) -> NDArray[np.float64]:
+        return _distances_scipy(is_free, _AGENT_CELL, cells) * cell_m
+
+    if len(targets_m) < 5 or not np.allclose(ours(0), peer(0), rtol=0.1):
+        raise AssertionError("the peer found other distances")
+    return compare("distances to frontiers, 400x400", ours, {"SciPy, Dijkstra on 8-connected cells": peer}, 40)
+
+
+def _distances_scipy(
+    is_free: NDArray[np.bool_], start: tuple[int, int], ends: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Distances in cells."""
+    number = np.full(is_free.shape, -1, np.int32)
+    number[is_free] = np.arange(is_free.sum())
+    sides, others, lengths = [], [], []
+    for d_row, d_col in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        here = number[: number.shape[0] - d_row, max(0, -d_col) : number.shape[1] - max(0, d_col)]
+        there = number[d_row:, max(0, d_col) : number.shape[1] + min(0, d_col)]
+        is_edge = (here >= 0) & (there >= 0)
+        sides.append(here[is_edge])
+        others.append(there[is_edge])
+        lengths.append(np.full(is_edge.sum(), math.hypot(d_row, d_col)))
+    edges = (np.concatenate(lengths), (np.concatenate(sides), np.concatenate(others)))
+    graph = csr_matrix(edges, shape=(is_free.sum(), is_free.sum()))
+    return dijkstra(graph, directed=False, indices=number[start])[number[ends[:, 0], ends[:, 1]]]
 
 
 # Objects
@@ -260,3 +312,36 @@ def _object_frame() -> list[Row]:
 
     faiss.omp_set_num_threads(1)
     return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, num)
+
+
+def _depth_evidence() -> list[Row]:
+    view, entries = _frame(), _full_map()
+    ids = [entry.id for entry in entries.entries]
+    clouds = [cloud for entry_id in ids if (cloud := entries.points_m(entry_id)) is not None]
+
+    def ours(_: int) -> list[DepthEvidence]:
+        return entries.depth_evidence(ids, view)
+
+    def peer(_: int) -> NDArray[np.int64]:
+        return _depth_evidence_numpy(clouds, view)
+
+    found = [[e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view] for e in ours(0)]
+    if found != peer(0).tolist():
+        raise AssertionError("the peer counts otherwise")
+    return compare("depth evidence, 100 entries", ours, {"NumPy, all points at once": peer}, 100, repeats=5)
+
+
+def _depth_evidence_numpy(clouds: list[NDArray[np.float32]], view: View) -> NDArray[np.int64]:
+    """`(E, 4)` counts for 256 points of each cloud: seen through, supported, occluded, out of view."""
+    points = np.stack([cloud[np.arange(256) * len(cloud) // 256] for cloud in clouds])
+    x, y, z = np.moveaxis((points.astype(np.float64) - view.pose.position_m) @ _axes(view.pose).T, -1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = (SIDE_PX / 2 + _INTRINSICS.focal_px / z * offset for offset in (x, y))
+    is_inside = (z > 0) & (u >= 0) & (u < SIDE_PX) & (v >= 0) & (v < SIDE_PX)
+    row, col = (np.where(is_inside, at, 0).astype(np.int64) for at in (v, u))
+    depth_m = view.depth_m[row, col].astype(np.float64)
+    is_known = is_inside & (depth_m > 0) & np.isfinite(depth_m)
+    band_m = np.maximum(0.1, 0.02 * z)
+    is_through, is_occluded = is_known & (depth_m > z + band_m), is_known & (depth_m < z - band_m)
+    kinds = (is_through, is_known & ~is_through & ~is_occluded, is_occluded, ~is_known)
+    return np.stack([kind.sum(axis=1) for kind in kinds], axis=1)
