@@ -12,11 +12,15 @@ from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig, FailThenUpdateRelook
-from evonav.agents.frontier_update.relook import RelookConfig
+from evonav.agents.frontier_update.relook import RelookConfig, place_from_another_side
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import places_around
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.sensors.observation import MapFrame
+from evonav.memory import ObjectMap
+from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics
 
 FRAME = MapFrame(rows=40, cols=40, cell_m=0.1, corner_m=(-1.0, 3.0))
 MIDDLE_M = (1.0, 5.0)
@@ -85,8 +89,59 @@ def test_without_free_floor_on_another_side_there_is_no_place():
     assert (places_m.shape, turns_rad.shape) == ((0, 2), (0,))
 
 
+def knowing_a_mug():
+    """A navigator with one entry, about 2.2 m ahead of (0, 0), and open floor around it."""
+    navigator = Navigator(MapFrame(rows=60, cols=60, cell_m=0.1, corner_m=(-3.0, -1.0)), NavigatorConfig())
+    depth_m, masks = np.full((60, 60), np.inf, np.float32), np.full((60, 60), -1, np.int32)
+    depth_m[20:40, 20:40], masks[20:40, 20:40] = 2.0 + np.linspace(0, 0.3, 20, dtype=np.float32), 0
+    free = np.ascontiguousarray(np.argwhere(np.ones((60, 60))), np.int32)
+    occupancy = VisibleOccupancy(free, np.zeros((0, 2), np.int32))
+    found = Detections(masks, ("Mug",), np.ones(1, np.float32))
+    pose, intrinsics = Pose(0.0, 1.575, 0.0, 0.0, 0.0), Intrinsics(60, 60, math.pi / 2)
+    navigator.objects.update(View(pose, intrinsics, depth_m, found, occupancy))
+    navigator.explorer.map.integrate(occupancy, (0.0, 0.0))
+    (entry,) = navigator.objects.entries
+    return navigator, entry
+
+
+def test_the_second_place_is_the_nearest_of_those_that_show_most(monkeypatch):
+    navigator, entry = knowing_a_mug()
+    x_m, _, z_m = entry.centre_m
+    first, config = Pose(x_m, 1.575, z_m - 1.5, 0.0, 0.0), RelookConfig()
+
+    def place(share_of):
+        monkeypatch.setattr(ObjectMap, "visible_shares", lambda self, points_m, eyes_m: share_of(eyes_m))
+        return place_from_another_side(navigator, entry, first, 5.0, config)
+
+    right = place(lambda eyes_m: np.where(eyes_m[:, 0] > x_m, 0.9, 0.4))
+    assert right.position_m[0] > x_m + 1.0
+    assert 60.0 <= right.turn_deg < 80.0  # of those on the right, the nearest
+    assert right.way_m == pytest.approx(math.dist(right.position_m, (first.x_m, first.z_m)), rel=0.1)
+    far = place(lambda eyes_m: np.where(eyes_m[:, 2] > z_m + 1.4, 0.5, 0.4))
+    assert far.turn_deg > 150.0
+    assert place(lambda eyes_m: np.zeros(len(eyes_m))) is None
+    assert place_from_another_side(navigator, entry, first, 0.5, config) is None
+
+
+def test_the_second_place_is_kept_when_the_middle_of_the_entry_shifts():
+    navigator, entry = knowing_a_mug()
+    x_m, _, z_m = entry.centre_m
+    target = Target(entry.id, (1.0, 1.0), (x_m + 0.5, z_m), keeps_place=True)
+    navigator.target = target
+    navigator.aim()
+    assert navigator.target == target
+    navigator.target = replace(target, keeps_place=False)
+    navigator.aim()
+    assert navigator.target.centre_m == (x_m, z_m)
+    assert navigator.target.goal_m != target.goal_m
+
+
 def hide_arrivals(agent, stage, num):
-    """Let something stand before the camera at the first `num` arrivals at an object in a stage; return their poses."""
+    """Let something stand before the camera at the first `num` arrivals at an object from a stage on.
+
+    Returns:
+        The agent's poses at all of these arrivals, which are added as it goes.
+    """
     act, begin_stage, stages, poses = agent.act, agent.begin_stage, [], []
 
     def hidden(view):
@@ -94,7 +149,7 @@ def hide_arrivals(agent, stage, num):
         return replace(view, depth_m=np.full_like(view.depth_m, 0.3), detections=nothing)
 
     def act_hidden(observation):
-        if stages[-1] == stage and observation.has_arrived and agent.diagnostics().choice.startswith("object"):
+        if stages[-1] >= stage and observation.has_arrived and agent.diagnostics().choice.startswith("object"):
             if len(poses) < num:
                 observation = replace(observation, views=tuple(map(hidden, observation.views)))
             poses.append(observation.pose)
@@ -152,6 +207,16 @@ def test_what_neither_look_shows_is_left_alone_and_not_looked_at_a_third_time():
     assert relooks_of(last) == (1, 0, 0, 1, 0)
     assert (last.stop_reason, last.trace[-1].counters["rejected_entries"]) == ("verified", 0)
     assert second_looks(last)[0].chosen_entry.entry_id in {entry.entry_id for entry in last.entries}
+
+
+def test_an_entry_may_be_looked_at_again_in_the_next_stage():
+    agent = FailThenUpdateRelook()
+    hide_arrivals(agent, 3, 9)
+    stages = [stage_case(1, "GarbageCan|1"), stage_case(2, "Fridge|1")]
+    stages += [stage_case(stage, "DiningTable|1") for stage in (3, 4)]
+    *_, third, fourth = run(agent, *stages)
+    assert relooks_of(third) == (1, 0, 0, 1, 0)
+    assert relooks_of(fourth) == (2, 0, 0, 2, 0)
 
 
 @pytest.mark.parametrize("config", [RelookConfig(max_way_m=0.3), RelookConfig(min_turn_deg=180.0)])
