@@ -1,6 +1,7 @@
 """Find where to stand to look at a remembered object (3D-Mem's observation point)."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +99,7 @@ def places_around(
     return np.stack([x_m[chosen] + object_m[0], z_m[chosen] + object_m[1]], axis=1), turns_rad[chosen]
 
 
-def _angles_between(bearings_rad: NDArray[np.float64], other_rad: float) -> NDArray[np.float64]:
+def _angles_between(bearings_rad: NDArray[np.floating[Any]], other_rad: float) -> NDArray[np.float64]:
     """Return the angles between bearings and another one, 0 to pi."""
     angles_rad: NDArray[np.float64] = np.abs((bearings_rad - other_rad + math.pi) % math.tau - math.pi)
     return angles_rad
