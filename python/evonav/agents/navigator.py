@@ -13,6 +13,7 @@ from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
+from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
@@ -51,19 +52,22 @@ class Target:
 class Navigator:
     """Integrates observations, and turns choices into places to go."""
 
-    def __init__(self, map_frame: MapFrame, config: NavigatorConfig, *, names_colours: bool = False) -> None:
+    def __init__(
+        self, map_frame: MapFrame, config: NavigatorConfig, *, names_colours: bool = False, keeps_layouts: bool = False
+    ) -> None:
         """Create an empty memory.
 
         Args:
             map_frame: Shape and place of the map.
             config: Parameters.
             names_colours: True to keep what views show by name, for rules that look, in place of their images.
+            keeps_layouts: True to keep, with `names_colours`, what surrounds objects in views, too.
         """
         self.config = config
         self._names_colours = names_colours
         self.explorer = Explorer(map_frame, config.explorer)
         self.objects = ObjectMap(config.objects)
-        self.views = ViewStore(names_colours=names_colours)
+        self.views = ViewStore(names_colours=names_colours, keeps_layouts=keeps_layouts)
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
         """Views of the last round, the heading view last."""
@@ -142,11 +146,14 @@ class Navigator:
         shares = [seen.colours for _, seen in largest if seen.colours is not None]
         if not shares or latest is None:
             return None
+        around = [seen.layout for _, seen in largest if seen.layout is not None]
         shown = (seen.entry_id for view in (*(view for view, _ in largest), latest) for seen in view.seen)
+        layout = Layout(_mean([one.near for one in around]), _mean([one.whole for one in around])) if around else None
         return Appearance(
-            colours=tuple(math.fsum(column) / len(shares) for column in zip(*shares, strict=True)),
+            colours=_mean(shares),
             shown_ids=frozenset(self.views.resolve(entry_id) for entry_id in shown if entry_id is not None),
             known_share=self.explorer.map.known_share((entry.centre_m[0], entry.centre_m[2]), KNOWN_RADIUS_M),
+            layout=layout,
         )
 
     def unseen_m2(self) -> float:
@@ -203,3 +210,8 @@ class Navigator:
             if best is None or cost < best[0]:
                 best = (cost, view)
         return None if best is None else pixels_of(best[1], self.config.image_px)
+
+
+def _mean(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:
+    """Return the mean of each column."""
+    return tuple(math.fsum(column) / len(rows) for column in zip(*rows, strict=True))

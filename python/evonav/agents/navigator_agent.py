@@ -18,6 +18,7 @@ from evonav.agents.agent import (
 from evonav.agents.explanation import entry_belief, frontier_beliefs
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import FrontierCandidate, Pixels, Point2
+from evonav.decision.goal_input import goal_as_given, goal_input_of
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
@@ -50,6 +51,7 @@ class NavigatorAgent(ABC):
         self._shows_images = model.needs_images
         self._names_colours = not self._shows_images and bool(getattr(model, "needs_colours", False))
         self.sensors = replace(sensors or SensorConfig(), needs_rgb=self._shows_images or self._names_colours)
+        self._goal_input = goal_input_of(model)
         self._navigator_config = config
         self._queries = QuerySession(model, num_tries=num_tries)
         self._counters: Counter[str] = Counter()
@@ -66,7 +68,12 @@ class NavigatorAgent(ABC):
 
     def _new_navigator(self) -> Navigator:
         """Return an empty memory for the task."""
-        return Navigator(self._task.map_frame, self._navigator_config, names_colours=self._names_colours)
+        return Navigator(
+            self._task.map_frame,
+            self._navigator_config,
+            names_colours=self._names_colours,
+            keeps_layouts=self._names_colours and self._goal_input != "text",
+        )
 
     def _unseen_m2(self) -> float:
         """Return the area that the map does not know, if the rules look."""
@@ -74,7 +81,7 @@ class NavigatorAgent(ABC):
 
     def begin_stage(self, goal: Goal) -> None:
         """Take a new goal; the memory stays."""
-        self._goal = goal
+        self._goal = goal_as_given(goal, self._goal_input)
         self._navigator.begin_stage(goal.stage)
 
     @abstractmethod

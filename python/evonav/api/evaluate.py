@@ -17,15 +17,10 @@ from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, check_decision
+from evonav.evaluation.run.decision_resources import DecisionResources, SpendingSettings
 from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
 from evonav.evaluation.run.run_settings import RunSettings
-from evonav.evaluation.run.settings import (
-    DecisionResources,
-    DecisionSettings,
-    PerceptionSettings,
-    SimulatorSettings,
-    SpendingSettings,
-)
+from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
 from evonav.evaluation.run.settings_model import Settings
 
 AgentSource = str | Callable[..., Agent]

@@ -10,6 +10,7 @@ from typing import Any, cast
 
 from evonav.decision.appearance.model import AppearanceMatch
 from evonav.decision.custom_model import CustomClient, load_custom_model
+from evonav.decision.goal_input import GoalInput
 from evonav.decision.noisy import NoiseRates, Noisy
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
@@ -42,7 +43,12 @@ def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> Decisi
 
 
 def appearance_match(
-    seed: int, *, eagerness: float = 0.0, mistakes: float = 0.0, noise: Mapping[str, float] | None = None
+    seed: int,
+    *,
+    eagerness: float = 0.0,
+    mistakes: float = 0.0,
+    goal_input: GoalInput = "text",
+    noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """Make the rules that look: see `AppearanceMatch`.
 
@@ -50,12 +56,14 @@ def appearance_match(
         seed: Seed of the agent, and of the mistakes.
         eagerness: 0 to 1.
         mistakes: Temperature, 0 or more.
+        goal_input: Form of the goal that agents go by: text, image or both.
         noise: Rates of other mistakes.
 
     Raises:
         InvalidArgumentError: A number is out of range.
     """
-    return _with_noise(AppearanceMatch(eagerness=eagerness, mistakes=mistakes, seed=seed), noise, seed)
+    model = AppearanceMatch(eagerness=eagerness, mistakes=mistakes, goal_input=goal_input, seed=seed)
+    return _with_noise(model, noise, seed)
 
 
 def vlm(
@@ -75,6 +83,7 @@ def vlm(
     max_cost_usd: float | None = None,
     noise: Mapping[str, float] | None = None,
     tells_of_change: bool | None = None,
+    goal_input: GoalInput = "text",
 ) -> DecisionModel:
     """Make a model behind an OpenAI-compatible endpoint.
 
@@ -94,6 +103,7 @@ def vlm(
         max_cost_usd: Largest cost of the run; needs `price`.
         noise: Rates of mistakes.
         tells_of_change: See `with_notice`.
+        goal_input: Form of the goal that agents go by: text, image or both.
 
     Raises:
         InvalidArgumentError: An option makes no sense.
@@ -108,7 +118,9 @@ def vlm(
         model=account or model,
     )
     client = VlmClient(config, store=store, mode=mode, account=booked, keeps_failures=True, keeps_images=keeps_images)
-    decision = VlmDecision(client, structured=structured, needs_images=images, tells_of_change=tells_of_change)
+    decision = VlmDecision(
+        client, structured=structured, needs_images=images, tells_of_change=tells_of_change, goal_input=goal_input
+    )
     return _with_noise(decision, noise, seed)
 
 
@@ -123,6 +135,7 @@ def own(
     account: str | None = None,
     noise: Mapping[str, float] | None = None,
     tells_of_change: bool | None = None,
+    goal_input: GoalInput = "text",
 ) -> DecisionModel:
     """Make a model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
 
@@ -136,6 +149,7 @@ def own(
         account: Name in the ledger; default: the model's path.
         noise: Rates of mistakes.
         tells_of_change: See `with_notice`; for a model with `ask`.
+        goal_input: Form of the goal that agents go by: text, image or both; for a model with `ask`.
 
     Raises:
         InvalidArgumentError: It cannot be imported or made, is none such, or has `answer` and is to be told of changes.
@@ -145,12 +159,16 @@ def own(
     if hasattr(model, "answer"):
         if tells_of_change:
             raise InvalidArgumentError(f"{path}: a model with `answer` makes its own prompts; tell it of changes there")
+        if goal_input != "text":
+            raise InvalidArgumentError(f"{path}: a model with `answer` says itself what it goes by, as `goal_input`")
         return _with_noise(cast("DecisionModel", model), noise, seed)
     booked = Account(ledger=None if ledger is None else Ledger(ledger), model=account or path)
     store = None if cache is None else ResponseCache(Path(cache))
     client = CustomClient(path, model, store=store, mode=mode, account=booked, keeps_images=keeps_images)
     needs_images = bool(getattr(model, "needs_images", True))
-    decision = VlmDecision(client, structured="off", needs_images=needs_images, tells_of_change=tells_of_change)
+    decision = VlmDecision(
+        client, structured="off", needs_images=needs_images, tells_of_change=tells_of_change, goal_input=goal_input
+    )
     return _with_noise(decision, noise, seed)
 
 
@@ -164,13 +182,21 @@ def counting(
     request: Mapping[str, Any] | None = None,
     noise: Mapping[str, float] | None = None,
     tells_of_change: bool | None = None,
+    goal_input: GoalInput = "text",
 ) -> DecisionModel:
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
     client = VlmClient(vlm_config(model, request))
     is_json = structured != "off"
     name, is_informed = str(seed), tells_of_change
     counted = Counting(
-        TextMatch(), client, Ledger(ledger), name, needs_images=images, is_json=is_json, tells_of_change=is_informed
+        TextMatch(),
+        client,
+        Ledger(ledger),
+        name,
+        needs_images=images,
+        is_json=is_json,
+        tells_of_change=is_informed,
+        goal_input=goal_input,
     )
     return _with_noise(counted, noise, seed)
 

@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.memory.colours import Layout
+
 Point2 = tuple[float, float]
 """`(x, z)` in metres."""
 Point3 = tuple[float, float, float]
@@ -24,6 +26,8 @@ class Appearance:
     """Ids of the entries in these views."""
     known_share: float
     """Share of the cells within a metre of it that the map knows."""
+    layout: Layout | None = None
+    """Colours around it, the mean over its largest views, if agents go by the goal's picture."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 import time
 from typing import Any, TypeVar
 
+from evonav.decision.goal_input import GoalInput, goal_input_of
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.account import Account
 
@@ -28,6 +29,11 @@ class Metered:
     def needs_colours(self) -> bool:
         """True if the model, without images, needs the names of the colours in them."""
         return bool(getattr(self.model, "needs_colours", False))
+
+    @property
+    def goal_input(self) -> GoalInput:
+        """Form of the goal that the model's agents go by."""
+        return goal_input_of(self.model)
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the measured model's answer."""

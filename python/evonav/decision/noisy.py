@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
+from evonav.decision.goal_input import GoalInput, goal_input_of
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.text.matcher import Matcher
 from evonav.errors import InvalidArgumentError
@@ -123,6 +124,11 @@ class Noisy:
     def needs_colours(self) -> bool:
         """True if the model, without images, needs the names of the colours in them."""
         return bool(getattr(self.model, "needs_colours", False))
+
+    @property
+    def goal_input(self) -> GoalInput:
+        """Form of the goal that the model's agents go by."""
+        return goal_input_of(self.model)
 
     def check(self) -> None:
         """Check the model."""

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.decision.goal_input import PictureGoal
 from evonav.tasks.public import Goal
 
 
@@ -73,7 +74,8 @@ class Prompt:
 def goal_prompt(goal: Goal, *contents: str | tuple[str, NDArray[np.uint8] | None]) -> Prompt:
     """Return the prompt of a question about a goal.
 
-    The goal is the unified instruction alone, as in the reported experiments (paper, Sec. C.1).
+    The goal is the unified instruction alone, as in the reported experiments (paper, Sec. C.1), unless agents go by its
+    picture.
 
     Args:
         goal: The stage's goal.
@@ -82,7 +84,8 @@ def goal_prompt(goal: Goal, *contents: str | tuple[str, NDArray[np.uint8] | None
     """
     parts: list[Part] = []
     lines = [f"Goal of the robot: {goal.unified_instruction}"]
-    for content in contents:
+    picture = [("This picture shows it, in the middle:", goal.reference_image)] if isinstance(goal, PictureGoal) else []
+    for content in (*picture, *contents):
         title, image = (content, None) if isinstance(content, str) else content
         lines.append(title)
         if image is not None:

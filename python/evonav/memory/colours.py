@@ -1,5 +1,8 @@
 """Name the colours of what an agent saw: the share of each of the describer's words in a detection's pixels."""
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -18,6 +21,9 @@ LIGHTNESS_WEIGHT = 0.5
 """Weight of lightness in that distance: light and shade change it more than the hue."""
 STRIDE_PX = 2
 """Every second pixel of every second row is read."""
+
+NEAR = 1 / 12
+"""Standard deviation of the weights of pixels by a place, as a share of the image's height."""
 
 _LEVELS = 16
 """Levels of a channel in the table of names."""
@@ -42,14 +48,57 @@ def colour_shares(view: View) -> Shares:
     num = len(view.detections.labels)
     masks = view.detections.masks[::STRIDE_PX, ::STRIDE_PX]
     is_seen = masks >= 0
-    bright = np.minimum(view.rgb[::STRIDE_PX, ::STRIDE_PX][is_seen] * np.float32(LIGHT_GAIN), 255.0)
-    red, green, blue = (bright.astype(np.int64) * _LEVELS // 256).T
-    cells = (red * _LEVELS + green) * _LEVELS + blue
+    cells = _cells(view.rgb[::STRIDE_PX, ::STRIDE_PX][is_seen])
     counts = np.bincount(masks[is_seen] * _LEVELS**3 + cells, minlength=num * _LEVELS**3)
     shares = counts.reshape(num, _LEVELS**3).astype(np.float32) @ _names()
     total = shares.sum(axis=1, keepdims=True)
     named: Shares = shares / np.maximum(total, np.float32(1.0))
     return named
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The colours around a place in an image: what is there, and what surrounds it."""
+
+    near: tuple[float, ...]
+    """Share of each colour word by the place, pixels weighted by a Gaussian of `NEAR` of the image's height."""
+    whole: tuple[float, ...]
+    """Share of each colour word in the whole image."""
+
+
+def layouts(rgb: NDArray[np.uint8], places_px: Sequence[tuple[float, float]]) -> list[Layout]:
+    """Return the layout of an image around each of some places.
+
+    Args:
+        rgb: `(H, W, 3)` image.
+        places_px: Column and row of each place.
+    """
+    if not places_px:
+        return []
+    named = _names()[_cells(rgb[::STRIDE_PX, ::STRIDE_PX])]
+    rows, cols = named.shape[:2]
+    whole = tuple(named.mean(axis=(0, 1), dtype=np.float64).tolist())
+    spread_px = NEAR * rgb.shape[0]
+    cols_px, rows_px = np.array(places_px, np.float64).T[:, :, None]
+    by_row = np.exp(-0.5 * ((np.arange(rows) * STRIDE_PX - rows_px) / spread_px) ** 2)
+    by_col = np.exp(-0.5 * ((np.arange(cols) * STRIDE_PX - cols_px) / spread_px) ** 2)
+    of_rows = (by_row @ named.reshape(rows, -1)).reshape(len(places_px), cols, len(COLOURS))
+    near = np.einsum("nx,nxc->nc", by_col, of_rows) / (by_row.sum(axis=1) * by_col.sum(axis=1))[:, None]
+    return [Layout(tuple(row), whole) for row in near.tolist()]
+
+
+def distance(one: Sequence[float], other: Sequence[float]) -> float:
+    """Return Hellinger's distance of two lists of shares: 0 for equal ones, 1 for those that share no colour."""
+    overlap = math.fsum(math.sqrt(a * b) for a, b in zip(one, other, strict=True))
+    return math.sqrt(max(0.0, 1.0 - overlap))
+
+
+def _cells(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return the row of `_names` of each of `(..., 3)` pixels, brightened."""
+    bright = np.minimum(rgb * np.float32(LIGHT_GAIN), 255.0)
+    levels = bright.astype(np.int64) * _LEVELS // 256
+    cells: NDArray[np.int64] = (levels[..., 0] * _LEVELS + levels[..., 1]) * _LEVELS + levels[..., 2]
+    return cells
 
 
 @cache

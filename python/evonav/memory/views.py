@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav import _core
-from evonav.memory.colours import colour_shares
+from evonav.errors import InvalidArgumentError
+from evonav.memory.colours import Layout, colour_shares, layouts
 from evonav.sensors.observation import Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -36,6 +37,8 @@ class Seen:
     box_px: Box
     colours: tuple[float, ...] | None = None
     """Share of each of `evonav.tasks.language.COLOURS`; `None` if the store keeps no colours."""
+    layout: Layout | None = None
+    """Colours of the view around the middle of its box; `None` if the store keeps none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,14 +62,16 @@ class StoredView:
 class ViewStore:
     """Views in the order of their arrival."""
 
-    def __init__(self, *, names_colours: bool = False) -> None:
+    def __init__(self, *, names_colours: bool = False, keeps_layouts: bool = False) -> None:
         """Create an empty store.
 
         Args:
             names_colours: True to keep the colours of detections by name, in place of the views' images.
+            keeps_layouts: True to keep, with `names_colours`, those around detections as well.
         """
         self.views: list[StoredView] = []
         self._names_colours = names_colours
+        self._keeps_layouts = keeps_layouts
         self._became: dict[int, int] = {}
         self._largest: dict[int, list[tuple[int, Seen]]] = {}
         """The views that show an entry largest, by id, with its detections there, the largest first."""
@@ -83,10 +88,11 @@ class ViewStore:
         """
         boxes = boxes_of(view.detections)
         named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
+        around = self._layouts(view, boxes) if self._keeps_layouts else [None] * len(boxes)
         seen = tuple(
-            Seen(entry_id, label, float(confidence), area_px, box_px, colours)
-            for entry_id, label, confidence, (area_px, box_px), colours in zip(
-                entry_ids, view.detections.labels, view.detections.confidences, boxes, named, strict=True
+            Seen(entry_id, label, float(confidence), area_px, box_px, colours, layout)
+            for entry_id, label, confidence, (area_px, box_px), colours, layout in zip(
+                entry_ids, view.detections.labels, view.detections.confidences, boxes, named, around, strict=True
             )
         )
         jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)
@@ -98,6 +104,12 @@ class ViewStore:
                 self._latest[entry_id] = stored.id
                 self._keep_largest(entry_id, [(stored.id, one)])
         return stored
+
+    def _layouts(self, view: View, boxes: Sequence[tuple[int, Box]]) -> Sequence[Layout]:
+        if view.rgb is None:
+            raise InvalidArgumentError("view.rgb is None: ask for colours with `SensorConfig(needs_rgb=True)`")
+        middles_px = [((left + right) / 2.0, (top + bottom) / 2.0) for _, (left, top, right, bottom) in boxes]
+        return layouts(view.rgb, middles_px)
 
     def follow(self, merged: Mapping[int, int] | Sequence[tuple[int, int]]) -> None:
         """Record that entries were absorbed by others; pairs are those of `ObjectUpdate.merged`."""

@@ -6,6 +6,7 @@ from typing import Any
 
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.run.components import USUAL_CAMERA, Backend
+from evonav.evaluation.run.settings import RULES
 from evonav.perception.shorthand import word_of
 from evonav.submission.pack import Submission
 
@@ -19,7 +20,7 @@ class PackedSetup:
     perception: str
     """Perception, as `--perception` names it."""
     decision: str
-    """Kind of the decision model: text, looks, vlm or own; with the rates of its simulated mistakes."""
+    """Kind of the decision model: text, looks, vlm or own; with the rates of its mistakes, and what agents go by."""
     model: str
     """The decision model's name, if it has one."""
     simulator: str
@@ -37,9 +38,10 @@ def packed_setup(header: Submission) -> PackedSetup:
     backend = with_current_paths(header.config.get("backend"))
     parts: dict[str, Any] = backend if isinstance(backend, dict) else {}
     decision, perception = (_mapping(parts.get(f"{name}_options")) for name in ("decision", "perception"))
-    kind = str(parts.get("decision", "")).rpartition(":")[2].removesuffix("_match")
+    made = str(parts.get("decision", "")).rpartition(":")[2]
+    kind = next((name for name, function in RULES.items() if function == made), made)
     rates = [f"{name}={value}" for name, value in _mapping(decision.get("noise")).items()]
-    rates += [f"{name}={decision[name]}" for name in ("eagerness", "mistakes") if decision.get(name)]
+    rates += [f"{name}={decision[name]}" for name in ("eagerness", "mistakes", "goal_input") if decision.get(name)]
     simulator = str(parts.get("simulator", ""))
     camera = [f"{key}={value}" for key, value in camera_of(parts).items()]
     return PackedSetup(

@@ -15,8 +15,9 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.decision_resources import SpendingSettings
 from evonav.evaluation.run.run_settings import RunSettings
-from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings, SpendingSettings
+from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
 from evonav.tasks.subsets import SubsetError, parse_subset

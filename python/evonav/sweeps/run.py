@@ -23,8 +23,8 @@ from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_decision
+from evonav.evaluation.run.decision_resources import DecisionResources
 from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, run_identity
-from evonav.evaluation.run.settings import DecisionResources
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet

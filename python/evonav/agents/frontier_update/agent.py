@@ -117,7 +117,7 @@ class FrontierUpdate(NavigatorAgent):
     ) -> list[ObjectCandidate]:
         """Return the entries that may be candidates, the best first: by image features, by words or by meaning."""
         here = (observation.pose.x_m, observation.pose.z_m)
-        feature = observation.goal_feature
+        feature = observation.goal_feature if self._goal_input != "image" else None  # it is of the sentence
         if feature is not None:
             order = rank_by_feature(feature, [entry.feature for entry in entries], [entry.id for entry in entries])
         elif self.config.ranking == "text":

@@ -7,7 +7,7 @@ graph and scene graph attract exploration a little. An obstacle stays one for ev
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
 from evonav.decision.candidates import Point2
+from evonav.decision.goal_input import goal_as_given, goal_input_of
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
@@ -65,6 +66,7 @@ class UniGoal:
     def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or UniGoalConfig()
         model: DecisionModel = decision or TextMatch()
+        self._goal_input = goal_input_of(model)
         self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._diagnostics = RoundDiagnostics()
         self._task: TaskInfo | None = None
@@ -73,14 +75,16 @@ class UniGoal:
         """Forget everything; the map begins where the agent first stands."""
         self._task = task
         self._queries.counters.clear()
-        self._graphs = GraphReasoner(self.config.graph, self._queries)
+        is_shown = self._goal_input == "image"
+        graph = replace(self.config.graph, goal_input="image") if is_shown else self.config.graph
+        self._graphs = GraphReasoner(graph, self._queries)
         self._random = random.Random(f"unigoal wander {task.seed}")  # noqa: S311 - not for secrets
         self._bev: BevMap | None = None
         self._num_given_up = 0
 
     def begin_stage(self, goal: Goal) -> None:
         """Drop the goal graph and all goals; map, visited cells, collisions and scene graph stay."""
-        self._graphs.begin_stage(goal)
+        self._graphs.begin_stage(goal_as_given(goal, self._goal_input))
         self._advice: Advice | None = None
         self._wander_m: Point2 | None = None
         self._num_steps = 0

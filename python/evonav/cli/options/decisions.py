@@ -12,8 +12,9 @@ if TYPE_CHECKING:  # the command must start fast
 
     from evonav.component import Component
     from evonav.decision.question import DecisionModel
+    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import RunConfig
-    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings
     from evonav.tasks.listing import TaskFile
 
 DryRun = Annotated[
@@ -55,7 +56,7 @@ def decision_component(
         StoreError: The file of exchanges cannot be opened.
     """
     from evonav.evaluation.run.components import check_decision
-    from evonav.evaluation.run.settings import DecisionResources
+    from evonav.evaluation.run.decision_resources import DecisionResources
 
     decisions.check()
     if decisions.kind != "vlm":

@@ -130,6 +130,7 @@ class Options:
 def settings_options(name: str) -> Options:
     """Return the options that the argument of a command with this name has."""
     from evonav.evaluation.run import settings
+    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run_settings import RunSettings
 
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
@@ -148,7 +149,7 @@ def settings_options(name: str) -> Options:
             {"mode": "vlm_mode"},
             fields=("model", "base_url", "mode", "exchanges", "images"),
         ),
-        "spending": Options(settings.SpendingSettings, MODEL_PANEL),
+        "spending": Options(SpendingSettings, MODEL_PANEL),
         "simulation": Options(
             settings.SimulatorSettings,
             "Simulator",

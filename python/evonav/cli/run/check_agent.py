@@ -12,7 +12,8 @@ from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Seed
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
+    from evonav.evaluation.run.decision_resources import SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings
 
 EXIT_BROKEN = 1
 _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}

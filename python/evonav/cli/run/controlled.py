@@ -27,9 +27,10 @@ from evonav.cli.options.shared import (
 from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import Progress
     from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings
 
 controlled_app = new_app(
     "controlled",

@@ -12,8 +12,9 @@ from evonav.cli.results.view import make_pages
 from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_tasks, running
 
 if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings
 
 
 @with_settings("workers", "decisions", "spending", hidden=("decisions", "spending"))

@@ -32,9 +32,10 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from collections.abc import Callable, Iterator
 
     from evonav.evaluation.metrics.navigation import AgentSummary
+    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import Progress, RunConfig
     from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings, SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
 

@@ -12,7 +12,8 @@ from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+    from evonav.evaluation.run.decision_resources import SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings
     from evonav.generation.instructions.writer import Writing
 
 

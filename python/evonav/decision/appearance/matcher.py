@@ -2,23 +2,28 @@
 
 `AppearanceMatch` stands where the paper's agents ask GPT-4o, as `TextMatch` does, but it sees: the colours of an object
 in the agent's own views, its size and proportions, and what these views show around it. Each of these is a likelihood
-ratio, the probability of what is seen for the goal over that for another object of its type. Their product and the
-number of objects of the type that the unseen part of the home should hold give a posterior probability. The agent goes
-to the likeliest object if that is likely enough against "not seen yet": exploring does not tell apart two objects that
-were both seen. What cannot be seen counts 1: materials, details, corners.
+ratio, the probability of what is seen for the goal over that for another object of its type; so is the goal's picture,
+for agents that go by it. Their product and the number of objects of the type that the unseen part of the home should
+hold give a posterior probability. The agent goes to the likeliest object if that is likely enough against "not seen
+yet": exploring does not tell apart two objects that were both seen. What cannot be seen counts 1: materials, details,
+corners.
 """
 
 import hashlib
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
 from evonav.decision.appearance.statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
+from evonav.decision.goal_input import PictureGoal
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
 from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
+from evonav.memory.colours import Layout
 from evonav.tasks.language import COLOURS
+from evonav.tasks.public import Goal
 
 _WALL_THINGS = {"painting", "window", "doorway"}
 """Things on or in walls, which views show less often than what stands on the floor."""
@@ -52,6 +57,8 @@ class AppearanceConfig:
     """The same for the room."""
     keep: float = 0.2
     """Share by which another frontier must be nearer than the one to which the agent goes."""
+    picture: PictureConfig = field(default_factory=PictureConfig)
+    """Numbers of the ratio of the goal's picture."""
     min_known_share: float = 0.7
     """Known share of the surroundings from which a neighbour or a room that is not seen counts as violated.
 
@@ -70,8 +77,19 @@ class AppearanceMatcher(Matcher):
             eagerness: 0 believes an object at `threshold`, 1 at `eager_threshold`.
         """
         super().__init__(TextMatchConfig())
+        self._pictured: tuple[Goal, Layout] | None = None
+        """The last goal with a picture, and the picture's layout, which takes a millisecond."""
         self.numbers = config or AppearanceConfig()
         self._threshold = self.numbers.threshold + eagerness * (self.numbers.eager_threshold - self.numbers.threshold)
+
+    def parsed(self, goal: Goal) -> ParsedGoal:
+        """Return the parsed instruction, and the layout of the picture if that counts."""
+        parsed = super().parsed(goal)
+        if not isinstance(goal, PictureGoal):
+            return parsed
+        if self._pictured is None or self._pictured[0] is not goal:
+            self._pictured = (goal, goal_layout(goal))
+        return replace(parsed, picture=self._pictured[1])
 
     def best(
         self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate], unseen_m2: float
@@ -97,7 +115,8 @@ class AppearanceMatcher(Matcher):
             around: Everything remembered; of it, only what an object's own views show counts.
             unseen_m2: Area that the map does not know.
         """
-        ratios = [self._colour_ratio(goal, one) * self._form_ratio(goal, one) for one in named]
+        rules = (self._colour_ratio, self._form_ratio, self._picture_ratio)
+        ratios = [math.prod(rule(goal, one) for rule in rules) for one in named]
         for relation in goal.relations:
             for index, ratio in enumerate(self._relation_ratios(relation, named, around)):
                 ratios[index] *= ratio
@@ -139,6 +158,12 @@ class AppearanceMatcher(Matcher):
             if word in over:
                 ratio *= self.numbers.form_ratio ** math.tanh(over[word] / (2.0 * self.numbers.form_slope))
         return ratio
+
+    def _picture_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
+        """Return the ratio of the goal's picture; 1 if it does not count, or nothing was seen in colour."""
+        if goal.picture is None or one.appearance is None or one.appearance.layout is None:
+            return 1.0
+        return picture_ratio(goal.picture, one.appearance.layout, self.numbers.picture)
 
     def _relation_ratios(
         self, relation: Relation, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate]

@@ -4,6 +4,7 @@ import math
 from typing import TypeVar
 
 from evonav.decision.appearance.matcher import AppearanceMatcher, MistakenMatcher
+from evonav.decision.goal_input import GoalInput, check_goal_input
 from evonav.decision.question import Question, Reply
 from evonav.errors import InvalidArgumentError
 
@@ -16,21 +17,26 @@ class AppearanceMatch:
     needs_images = False
     needs_colours = True
 
-    def __init__(self, *, eagerness: float = 0.0, mistakes: float = 0.0, seed: int = 0) -> None:
+    def __init__(
+        self, *, eagerness: float = 0.0, mistakes: float = 0.0, goal_input: GoalInput = "text", seed: int = 0
+    ) -> None:
         """Create a model.
 
         Args:
             eagerness: 0 to 1; more ends exploration for an object that is less likely the goal.
             mistakes: Temperature, 0 or more, at which objects are drawn from the posterior; 0 draws none.
+            goal_input: Form of the goal that agents go by: the sentence, the picture, or both.
             seed: Seed of these draws.
 
         Raises:
-            InvalidArgumentError: A number is out of range.
+            InvalidArgumentError: A number is out of range, or there is no such input.
         """
         if not 0.0 <= eagerness <= 1.0:
             raise InvalidArgumentError(f"eagerness = {eagerness!r}: expected a number from 0 to 1")
         if not (math.isfinite(mistakes) and mistakes >= 0.0):
             raise InvalidArgumentError(f"mistakes = {mistakes!r}: expected a temperature, 0 or more")
+        check_goal_input(goal_input, sees_images=True)
+        self.goal_input = goal_input
         if mistakes > 0.0:
             self.matcher: AppearanceMatcher = MistakenMatcher(mistakes, seed, eagerness=eagerness)
         else:

@@ -7,11 +7,12 @@ folded.
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import zip_longest
 from typing import Literal
 
+from evonav.memory.colours import Layout
 from evonav.tasks.language import COLOURS, MATERIALS, PROCTHOR_TYPES, SHAPES, SIZES, noun_of, plural_of
 
 RelationKind = Literal["in", "on", "near"]
@@ -117,6 +118,8 @@ class ParsedGoal:
     relations: tuple[Relation, ...] = ()
     adjectives: tuple[str, ...] = ()
     """Words of `evonav.tasks.language` for its size, shape, colours and material."""
+    picture: Layout | None = field(default=None, compare=False, repr=False)
+    """Colours of the goal's picture, if agents go by it and the rules look."""
 
     @property
     def room(self) -> str | None:

@@ -3,6 +3,7 @@
 from typing import TypeVar
 
 from evonav.decision.change_notice import with_notice
+from evonav.decision.goal_input import GoalInput
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.decision import with_schema
@@ -27,6 +28,7 @@ class Counting:
         needs_images: bool,
         is_json: bool,
         tells_of_change: bool | None = False,
+        goal_input: GoalInput = "text",
     ) -> None:
         """Count the questions to `model`.
 
@@ -38,8 +40,10 @@ class Counting:
             needs_images: True if questions should have images, as they would for the model.
             is_json: True if requests would come with a JSON Schema.
             tells_of_change: See `with_notice`.
+            goal_input: Form of the goal that agents go by; of a picture, the text matcher knows the category alone.
         """
         self.needs_images = needs_images
+        self.goal_input = goal_input
         self._model = model
         self._client = client
         self._ledger = ledger

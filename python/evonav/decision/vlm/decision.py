@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, TypeVar
 
 from evonav.decision.change_notice import with_notice
+from evonav.decision.goal_input import GoalInput, check_goal_input
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
@@ -55,6 +56,7 @@ class VlmDecision:
         structured: Structured = "auto",
         needs_images: bool = True,
         tells_of_change: bool | None = False,
+        goal_input: GoalInput = "text",
     ) -> None:
         """Create a decision model.
 
@@ -63,13 +65,16 @@ class VlmDecision:
             structured: Answers by JSON Schema: auto, on, off.
             needs_images: True if agents should put images into questions.
             tells_of_change: True if prompts say that things may have been moved, see `with_notice`.
+            goal_input: Form of the goal that agents go by: the sentence, the picture, or both.
 
         Raises:
-            InvalidArgumentError: `structured` is none of the three.
+            InvalidArgumentError: `structured` is none of the three, or a model without images is to go by a picture.
         """
         if structured not in STRUCTURED:
             raise InvalidArgumentError(f"structured: expected one of {', '.join(STRUCTURED)}, got {structured!r}")
+        check_goal_input(goal_input, sees_images=needs_images)
         self.client = client
+        self.goal_input = goal_input
         self.structured: Structured = structured
         self.needs_images = needs_images
         self.tells_of_change = tells_of_change

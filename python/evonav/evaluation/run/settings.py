@@ -6,17 +6,16 @@ Sweep files are validated by these models, and the command derives its options f
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
 from evonav.component import Component
+from evonav.decision.goal_input import GoalInput
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
-from evonav.decision.vlm.ledger import LEDGER_NAME
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import StoreError
 from evonav.evaluation.run.components import USUAL_CAMERA, drawn_in
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
@@ -24,7 +23,7 @@ from evonav.perception.shorthand import PREDICTED, read_word
 from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
-    from evonav.decision.vlm.account import Price
+    from evonav.evaluation.run.decision_resources import DecisionResources
 
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""
@@ -183,6 +182,10 @@ class DecisionSettings(Settings):
     """VLM: number of retries after a lost connection, status 429 or a server error. Default: 4."""
     tell_of_change: bool = False
     """Tell the model in every prompt that things may have been moved; the paper's agents are not informed."""
+    goal_input: GoalInput = "text"
+    """Form of the goal for agents: the sentence (text, as in the paper), reference image and category (image), or both.
+
+    image and both need a model that sees: looks or vlm."""
     noise: dict[str, float] = Field(default_factory=dict)
     """Rates of simulated mistakes, from 0 to 1: wrong, confused, unparsable, refusal, lost; and delay in seconds."""
     eagerness: float = 0.0
@@ -230,12 +233,14 @@ class DecisionSettings(Settings):
 
         if NoiseRates.read(self.noise).confused and not self.asks_rules:
             raise SettingError(type(self), "noise", "confused needs the scores of rules: decision text or looks")
+        if self.goal_input != "text" and (self.kind == "text" or not self.images):
+            raise SettingError(type(self), "goal_input", f"{self.goal_input}: needs looks, or vlm with images")
         if self.kind == "text":
             self._refuse_all_but("model")
         elif self.kind == "looks":
             from evonav.decision.appearance.model import AppearanceMatch
 
-            self._refuse_all_but("model", "eagerness", "mistakes")
+            self._refuse_all_but("model", "eagerness", "mistakes", "goal_input")
             AppearanceMatch(eagerness=self.eagerness, mistakes=self.mistakes)
         elif self.kind == "vlm":
             self._refuse_all_but(*type(self).model_fields.keys() - {"eagerness", "mistakes"})
@@ -244,7 +249,7 @@ class DecisionSettings(Settings):
         elif ":" not in self.kind:
             raise SettingError(type(self), "kind", f"{self.kind}: expected text, looks, vlm or module:name")
         else:
-            self._refuse_all_but("model", "mode", "exchanges", "exchange_images", "tell_of_change")
+            self._refuse_all_but("model", "mode", "exchanges", "exchange_images", "tell_of_change", "goal_input")
         if self.mode == "live" and self.exchanges is not None:
             raise SettingError(type(self), "exchanges", "is of no use with mode live, which stores nothing")
 
@@ -254,13 +259,15 @@ class DecisionSettings(Settings):
         Raises:
             SettingError: No model is named.
         """
-        noise = {"noise": dict(self.noise)} if self.noise else {}
+        changed: dict[str, Any] = {"noise": dict(self.noise)} if self.noise else {}
+        if self.goal_input != "text":  # headers of runs before there was the option mean text
+            changed["goal_input"] = self.goal_input
         if self.kind == "text":
-            return noise
+            return changed
         if self.kind == "looks":
-            return {"eagerness": self.eagerness, "mistakes": self.mistakes, **noise}
+            return {"eagerness": self.eagerness, "mistakes": self.mistakes, **changed}
         if self.kind != "vlm":
-            return {"path": self.kind, "tells_of_change": self.tell_of_change, **noise}
+            return {"path": self.kind, "tells_of_change": self.tell_of_change, **changed}
         from evonav.decision.backends import SAMPLING
 
         model = self.named_model()
@@ -270,7 +277,7 @@ class DecisionSettings(Settings):
         given = _given(temperature=self.temperature, top_p=self.top_p, max_tokens=self.max_tokens)
         request = {**sampling, **given}
         how = {"structured": self.structured, "images": self.images, "tells_of_change": self.tell_of_change}
-        return {"model": model, **how, "request": request, **noise}
+        return {"model": model, **how, "request": request, **changed}
 
     def component(
         self, seed: int, resources: "DecisionResources | None", recorded: Mapping[str, Any] | None = None
@@ -348,61 +355,6 @@ class DecisionSettings(Settings):
             "mode": "auto" if mode == "record" else mode,
             "keeps_images": self.exchange_images,
         }
-
-
-class SpendingSettings(Settings):
-    """Prices of models, and how much may be spent."""
-
-    prices: str | None = None
-    """JSON file of prices in dollars per million tokens: {"MODEL": {"input_usd": .., "output_usd": ..}}."""
-    max_cost: float | None = Field(default=None, gt=0.0)
-    """Largest cost in dollars; later questions fail. It needs prices. Default: no limit."""
-
-    def price(self, model: str) -> "Price | None":
-        """Return a model's price; `None` without a file of prices.
-
-        Raises:
-            InvalidArgumentError: The file cannot be read, or lacks the model.
-        """
-        from evonav.decision.vlm.account import read_prices
-
-        if self.prices is None:
-            return None
-        table = read_prices(Path(self.prices))
-        if model not in table:
-            raise InvalidArgumentError(f"{self.prices}: has no prices of {model!r}")
-        return table[model]
-
-    def host_options(self, model: str) -> dict[str, Any]:
-        """Return the keyword arguments of a decision model that asks `model`."""
-        price = self.price(model)
-        if self.max_cost is not None and price is None:
-            raise SettingError(
-                type(self),
-                "max_cost",
-                "needs the model's prices: name a file with --prices (in a sweep file: prices = ...)",
-            )
-        spending: dict[str, Any] = {} if price is None else {"price": [price.input_usd, price.output_usd]}
-        return spending if self.max_cost is None else {**spending, "max_cost_usd": self.max_cost}
-
-
-@dataclass(frozen=True, slots=True)
-class DecisionResources:
-    """The files in which a run stores answers of its model and logs their costs."""
-
-    run_dir: Path
-    """Folder of the run, which holds the answers unless the settings name another file."""
-    spending_log: Path
-    """File in which all workers log costs, of one run or of several."""
-    spending: SpendingSettings
-    account: str | None = None
-    """Name in the spending log; default: the model's."""
-    num_workers: int = 1
-
-    @classmethod
-    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_workers: int) -> "DecisionResources":
-        """Return the resources of a run that has a spending log of its own."""
-        return cls(run_dir, run_dir / LEDGER_NAME, spending, num_workers=num_workers)
 
 
 def _is_silent_on_change(recorded: Mapping[str, Any], path: str) -> bool:
