@@ -189,12 +189,17 @@ def test_a_second_look_deletes_a_table_whose_absence_the_first_could_not_tell():
     assert abs(math.remainder(second - first, math.tau)) >= math.radians(58.0)  # the planner ends within a step
 
 
-def test_a_second_look_finds_what_the_first_could_not_see():
+def test_a_second_look_finds_what_the_first_could_not_see(monkeypatch):
+    kept, aim = [], Navigator.aim
+    monkeypatch.setattr(Navigator, "aim", lambda self: kept.append(self.target.keeps_place) or aim(self))
     agent = FailThenUpdateRelook()
-    hide_arrivals(agent, 3, 1)
+    poses = hide_arrivals(agent, 3, 1)
     static = (stage_case(1, "GarbageCan|1"), stage_case(2, "Fridge|1"), stage_case(3, "DiningTable|1"))
     last = run(agent, *static)[2]
+    assert len(poses) == 2
     assert relooks_of(last) == (1, 1, 0, 0, 0)
+    assert kept == sorted(kept)  # on the way to the second place it is kept, and never before
+    assert kept[-1]
     assert (last.stop_reason, last.trace[-1].counters["rejected_entries"]) == ("verified", 0)
     assert last.state is EndState.SUCCESS
 

@@ -34,8 +34,9 @@ class FailThenUpdateConfig(FrontierUpdateConfig):
     """A safeguard: an entry that was rejected this often at one place in a stage is no candidate for the rest of it.
     `None`: it is offered again."""
     relook: RelookConfig | None = None
-    """Where neither detections nor depth tell whether the object is there, look once more from another side before the
-    question is asked, at most once an entry and stage. `None`: never."""
+    """Conditions of a second look, from another side, before the question is asked; `None` for no such look.
+
+    It is offered where neither detections nor depth tell whether the object is there, once an entry and stage."""
 
 
 class FailThenUpdate(FrontierUpdate):

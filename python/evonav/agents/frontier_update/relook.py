@@ -31,7 +31,7 @@ class RelookConfig:
 
 @dataclass(frozen=True, slots=True)
 class FirstLook:
-    """What was in view at the place of an entry when this did not tell whether its object is there."""
+    """Views at the place of an entry that did not tell whether its object is there."""
 
     entry_id: int
     views: tuple[View, ...]
