@@ -118,6 +118,14 @@ def test_a_node_takes_three_detections_and_is_related_to_every_other():
     assert graph.type_of(3) == "Desk"
 
 
+def test_windows_have_a_word_in_the_scene_graph_and_doors_have_none():
+    graph = ObjectGraph()
+    for _ in range(3):
+        graph.update(wall_of(["Doorway", "Window", "Doorframe"]))
+    assert [(one.caption, graph.type_of(one.id)) for one in graph.nodes] == [("windows", "Window")]
+    assert not {"Doorway", "Doorframe", "Window"} & CATEGORY_OF_TYPE.keys(), "none triggers a goal"
+
+
 def test_without_an_answer_the_pairs_get_no_edge():
     graph = ObjectGraph()
     pairs = [graph.update(wall_of(["Chair", "Sofa"])) for _ in range(3)][-1]

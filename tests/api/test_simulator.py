@@ -9,6 +9,7 @@ import pytest
 import evonav
 from evonav import Action, Pose
 from evonav.errors import HouseError, InvalidArgumentError, SimulationError
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.embedded import EmbeddedSimulator
 
 
@@ -85,12 +86,22 @@ def test_a_look_is_a_view_that_maps_take(simulator: evonav.Simulator) -> None:
     assert view.rgb is not None
     assert view.rgb.shape == (300, 300, 3)
     assert simulator.look(rgb=False).rgb is None
-    assert {entry.label for entry in objects.entries} <= {found.category for found in simulator.objects}
+    known = {found.category for found in simulator.objects} | {*STRUCTURE_TYPES}
+    assert {entry.label for entry in objects.entries} <= known
     assert repr(objects).startswith(f"ObjectMap({len(objects)} entries, ")
     assert f"{int((cells.cells == 1).sum())} free" in repr(cells)
     assert "labels=(" in repr(view)
     assert "array" not in repr(view)
     assert repr(objects.entries[0]).startswith(f'ObjectEntry(id={objects.entries[0].id}, label="')
+
+
+def test_paths_lead_to_all_that_a_look_may_report(simulator: evonav.Simulator) -> None:
+    for body in simulator.embedded.objects:
+        if body.kind in ("door", "window"):
+            end = simulator.path_to(body.id)[-1]
+            nearest_m = [max(0.0, abs(end[i] - body.centre_m[i]) - body.size_m[i] / 2) for i in (0, 2)]
+            assert math.hypot(*nearest_m) < 1.5
+    assert len(simulator.path_to("Doorway")) > 0
 
 
 def test_paths_lead_to_the_nearest_object(simulator: evonav.Simulator) -> None:

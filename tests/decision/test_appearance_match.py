@@ -162,3 +162,24 @@ def test_its_name_and_options_are_in_the_header() -> None:
     component = DecisionSettings(kind="looks", mistakes=0.5).component(0, None)
     assert component.path == "evonav.decision.backends:appearance_match"
     assert component.options == {"eagerness": 0.0, "mistakes": 0.5}
+
+
+def window_odds(text: str, *others: ObjectCandidate, known_share: float = 1.0) -> list[float]:
+    """Return the probabilities of a mug whose views show what is beside it, and of one whose views show nothing."""
+    mugs = [
+        mug(1, 0.0, appearance_of("red", tuple(other.entry_id for other in others), known_share)),
+        mug(2, 5.0, appearance_of("red", (), known_share)),
+    ]
+    return AppearanceMatcher().posterior(parse_goal(f"Find the {text}."), mugs, [*mugs, *others], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "label"),
+    [("mug near the window", "Window"), ("mug near the doorway", "Doorframe"), ("mug by a door", "Doorway")],
+)
+def test_doors_and_windows_count_where_the_views_of_an_object_show_them(text: str, label: str) -> None:
+    beside = ObjectCandidate(11, label, (0.3, 1.5, 0.4), (1.0, 1.0, 0.1), 9)
+    by_it, away = window_odds(text, beside)
+    assert (by_it, away) == pytest.approx((0.75, 0.25))
+    assert window_odds(text) == [0.5, 0.5], "an agent that remembers none cannot tell"
+    assert window_odds(text, beside, known_share=0.5)[1] > away, "nor one that does not know the place"

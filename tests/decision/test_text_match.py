@@ -148,3 +148,46 @@ def test_every_question_answers_by_a_rule_of_its_own():
     assert (reply.answer, reply.text) == (True, "yes\nas always")
     with pytest.raises(DecisionError, match="no rule for Unruled: ask a model"):
         TextMatch().answer(Unruled(MUG_GOAL, MUG_ON_TABLE, [], 0.1))
+
+
+DOOR = thing(20, "Doorway", 6.3, 2.6, y=1.0, size=(1.0, 2.0, 0.1), seen=50)
+WINDOW = thing(21, "Window", 2.0, 2.8, y=1.5, size=(1.0, 1.0, 0.1), seen=50)
+FRAME = thing(22, "Doorframe", 2.0, 1.2, y=1.0, size=(1.0, 2.0, 0.1), seen=50)
+
+
+def share(text, mug, *around):
+    matcher = Matcher()
+    return matcher.relation_share(matcher.parsed(goal(f"Find the mug {text}.", "Mug")), mug, [*ALL, *around])
+
+
+@pytest.mark.parametrize(
+    ("text", "structure", "near"),
+    [
+        ("near the doorway", DOOR, MUG_ON_COUNTER),
+        ("near a door", FRAME, MUG_ON_TABLE),
+        ("near the window", WINDOW, MUG_ON_TABLE),
+        ("by the windows", WINDOW, MUG_ON_TABLE),
+    ],
+)
+def test_a_doorway_or_a_window_is_judged_once_one_is_remembered(text, structure, near):
+    far = MUG_ON_TABLE if near is MUG_ON_COUNTER else MUG_ON_COUNTER
+    assert share(text, near) == share(text, far) == 1.0, "an agent that remembers none cannot tell"
+    assert share(text, near, structure) == 1.0
+    assert share(text, far, structure) == 0.0
+
+
+def test_a_corner_is_never_judged():
+    assert share("in a corner", MUG_ON_TABLE, DOOR, WINDOW) == 1.0
+    assert share("on the countertop, in a corner", MUG_ON_TABLE, DOOR, WINDOW) == 0.0
+
+
+def test_doors_and_windows_are_no_candidates_and_no_hints():
+    stage = goal("Please navigate to the mug near the doorway and the window.", "Mug")
+    structures = [DOOR, WINDOW, FRAME]
+    parsed = Matcher().parsed(stage)
+    assert [Matcher().label_score(parsed, one.label) for one in structures] == [0.0] * 3
+    model, asked = question([*structures, FRIDGE], stage=stage)
+    with pytest.raises(AnswerError, match="nothing to go to"):
+        model.answer(asked)
+    for frontier in (NEAR, FAR):
+        assert Matcher().frontier_cost_m(parsed, frontier, structures) == frontier.travel_m

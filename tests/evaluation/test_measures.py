@@ -66,6 +66,16 @@ def test_memory_is_told_as_precision_and_recall():
     assert (blank.precision, blank.recall, blank.num_entries) == (None, None, 0)
 
 
+def test_entries_of_doors_and_windows_are_in_no_measure_of_memory():
+    structures = (entry("Window"), entry("Doorway", is_stale=True), entry("Doorframe"))
+    entries = (entry(), entry(is_stale=True))
+    alone, among = (
+        metrics_of(made_up_record(entries=shown, memory_at_end=memory())) for shown in (entries, structures + entries)
+    )
+    assert (among.num_entries, among.num_stale_entries, among.precision) == (2, 1, 0.5)
+    assert among == alone
+
+
 @pytest.mark.parametrize(
     ("has_stopped", "is_visible", "box_m", "expected"),
     [(True, True, 1.0, True), (True, True, 1.01, False), (False, True, 0.5, False), (True, False, 0.5, False)],

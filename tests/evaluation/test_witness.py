@@ -162,3 +162,25 @@ def test_what_a_simulator_draws_of_a_thing_is_where_its_place_is_shown(yaw_deg, 
         seen = frame(depth_m=0.1, pose=pose)
         seen.depth_m[row, col] = 2.0
         assert shows_place(seen, EntryBelief(1, "Cup", tuple(point.tolist()), (0.01, 0.01, 0.01), 1))
+
+
+def test_entries_of_doors_and_windows_count_nowhere():
+    bodies = [*MUGS, body("d", "Doorway", 0.0, 4.0, kind="door"), body("w", "Window", 1.0, 4.0, kind="window")]
+    structures = [belief("Doorway", 0.0, 4.0), belief("Window", 1.0, 4.0), belief("Doorframe", 8.0, 8.0, entry_id=7)]
+    so_far = TrackedState()
+    seen_by = witness(bodies, so_far)
+    mugs = [belief("Mug", 0.3, 2.0), belief("Mug", 3.0, 3.0, entry_id=5)]
+    start = seen_by.begin([*structures, *mugs])
+    assert (start.num_entries, start.num_right, start.num_held) == (2, 1, 1)
+    assert seen_by.stale_ids([*structures, *mugs]) == [5]
+    assert [entry.label for entry in seen_by.stale_entries()] == ["Mug"]
+    seen_by.begin_round(0)
+    seen_by.look(frame(instance=4))
+    end, _ = seen_by.end([*structures, *mugs])
+    assert (end.num_entries, end.num_right, end.num_held, end.num_seen) == (2, 1, 1, 0)
+    assert end.position_error_m == pytest.approx(0.0)
+    assert so_far.beliefs == mugs
+    # The next house: the agent has forgotten the door, which is no loss.
+    after = witness(bodies, so_far)
+    after.begin(mugs)
+    assert after.end(mugs)[1] == 0

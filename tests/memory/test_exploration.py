@@ -9,7 +9,7 @@ import pytest
 
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap, OccupancyMap
-from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import DETECTED_KINDS, GroundTruthPerception
 from evonav.sensors.observation import MapFrame, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.embedded import EmbeddedSimulator
@@ -84,7 +84,7 @@ def test_a_walk_to_the_nearest_frontier_learns_the_house(index: int) -> None:
     known = walker.map.cells
     assert (walker.grid.cells[known == 1] == 0).all()
     assert (walker.grid.cells[known == 2] == 1).all()
-    objects = [body for body in walker.simulator.objects if body.kind == "object"]
+    objects = [body for body in walker.simulator.objects if body.kind in DETECTED_KINDS]
 
     def is_object(label: str, centre_m: tuple[float, float, float]) -> bool:
         return any(body.category == label and math.dist(body.centre_m, centre_m) < 0.8 for body in objects)

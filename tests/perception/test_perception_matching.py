@@ -22,7 +22,7 @@ from evonav.perception_benchmark.matching import (
     same_labels,
     true_objects,
 )
-from evonav.perception_benchmark.rows import check_percept
+from evonav.perception_benchmark.rows import check_percept, scored_percept
 from evonav.sensors.observation import Detections
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
@@ -128,6 +128,20 @@ def test_views_without_objects_or_detections():
         assert (pairs.object_of == NONE).all()
         assert (pairs.detection_of == NONE).all()
         assert (main_objects(truth, told) == NONE).all()
+
+
+def test_reported_doors_and_windows_are_not_scored():
+    there = frame(scene())
+    found = detections(
+        ("Doorway", 0.9, slice(0, 8), slice(0, 8)),  # nothing there, and yet no error
+        ("Sofa", 0.8, slice(10, 20), slice(0, 16)),
+        ("Window", 0.7, slice(0, 3), slice(30, 33)),  # too little of the window for a pair
+    )
+    scored = scored_percept(there, Percept(found, there.depth_m, there.pose)).detections
+    assert scored.labels == ("Sofa",)
+    assert ((scored.masks == 0) == (found.masks == 1)).all()
+    with pytest.raises(InvalidArgumentError, match="`masks`"):
+        scored_percept(there, Percept(replace(found, masks=found.masks + 1), there.depth_m, there.pose))
 
 
 def test_what_a_perception_may_not_tell_is_named():

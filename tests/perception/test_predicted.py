@@ -42,6 +42,7 @@ from evonav.perception.vocabulary import (
 )
 from evonav.sensors.observation import Detections
 from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.tasks.listing import task_files
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, LABEL_TRANSLATION, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
@@ -183,7 +184,8 @@ def test_vocabularies_are_what_they_say() -> None:
     assert types <= set(PROCTHOR_TYPES)
     assert len(SCANNET200) == len(set(SCANNET200)) == 200
     assert {"wall", "floor", "mattress"} <= set(SCANNET200)
-    assert set(TYPE_OF_WORD.values()) <= set(PROCTHOR_TYPES)
+    assert set(TYPE_OF_WORD.values()) <= {*PROCTHOR_TYPES, *STRUCTURE_TYPES}
+    assert [TYPE_OF_WORD[word] for word in ("door", "window", "windows")] == ["Doorway", "Window", "Window"]
     assert [TYPE_OF_WORD[noun] for noun in PROCTHOR_NOUNS] == list(PROCTHOR_TYPES)
     assert type_of_word("Trash cans") == "GarbageCan"
     assert type_of_word("table") is None  # dining, coffee or side
@@ -202,6 +204,7 @@ def test_unigoal_reads_its_own_words_again() -> None:
     )
     kept = relabelled(told, LABEL_TRANSLATION).labels
     assert {"table", "tv", "chair", "sofa", "bed", "plant", "painting", "cabinet", "mirror", "curtain"} <= set(kept)
+    assert "windows" in kept
     assert category_image(told).shape == (1, len(label))
 
 
@@ -214,7 +217,7 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
     ]
     assert predicted_perception().needs_rgb
     assert weights_of("3d-mem", StackConfig(sam="mobile_sam.pt"))["sam"].name == "mobile_sam.pt"
-    assert StackConfig().phrases == PROCTHOR_NOUNS
+    assert StackConfig().phrases == (*PROCTHOR_NOUNS, "door", "window")
     assert StackConfig(vocabulary="Sofa; tv ;sofa").phrases == ("sofa", "tv")
     with pytest.raises(InvalidArgumentError, match="no option 'confidence'; there are vocabulary, min_confidence"):
         predicted_perception(confidence=0.5)

@@ -19,6 +19,7 @@ from evonav.perception.noise.pose_drift import PoseDrift
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections
 from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame
@@ -137,6 +138,19 @@ def test_labels_are_confused_at_the_rate_and_mostly_with_similar_ones() -> None:
     grouped = [both for both in wrong if both[0] in similar]
     alike = [told in similar[truth][0] for truth, told in grouped]
     assert 0.85 < np.mean(alike) < 0.97
+
+
+def test_doors_and_windows_are_missed_and_confused_and_nothing_is_taken_for_one() -> None:
+    _, pairs = rates(confusion_rate=1.0, confusion_similar=1.0)
+    told = {both for truth, told in pairs for both in zip(truth.labels, told.labels, strict=True)}
+    assert {wrong for true, wrong in told if true == "Doorway"} == {"Doorframe"}
+    assert {wrong for true, wrong in told if true == "Window"} == {"Painting"}
+    _, pairs = rates(confusion_rate=0.5, confusion_similar=0.0, false_positives_per_view=2.0)
+    for truth, seen_as in pairs:
+        assert all(seen_as.labels.count(kind) <= truth.labels.count(kind) for kind in STRUCTURE_TYPES)
+    is_found, _ = rates(miss_rate=0.5)
+    is_structure = np.tile([label in STRUCTURE_TYPES for truth, _, _ in truths() for label in truth.labels], 3)
+    assert 0.35 < is_found[is_structure].mean() < 0.65
 
 
 def test_nothing_is_taken_for_something_at_the_rate_and_again_where_it_was() -> None:

@@ -12,12 +12,13 @@ import numpy as np
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.text.language import canonical
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
 from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
-from evonav.sensors.observation import MapFrame, Observation
+from evonav.sensors.observation import MapFrame, Observation, View
 
 KNOWN_RADIUS_M = 1.0
 """Radius around an entry within which `Appearance.known_share` counts cells."""
@@ -35,6 +36,8 @@ class NavigatorConfig:
     """The place to stand is chosen again when the middle of the entry has shifted by more than this."""
     image_px: int = 360
     """Longest edge of an image in a prompt."""
+    background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "door", "rug", "bath mat")
+    """Nouns of what is not remembered: 3D-Mem's list, which has doors and not windows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,7 @@ class Navigator:
             keeps_layouts: True to keep, with `names_colours`, what surrounds objects in views, too.
         """
         self.config = config
+        self._background = frozenset(canonical(noun) for noun in config.background)
         self._names_colours = names_colours
         self.explorer = Explorer(map_frame, config.explorer)
         self.objects = ObjectMap(config.objects)
@@ -84,14 +88,14 @@ class Navigator:
         self.objects.begin_stage(stage)
 
     def observe(self, observation: Observation) -> bool:
-        """Integrate a round's views: entries first, then cells and frontiers.
+        """Integrate a round's views, without background: entries first, then cells and frontiers.
 
         Returns:
             Whether the views contradicted the map, which then holds this round's views alone; the target is dropped.
         """
         self.round += 1
         self.round_views = []
-        for view in observation.views:
+        for view in self.without_background(observation).views:
             update = self.objects.update(view)
             self.views.follow(update.merged)
             self.round_views.append(self.views.add(view, update.entry_ids, stage=self.stage, round_=self.round))
@@ -101,6 +105,15 @@ class Navigator:
             self.target = None
             self._first_map_view = self.round_views[0].id
         return is_outdated
+
+    def without_background(self, observation: Observation) -> Observation:
+        """Return an observation without the detections that are not remembered."""
+        return replace(observation, views=tuple(self._without_background(view) for view in observation.views))
+
+    def _without_background(self, view: View) -> View:
+        labels = view.detections.labels
+        left = [index for index, label in enumerate(labels) if canonical(label) not in self._background]
+        return view if len(left) == len(labels) else replace(view, detections=view.detections.taken(left))
 
     def _follow(self, removed: Sequence[int]) -> None:
         """Follow the target's entry if it was merged into another; drop the target if the entry was removed."""

@@ -14,7 +14,7 @@ from evonav.api.loading import load_houses
 from evonav.drawing.pictures import Picture, house_picture
 from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.evaluation.episode.sensors import map_frame
-from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import DETECTED_KINDS, GroundTruthPerception
 from evonav.sensors.observation import MapFrame, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.appearance import Change, Colors, Lighting, Materials
@@ -162,7 +162,7 @@ class Simulator:
 
         Args:
             target: The category of an object, of which the nearest is taken, the id of an object, or a point `(x, z)`
-                or `(x, y, z)`.
+                or `(x, y, z)`. Doors and windows are found as objects are.
 
         Returns:
             `(M, 3)` corners `(x, y, z)` in metres. It ends beside the object, in its room, or at the free point nearest
@@ -265,8 +265,8 @@ class Simulator:
         return (x_m, y_m, z_m)
 
     def _found(self, name: str) -> list[SceneObject]:
-        """Return the objects of a category, or the one with an id."""
-        objects = self.objects
+        """Return the objects, doors or windows of a category, or the one with an id."""
+        objects = [body for body in self.embedded.objects if body.kind in DETECTED_KINDS]
         found = [one for one in objects if name in (one.id, one.category)]
         if not found:
             categories = sorted({one.category for one in objects})

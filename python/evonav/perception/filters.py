@@ -20,8 +20,8 @@ class FilterConfig:
 
     reference_px: tuple[int, int] = (1280, 1280)
     """Height and width of the images for which the values in pixels are meant."""
-    background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "door", "rug", "bath mat")
-    """Labels that are no objects."""
+    background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "rug", "bath mat")
+    """Labels that are no objects. 3D-Mem's list has `door` as well, which its agent drops (`NavigatorConfig`)."""
     min_area_fraction: float = 0.001
     """Smallest part of the image that a mask covers."""
     min_confidence: float = 0.4

@@ -12,6 +12,9 @@ from evonav.perception.perception import Percept, StageScene
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame, SceneObject
 
+DETECTED_KINDS = ("object", "door", "window")
+"""Kinds of bodies that are detected; what the house is built of otherwise is background to every agent."""
+
 
 @dataclass(slots=True)
 class GroundTruthPerception:
@@ -46,7 +49,9 @@ class GroundTruthPerception:
         """Return `None`: ground truth has no features."""
 
     def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
-        """Return the objects in a frame; walls, floors, ceilings, doors and windows are background.
+        """Return the objects, doors and windows in a frame; walls, floors and ceilings are background.
+
+        The mask of a door is its frame and its leaf, that of a window its frame and its pane.
 
         Detections are numbered anew in every frame, in the order of their first pixel: neither numbers nor their
         order tell which instance a detection is.
@@ -56,7 +61,8 @@ class GroundTruthPerception:
             objects: The simulator's bodies, in instance order.
 
         Returns:
-            Detections labelled with ProcTHOR's object type, confidence 1, no features.
+            Detections labelled with ProcTHOR's type (a door's is `Doorway`, or `Doorframe` without a leaf), confidence
+            1, no features.
 
         Raises:
             InvalidArgumentError: The frame has no instances, they are outside `objects`, or a parameter of this
@@ -79,7 +85,7 @@ class GroundTruthPerception:
             raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
         return _core.number_instances(
             frame.instances,
-            np.array([body.kind == "object" for body in objects], np.bool_),
+            np.array([body.kind in DETECTED_KINDS for body in objects], np.bool_),
             min_area_px=self.min_px(frame),
             max_box_fraction=self.max_box_fraction,
         )

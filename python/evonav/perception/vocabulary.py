@@ -4,14 +4,16 @@ from collections.abc import Mapping
 from typing import Literal
 
 from evonav.decision.text.language import canonical
-from evonav.tasks.language import PROCTHOR_TYPES, noun_of, phrases_of
+from evonav.tasks.language import PROCTHOR_TYPES, STRUCTURE_TYPES, noun_of, phrases_of
 from evonav.tasks.vocabulary import MAP_CATEGORIES
 
 VocabularyName = Literal["procthor", "scannet200", "coco-unigoal", "dino-unigoal"]
 
 
 PROCTHOR_NOUNS = tuple(noun_of(kind) for kind in PROCTHOR_TYPES)
-"""Their names in words: what an open-vocabulary detector is asked for if nothing else is said."""
+"""Their names in words."""
+PROCTHOR_WORDS = (*PROCTHOR_NOUNS, "door", "window")
+"""The words that an open-vocabulary detector is asked for if nothing else is said."""
 
 SCANNET200 = phrases_of(
     """
@@ -50,7 +52,7 @@ DINO_UNIGOAL = phrases_of(
 """UniGoal's 15 of the scene graph, three rooms among them."""
 
 VOCABULARIES: Mapping[VocabularyName, tuple[str, ...]] = {
-    "procthor": PROCTHOR_NOUNS,
+    "procthor": PROCTHOR_WORDS,
     "scannet200": SCANNET200,
     "coco-unigoal": COCO_UNIGOAL,
     "dino-unigoal": DINO_UNIGOAL,
@@ -89,7 +91,7 @@ def type_of_word(word: str) -> str | None:
     return _MORE.get(word.lower()) or _TYPE_OF_NOUN.get(canonical(word))
 
 
-_TYPE_OF_NOUN = {canonical(kind): kind for kind in PROCTHOR_TYPES}
+_TYPE_OF_NOUN = {canonical(kind): kind for kind in (*reversed(STRUCTURE_TYPES), *PROCTHOR_TYPES)}
 
 TYPE_OF_WORD: Mapping[str, str] = {
     word: kind

@@ -32,7 +32,7 @@ from evonav.perception_benchmark.records import (
     write_header,
     write_record,
 )
-from evonav.perception_benchmark.rows import Matched, Rows
+from evonav.perception_benchmark.rows import Matched, Rows, scored_percept
 from evonav.perception_benchmark.tour import tour
 from evonav.sensors.observation import Detections
 from evonav.tasks.listing import TaskFile
@@ -245,8 +245,9 @@ def measure_task(
         for number, poses in enumerate(places, start=1):
             frames = [simulator.render(pose, rgb=perception.needs_rgb, instances=True) for pose in poses]
             image_px = frames[0].depth_m.size
-            for frame, percept, pose in zip(frames, perception.perceive(frames), poses, strict=True):
+            for frame, reported, pose in zip(frames, perception.perceive(frames), poses, strict=True):
                 truth = true_objects(frame, objects)
+                percept = scored_percept(frame, reported)
                 matched = rows.add(stage, frame, percept, truth, objects)
                 memory.look(frame, percept, truth)
                 if has_picture and stage == 1:

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from evonav.perception_benchmark.records import (
     PoseRows,
     TrueRows,
 )
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import Frame, SceneObject
 
 MAX_FEATURES = 400
@@ -42,6 +43,18 @@ class Matched:
 
     found: Matches
     located: Matches
+
+
+def scored_percept(frame: Frame, percept: Percept) -> Percept:
+    """Return a percept without the doors and windows that it reports, which are not scored.
+
+    Raises:
+        InvalidArgumentError: See `check_percept`.
+    """
+    check_percept(frame, percept)
+    found = percept.detections
+    scored = [index for index, label in enumerate(found.labels) if label not in STRUCTURE_TYPES]
+    return replace(percept, detections=found.taken(scored))
 
 
 def check_percept(frame: Frame, percept: Percept) -> None:
@@ -80,12 +93,7 @@ class Rows:
     def add(
         self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: Sequence[SceneObject]
     ) -> Matched:
-        """Add a view of a stage's house; `objects` are the simulator's bodies, in instance order.
-
-        Raises:
-            InvalidArgumentError: See `check_percept`.
-        """
-        check_percept(frame, percept)
+        """Add a scored percept of a view of a stage's house; `objects` are the simulator's bodies, in order."""
         found = percept.detections
         ious = intersections_over_union(truth, found)
         matched = Matched(

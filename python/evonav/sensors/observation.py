@@ -1,5 +1,6 @@
 """An agent's input in a decision round, without simulator ids and oracle data."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,20 @@ class Detections:
     """`(N,)` confidences, 0 to 1."""
     features: NDArray[np.float32] | None = field(default=None, repr=False)
     """`(N, D)` unit image features (CLIP), if the perception computes them."""
+
+    def taken(self, indices: Sequence[int]) -> "Detections":
+        """Return some of the detections, numbered anew in the order given; the pixels of the others become -1."""
+        taken = list(indices)
+        if taken == list(range(len(self.labels))):
+            return self
+        numbers = np.full(len(self.labels) + 1, -1, np.int32)  # index -1 finds the last
+        numbers[taken] = np.arange(len(taken), dtype=np.int32)
+        return Detections(
+            masks=numbers[self.masks],
+            labels=tuple(self.labels[index] for index in taken),
+            confidences=self.confidences[taken],
+            features=None if self.features is None else self.features[taken],
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,3 +110,8 @@ PROCTHOR_TYPES = phrases_of(
     """
 )
 """ProcTHOR's types of objects; doors, windows and what the house is built of are none."""
+
+STRUCTURE_TYPES = ("Doorway", "Doorframe", "Window")
+"""ProcTHOR's types of doors, with and without a leaf, and of windows: they are detected, never move, and are no goals.
+
+Instructions call both types of doors a doorway."""

@@ -6,6 +6,7 @@ agent; docs/agents.md gives the number of goals that this excludes.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,11 +83,12 @@ LABEL_OF_TYPE: dict[str, str] = {
     "Curtains": "curtain",
     "ShowerCurtain": "curtain",
     "Painting": "painting",
+    "Window": "windows",
 }
 """The scene graph's labels (Grounding-DINO with a fixed list of 15).
 
-Five of them are not used: `windows` are background in our perception, `kitchen`, `bedroom` and `living room` are not
-objects, and `picture` means the same as `painting`.
+Four of them are not used: `kitchen`, `bedroom` and `living room` are not objects, and `picture` means the same as
+`painting`. Doors have no label in it.
 """
 
 LABEL_TRANSLATION: dict[str, str] = {**{label: label for label in LABEL_OF_TYPE.values()}, **LABEL_OF_TYPE}
@@ -101,18 +103,8 @@ def relabelled(detections: Detections, translation: Mapping[str, str]) -> Detect
         translation: The detector's label by label; a label without one is not detected.
     """
     detected = [index for index, label in enumerate(detections.labels) if label in translation]
-    if len(detected) == len(detections.labels):
-        masks = detections.masks
-    else:
-        renumbered = np.full(len(detections.labels) + 1, -1, np.int32)  # index -1 finds the last
-        renumbered[detected] = np.arange(len(detected), dtype=np.int32)
-        masks = renumbered[detections.masks]
-    return Detections(
-        masks=masks,
-        labels=tuple(translation[detections.labels[index]] for index in detected),
-        confidences=detections.confidences[detected],
-        features=None if detections.features is None else detections.features[detected],
-    )
+    found = detections.taken(detected)
+    return replace(found, labels=tuple(translation[label] for label in found.labels))
 
 
 def category_image(detections: Detections) -> NDArray[np.int32]:

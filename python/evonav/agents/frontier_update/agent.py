@@ -11,6 +11,7 @@ from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
+from evonav.decision.text.language import is_structure
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
@@ -127,8 +128,8 @@ class FrontierUpdate(NavigatorAgent):
         return [remembered[index] for index in order if self._is_offered(entries[index])]
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
-        """Return whether an entry may be a candidate."""
-        return True
+        """Return whether an entry may be a candidate: a window never is."""
+        return not is_structure(entry.label)
 
     def _without_candidates(self, observation: Observation) -> AgentAction:
         """Act when there is nothing to ask about: neither entries nor frontiers."""

@@ -159,12 +159,12 @@ class FailThenUpdate(FrontierUpdate):
     def _is_offered(self, entry: ObjectEntry) -> bool:
         limit = self._verification.hide_after_rejections
         if limit is None:
-            return True
+            return super()._is_offered(entry)
         times = sum(
             label == entry.label and math.dist(centre_m, entry.centre_m) <= SAME_PLACE_M
             for _, label, centre_m in self._rejected
         )
-        return times < limit
+        return times < limit and super()._is_offered(entry)
 
 
 class FailThenUpdateRelook(FailThenUpdate):

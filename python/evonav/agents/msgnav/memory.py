@@ -34,6 +34,7 @@ class GraphMemory:
     def observe(self, observation: Observation) -> None:
         """Integrate a round's views: entries, map and frontiers, then the graph."""
         navigator, graph = self.navigator, self.graph
+        observation = navigator.without_background(observation)
         navigator.observe(observation)
         became = {entry_id: navigator.views.resolve(entry_id) for entry_id in graph.entry_ids}
         graph.follow({old: new for old, new in became.items() if old != new})

@@ -17,7 +17,7 @@ from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesNoQuestion, first_line, lines_of
-from evonav.decision.text.language import ParsedGoal, canonical, similarity
+from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher, gap_m
 from evonav.decision.text.ranking import rank_entries
 from evonav.tasks.public import Goal
@@ -80,7 +80,7 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
 
     def alternatives(self, answer: tuple[int, ...]) -> Sequence[tuple[int, ...]]:
         """Return each other object alone."""
-        return [(node.entry_id,) for node in self.objects if (node.entry_id,) != answer]
+        return [(node.entry_id,) for node in _things(self.objects) if (node.entry_id,) != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[int, ...], str]:
         """Select the entries that the instruction mentions; then others, one a label, none beside a selected one."""
@@ -91,7 +91,9 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
         chosen: list[int] = []
         labels: set[str] = set()
         covered: set[int] = set()
-        for index in rank_entries(matcher, self.goal, candidates, self.position_m):
+        ranked = rank_entries(matcher, self.goal, candidates, self.position_m)
+        # A door is shown with what is beside it, and helps little by itself.
+        for index in [i for i in ranked if not is_structure(candidates[i].label)] or ranked:
             node = self.objects[index]
             label = canonical(node.candidate.label)
             is_mentioned = matcher.label_score(goal, node.candidate.label) > 0.0
@@ -179,7 +181,7 @@ class GraphQuestion(Question[GraphChoice]):
 
     def alternatives(self, answer: GraphChoice) -> Sequence[GraphChoice]:
         """Return every other object, and exploration."""
-        choices = [*(GraphChoice("object", node.entry_id) for node in self.objects), GraphChoice("explore")]
+        choices = [*(GraphChoice("object", node.entry_id) for node in _things(self.objects)), GraphChoice("explore")]
         return [choice for choice in choices if choice != answer]
 
     def _past_line(self, choice: PastChoice) -> str:
@@ -254,6 +256,11 @@ class GraphQuestion(Question[GraphChoice]):
             return None
         _, number, label = max(found)
         return GraphChoice("image", -number, canonical(label))
+
+
+def _things(objects: Sequence[GraphObject]) -> list[GraphObject]:
+    """Return the objects that can be goals: doors and windows are in the graph for what is beside them."""
+    return [node for node in objects if not is_structure(node.candidate.label)]
 
 
 def _object_line(node: GraphObject) -> str:

@@ -12,6 +12,7 @@ from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, Snapsh
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.question import DecisionModel
+from evonav.decision.text.language import is_structure
 from evonav.memory.views import crop_of, pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
@@ -102,7 +103,8 @@ class ThreeDMem(NavigatorAgent):
     def _surviving(self, remembered: Mapping[int, ObjectCandidate]) -> list[Snapshot]:
         """Return the snapshots with objects of the useful classes, without other objects."""
         snapshots = self._snapshots.snapshots
-        names = sorted({remembered[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids})
+        labels = {remembered[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids}
+        names = sorted(label for label in labels if not is_structure(label))  # a window is never the goal
         useful: tuple[str, ...] = ()
         if names:
             answer = self._queries.ask(PrefilterQuestion(self._goal, names, self.config.max_classes))

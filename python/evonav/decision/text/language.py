@@ -13,7 +13,7 @@ from itertools import zip_longest
 from typing import Literal
 
 from evonav.memory.colours import Layout
-from evonav.tasks.language import COLOURS, MATERIALS, PROCTHOR_TYPES, SHAPES, SIZES, noun_of, plural_of
+from evonav.tasks.language import COLOURS, MATERIALS, PROCTHOR_TYPES, SHAPES, SIZES, STRUCTURES, noun_of, plural_of
 
 RelationKind = Literal["in", "on", "near"]
 
@@ -31,6 +31,8 @@ SYNONYMS: dict[str, str] = {
     "counter top": "countertop",
     "counter": "countertop",
     "door": "doorway",
+    "door frame": "doorway",
+    "doorframe": "doorway",
     "dryer": "clothes dryer",
     "dust bin": "garbage can",
     "dustbin": "garbage can",
@@ -74,7 +76,7 @@ _NOUNS = frozenset(
     (
         *(SYNONYMS.get(noun, noun) for noun in (noun_of(kind).lower() for kind in PROCTHOR_TYPES)),
         *ROOMS,
-        *("bathtub", "doorframe", "doorway", "window", "table", "lamp"),
+        *("bathtub", "doorway", "window", "table", "lamp"),
     )
 )
 """ProcTHOR's types and rooms, canonical: common knowledge of the benchmark, used to tell nouns from adjectives."""
@@ -139,6 +141,11 @@ def canonical(phrase: str) -> str:
         if spelling in _NOUNS:
             return spelling
     return noun
+
+
+def is_structure(label: str) -> bool:
+    """Return whether a label names a door or a window: a part of the house, and never a goal."""
+    return canonical(label) in STRUCTURES
 
 
 def _singular(noun: str) -> str:

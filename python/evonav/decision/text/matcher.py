@@ -13,8 +13,7 @@ from typing import TypeVar
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
 from evonav.decision.question import Question, Reply
-from evonav.decision.text.language import ParsedGoal, Relation, canonical, parse_goal, similarity
-from evonav.tasks.language import STRUCTURES
+from evonav.decision.text.language import ParsedGoal, Relation, canonical, is_structure, parse_goal, similarity
 from evonav.tasks.public import Goal
 
 A = TypeVar("A")
@@ -100,7 +99,12 @@ class Matcher:
         return similarity(goal.noun, entry.label) >= self.config.min_similarity
 
     def label_score(self, goal: ParsedGoal, label: str) -> float:
-        """Return 1 for the goal's own label, less for part of it, still less for a related object."""
+        """Return 1 for the goal's own label, less for part of it, still less for a related object.
+
+        Doors and windows score 0 even where they are named: every room has them.
+        """
+        if is_structure(label):
+            return 0.0
         own = similarity(goal.noun, label)
         if own >= self.config.min_similarity:
             return own
@@ -135,12 +139,17 @@ class Matcher:
         return [self.relation_share(goal, candidate, around) for candidate in named]
 
     def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
+        """Return the share of the relations that hold, 1 if there is none.
 
+        A doorway or a window is judged once one is remembered: some agents forget doors, and none knows corners.
         Adjectives do not count: memory has no colours, and an object that is small for its kind may be the
         larger of two that are remembered.
         """
-        judged = [self.holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES]
+        judged = [
+            self.holds(relation, entry, around)
+            for relation in goal.relations
+            if not is_structure(relation.noun) or any(similarity(relation.noun, o.label) >= 1.0 for o in around)
+        ]
         return sum(judged) / len(judged) if judged else 1.0
 
     def holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
@@ -187,8 +196,11 @@ class Matcher:
     def frontier_cost_m(
         self, goal: ParsedGoal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]
     ) -> float:
-        """Return the distance to travel, less the value of a hint: a mentioned object, or the right type of room."""
-        mentioned = {relation.noun for relation in goal.relations if relation.kind != "in"}
+        """Return the distance to travel, less the value of a hint: a mentioned object, or the right type of room.
+
+        Doors and windows are no hints: every room has them.
+        """
+        mentioned = {r.noun for r in goal.relations if r.kind != "in" and not is_structure(r.noun)}
         is_lead = any(
             canonical(other.label) in mentioned
             and math.dist(other.ground_m, frontier.position_m) <= self.config.lead_radius_m

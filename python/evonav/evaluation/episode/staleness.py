@@ -4,6 +4,8 @@ An entry is *stale* unless an object of its label stands within `STALE_MARGIN_M`
 matched to the nearest such object. An object is *seen* once at least `min_visible_px` of its pixels are in a view that
 was taken at most `EVIDENCE_RANGE_M` from it, the range of the paper's object memory. Only what was seen counts against
 an agent.
+
+Doors and windows never move, so entries of them count nowhere here: agents differ in whether they remember them.
 """
 
 import math
@@ -22,6 +24,7 @@ from evonav.evaluation.records.schema import (
     Relocation,
     StaleEntryRecord,
 )
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
 from evonav.world.simulator import Frame, SceneObject
 
@@ -52,6 +55,11 @@ def matched_object(label: str, centre_m: Point3, bodies: Mapping[str, Sequence[S
             if rank < least or nearest is None:
                 nearest, least = body, rank
     return nearest
+
+
+def movable(beliefs: Sequence[EntryBelief]) -> list[EntryBelief]:
+    """Return the entries of objects: those of doors and windows, which never move, are left out."""
+    return [belief for belief in beliefs if belief.label not in STRUCTURE_TYPES]
 
 
 def matched_objects(
@@ -124,7 +132,7 @@ class TrackedState:
     seen_ids: set[str] = field(default_factory=set)
     """Objects seen so far."""
     beliefs: Sequence[EntryBelief] = ()
-    """The agent's entries at the end of the last stage."""
+    """The agent's entries of objects at the end of the last stage."""
 
 
 class StalenessTracker:
@@ -187,6 +195,7 @@ class StalenessTracker:
 
     def begin(self, beliefs: Sequence[EntryBelief]) -> MemoryRecord:
         """Judge the agent's entries as the stage begins."""
+        beliefs = movable(beliefs)
         matches = matched_objects(beliefs, self.bodies)
         earlier = self._so_far.beliefs
         earlier_matches = matches if list(earlier) == list(beliefs) else matched_objects(earlier, self.bodies)
@@ -196,6 +205,7 @@ class StalenessTracker:
 
     def stale_ids(self, beliefs: Sequence[EntryBelief]) -> list[int]:
         """Return the ids of the stale entries."""
+        beliefs = movable(beliefs)
         matches = matched_objects(beliefs, self.bodies)
         return [belief.entry_id for belief, body in zip(beliefs, matches, strict=True) if body is None]
 
@@ -244,6 +254,7 @@ class StalenessTracker:
         Returns:
             The judgement, and the number of objects that were forgotten although they did not move.
         """
+        beliefs = movable(beliefs)
         matches = matched_objects(beliefs, self.bodies)
         self.close(beliefs)
         forgotten = self._matched_before - {body.id for body in matches if body is not None}
@@ -254,7 +265,7 @@ class StalenessTracker:
         self._so_far.seen_ids.update(
             body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen
         )
-        self._so_far.beliefs = beliefs
+        self._so_far.beliefs = movable(beliefs)
 
     def stale_entries(self) -> tuple[StaleEntryRecord, ...]:
         """Return the entries that were stale at the start."""

@@ -15,6 +15,7 @@ from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.failure_causes import cause_of
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
+from evonav.tasks.language import STRUCTURE_TYPES
 
 if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore
@@ -121,7 +122,7 @@ class RecordMetrics:
     """Objects known at the start and not at the end though they stand where they stood."""
 
     num_entries: int | None
-    """Entries in memory at the end."""
+    """Entries of objects in memory at the end; doors and windows, which never move, count in none of these."""
     num_stale_entries: int | None
     """Stale entries in memory at the end."""
     precision: float | None
@@ -247,7 +248,8 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
     found = [(m.seen_round, m.found_round) for m in record.moved_objects]
     # Records of the first runs have no `memory_at_end`, but entries: stale or not is in them.
     has_entries = has_memory or bool(record.entries)
-    num_stale = sum(entry.is_stale for entry in record.entries)
+    entries = [entry for entry in record.entries if entry.label not in STRUCTURE_TYPES]
+    num_stale = sum(entry.is_stale for entry in entries)
     return RecordMetrics(
         **{name: getattr(record, name) for name in _COPIED},
         is_baseline=record.agent in BASELINES,
@@ -280,9 +282,9 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         num_moved_found=sum(there is not None for _, there in found) if has_memory else None,
         rounds_to_find=_mean(b - a for a, b in _whole(found)),
         metres_to_find=_mean(travelled_m[b] - travelled_m[a] for a, b in _whole(found)),
-        num_entries=len(record.entries) if has_entries else None,
+        num_entries=len(entries) if has_entries else None,
         num_stale_entries=num_stale if has_entries else None,
-        precision=1.0 - num_stale / len(record.entries) if record.entries else None,
+        precision=1.0 - num_stale / len(entries) if entries else None,
         recall=_recall(end),
         num_seen_objects=None if end is None else end.num_seen,
         num_duplicates=None if end is None else end.num_right - end.num_held,
