@@ -86,7 +86,7 @@ def test_rules_that_look_draw_by_their_posterior() -> None:
     goal = model.matcher.parsed(GOAL)
     scores = model.matcher.scores(goal, question.objects, question.surroundings, 0.0)
     assert scores == sorted(scores, reverse=True)
-    assert question.look_alikes(Choice("object", 0), model.matcher) == [
+    assert question.namesakes(Choice("object", 0), model.matcher) == [
         (Choice("object", 1), scores[1]),
         (Choice("object", 2), scores[2]),
     ]
@@ -138,8 +138,8 @@ def test_an_object_of_several_snapshots_counts_once_and_is_never_its_own_look_al
     snapshots = [SnapshotCandidate(7, [RIGHT]), SnapshotCandidate(8, [RIGHT, ON_DESK]), SnapshotCandidate(9, [ON_DESK])]
     question = SnapshotQuestion(GOAL, (0.0, 0.0), snapshots, FRONTIERS, [*AROUND, RIGHT, ON_DESK], num_rounds_left=40)
     for place in (SnapshotChoice(0, 0), SnapshotChoice(1, 0)):
-        assert question.look_alikes(place, Matcher()) == [(SnapshotChoice(1, 1), 0.5)]
-    assert [choice for choice, _ in question.look_alikes(SnapshotChoice(2, 0), Matcher())] == [SnapshotChoice(0, 0)]
+        assert question.namesakes(place, Matcher()) == [(SnapshotChoice(1, 1), 0.5)]
+    assert [choice for choice, _ in question.namesakes(SnapshotChoice(2, 0), Matcher())] == [SnapshotChoice(0, 0)]
     assert question.exploring(SnapshotChoice(0, 0), Matcher()) == SnapshotChoice(None, 1)
     assert question.exploring(SnapshotChoice(None, 0), Matcher()) is None
 
@@ -148,7 +148,7 @@ def test_msgnav_does_not_confuse_the_goal_with_what_it_rejected() -> None:
     nodes = [GraphObject(one, "bedroom") for one in (RIGHT, ON_DESK, BY_LAPTOP, *AROUND)]
     past = [PastChoice(0, "object", 3)]
     question = GraphQuestion(GOAL, nodes, [], [], past, round=1, max_rounds=50, num_frontiers=1)
-    assert question.look_alikes(GraphChoice("object", 1), Matcher()) == [(GraphChoice("object", 2), 0.5)]
+    assert question.namesakes(GraphChoice("object", 1), Matcher()) == [(GraphChoice("object", 2), 0.5)]
     assert question.exploring(GraphChoice("object", 1), Matcher()) == GraphChoice("explore")
     assert question.exploring(GraphChoice("explore"), Matcher()) is None
 

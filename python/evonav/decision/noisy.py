@@ -182,7 +182,7 @@ class Noisy:
 
     def _confused(self, question: Question[A], reply: Reply[A], draws: random.Random) -> Reply[A]:
         assert self._matcher is not None, "checked when it was made"
-        rated = question.look_alikes(reply.answer, self._matcher)
+        rated = question.namesakes(reply.answer, self._matcher)
         if rated:
             answers, scores = zip(*rated, strict=True)
             (other,) = draws.choices(answers, scores if any(scores) else None)

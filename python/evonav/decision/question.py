@@ -82,7 +82,7 @@ class Question(ABC, Generic[A]):
         """Return the other valid answers, in a fixed order: those that a mistaken model could give."""
         return ()
 
-    def look_alikes(self, answer: A, matcher: "Matcher") -> Sequence[tuple[A, float]]:
+    def namesakes(self, answer: A, matcher: "Matcher") -> Sequence[tuple[A, float]]:
         """Return the answers that go to other remembered objects of the goal's class, each with the matcher's score.
 
         Args:

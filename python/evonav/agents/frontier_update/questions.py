@@ -75,7 +75,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             *(Choice("frontier", index) for index in range(len(self.frontiers))),
         ]
 
-    def look_alikes(self, answer: Choice, matcher: Matcher) -> Sequence[tuple[Choice, float]]:
+    def namesakes(self, answer: Choice, matcher: Matcher) -> Sequence[tuple[Choice, float]]:
         """Return the other objects with the goal's name."""
         goal = matcher.parsed(self.goal)
         indices = [index for index, one in enumerate(self.objects) if matcher.names_goal(goal, one)]

@@ -193,7 +193,7 @@ class GraphQuestion(Question[GraphChoice]):
         what = "an image that is not shown now" if number is None else f"image {number}"
         return f"Round {choice.round + 1}: chose {what}, {choice.category} - not correct."
 
-    def look_alikes(self, answer: GraphChoice, matcher: Matcher) -> Sequence[tuple[GraphChoice, float]]:
+    def namesakes(self, answer: GraphChoice, matcher: Matcher) -> Sequence[tuple[GraphChoice, float]]:
         """Return the other objects with the goal's name that were not rejected."""
         goal = matcher.parsed(self.goal)
         named = [candidate for candidate in self._not_rejected() if matcher.names_goal(goal, candidate)]

@@ -161,7 +161,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             *(SnapshotChoice(None, index) for index in range(len(self.frontiers))),
         ]
 
-    def look_alikes(self, answer: SnapshotChoice, matcher: Matcher) -> Sequence[tuple[SnapshotChoice, float]]:
+    def namesakes(self, answer: SnapshotChoice, matcher: Matcher) -> Sequence[tuple[SnapshotChoice, float]]:
         """Return the other objects with the goal's name, each in the first snapshot that has it."""
         goal = matcher.parsed(self.goal)
         chosen = None if answer.snapshot is None else self.snapshots[answer.snapshot].objects[answer.index]
