@@ -1,12 +1,20 @@
 """A run that is resumed keeps the style and the camera with which it was begun."""
 
 import math
+from pathlib import Path
 from typing import Literal
 
 import pytest
 from pydantic import ValidationError
 
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import SimulatorSettings
+from evonav.submission.pack import About, pack
+from evonav.submission.packed_setup import packed_setup
+from evonav.submission.verify import verify
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.world.simulator import SimulatorConfig
 
 
@@ -40,3 +48,15 @@ def test_the_camera_of_a_run_is_what_was_asked_for(kind: Literal["embedded", "ai
     assert config.intrinsics.focal_px == pytest.approx(200.0 / math.tan(math.radians(60.0)))
     with pytest.raises(ValidationError, match="hfov_deg"):
         SimulatorSettings(kind=kind, hfov_deg=170.0)
+
+
+def test_a_run_with_another_camera_is_scored_again_with_it(tmp_path: Path) -> None:
+    with bundled_tasks() as folder:
+        tasks = task_files(folder, 1)
+    backend = Backend(simulator=SimulatorSettings(hfov_deg=120.0, width_px=400).component())
+    evaluate(["fu"], tasks, tmp_path / "wide", config=RunConfig(backend=backend), num_workers=0)
+    pack(tmp_path / "wide", tmp_path / "wide.zip", about=About())
+    verdict = verify(tmp_path / "wide.zip", tasks)
+    assert verdict.is_accepted, verdict.checks
+    assert verdict.submission is not None
+    assert packed_setup(verdict.submission).simulator.endswith(":embedded_simulator,width_px=400,hfov_deg=120.0")

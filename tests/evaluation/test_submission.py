@@ -17,9 +17,7 @@ from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
-from evonav.evaluation.run.settings import SimulatorSettings
 from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
-from evonav.submission.packed_setup import packed_setup
 from evonav.submission.rescore import rescore
 from evonav.submission.verify import verify
 from evonav.tasks.listing import TaskFile, task_files
@@ -73,16 +71,6 @@ def test_true_submission_is_accepted_and_has_the_runs_scores(packed: Path, run: 
     assert verdict.submission.about.title == "A title"
     summary = json.loads((run / "summary.json").read_text())
     assert verdict.submission.summary["agents"]["ftu"] == summary["agents"]["ftu"]
-
-
-def test_a_run_with_another_camera_is_scored_again_with_it(tmp_path: Path, tasks: list[TaskFile]) -> None:
-    backend = Backend(simulator=SimulatorSettings(hfov_deg=120.0, width_px=400).component())
-    evaluate(["fu"], tasks, tmp_path / "wide", config=RunConfig(backend=backend), num_workers=0)
-    pack(tmp_path / "wide", tmp_path / "wide.zip", about=About())
-    verdict = verify(tmp_path / "wide.zip", tasks)
-    assert verdict.is_accepted, verdict.checks
-    assert verdict.submission is not None
-    assert packed_setup(verdict.submission).simulator.endswith(":embedded_simulator,width_px=400,hfov_deg=120.0")
 
 
 def test_equal_runs_give_equal_files(packed: Path, run: Path, tmp_path: Path) -> None:

@@ -137,17 +137,17 @@ class Planner:
             corners = self._path_near(target_m)
         return [(float(x), float(z)) for x, _, z in corners]
 
-    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: House, room_id: str) -> list[Point2]:
+    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: House | None, room_id: str) -> list[Point2]:
         """Return corners to the free point of a target's room that is nearest to the target.
 
         Args:
             path_m: Path to the nearest free point of the house, which may lie behind a wall. It is returned if it ends
                 in the room, or if no path leads there.
             target_m: Position of the target.
-            house: House of the stage.
+            house: House of the stage; `None` returns `path_m`, as in runs of earlier versions.
             room_id: Room of the target.
         """
-        if not path_m or house.room_of(*path_m[-1]) == room_id:
+        if house is None or not path_m or house.room_of(*path_m[-1]) == room_id:
             return path_m
         pose = self._simulator.pose
         free_m, _ = _by_distance(_free_cells_m(self._simulator.occupancy()), target_m)

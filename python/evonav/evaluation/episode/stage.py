@@ -191,13 +191,9 @@ class Stage:
 
     def _path_to_target_m(self) -> list[motion.Point2]:
         """Return the planner's path from the agent to the target; empty if there is none."""
-        target = self._stage.target
-        x_m, _, z_m = target.position_m
-        path_m = self._planner.path_m((x_m, z_m))
-        if not self._protocol.reference_in_room:
-            return path_m
-        house = self._spec.parsed_house(self._record.stage)
-        return self._planner.into_room_m(path_m, (x_m, z_m), house, target.room_id)
+        (x_m, _, z_m), planner = self._stage.target.position_m, self._planner
+        house = self._spec.parsed_house(self._record.stage) if self._protocol.reference_in_room else None
+        return planner.into_room_m(planner.path_m((x_m, z_m)), (x_m, z_m), house, self._stage.target.room_id)
 
     def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
         """Count steps from here; without a reference path, the stage has no score."""
