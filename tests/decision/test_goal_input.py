@@ -113,8 +113,9 @@ def test_the_picture_of_a_new_stage_replaces_the_last() -> None:
 
 
 def test_rankings_use_no_feature_of_the_sentence_where_the_image_counts() -> None:
-    entries = [SimpleNamespace(id=number, feature=np.eye(2, dtype=np.float32)[number]) for number in (0, 1)]
     mugs = [mug(0, None), replace(mug(1, None), label="Desk")]
+    features = np.eye(2, dtype=np.float32)
+    entries = [SimpleNamespace(id=n, label=one.label, feature=features[n]) for n, one in enumerate(mugs)]
     seen = SimpleNamespace(goal_feature=entries[1].feature, pose=SimpleNamespace(x_m=0.0, z_m=0.0))
 
     def first(goal_input: GoalInput) -> str:
