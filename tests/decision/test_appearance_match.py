@@ -170,7 +170,7 @@ def window_odds(text: str, *others: ObjectCandidate, known_share: float = 1.0) -
         mug(1, 0.0, appearance_of("red", tuple(other.entry_id for other in others), known_share)),
         mug(2, 5.0, appearance_of("red", (), known_share)),
     ]
-    return AppearanceMatcher().posterior(parse_goal(f"Find the {text}."), mugs, [*mugs, *others], 0.0)
+    return AppearanceMatcher().scores(parse_goal(f"Find the {text}."), mugs, [*mugs, *others], 0.0)
 
 
 @pytest.mark.parametrize(
