@@ -13,7 +13,7 @@ use crate::{
         shader::{
             bends::{Bends, Shades},
             edges::Edges,
-            surface::{Surface, Wide, high},
+            surface::{Pair, Surface, Wide, products, wide},
         },
     },
     world::mesh::SceneMesh,
@@ -158,17 +158,18 @@ impl Shot<'_> {
         run: Range<usize>,
         colours: &mut [u8],
     ) {
-        let mut start = self.light_at(index, [run.start, row]);
+        let mut start = End::of(self.light_at(index, [run.start, row]));
         for first in run.clone().step_by(LANES) {
             let last = (first + LANES).min(run.end - 1);
-            let end = if last == first { start } else { self.light_at(index, [last, row]) };
+            let end = match last == first {
+                true => start,
+                false => End::of(self.light_at(index, [last, row])),
+            };
             let share = SHARES[last - first];
             let light = self.light_between([first, row], [&start, &end], share);
-            let depth_m = lanes(self.depth_m, first);
-            let scale = if self.rays.horizon_m.is_some() { &[1.0; LANES] } else { depth_m };
-            let middle = (last - first) / 2;
-            let length2 = self.rays.length2([first + middle, row]);
-            let surface = surface.colours([first, row], scale, scale[middle], length2);
+            let surface = surface
+                .plain()
+                .unwrap_or_else(|| self.textured(surface, [first, row], (last - first) / 2));
             let found = respond(&surface, &light, lanes(self.open, first));
             let colours = &mut colours[3 * first..][..3 * LANES + 1];
             for (lane, found) in found.as_chunks::<4>().0.iter().enumerate() {
@@ -180,6 +181,15 @@ impl Shot<'_> {
             }
             start = end;
         }
+    }
+
+    /// Return the colours of a block before they are lit; the face is seen around `middle`.
+    #[inline(always)]
+    fn textured(&self, surface: &Surface, [first, row]: [usize; 2], middle: usize) -> Wide {
+        let depth_m = lanes(self.depth_m, first);
+        let scale = if self.rays.horizon_m.is_some() { &[1.0; LANES] } else { depth_m };
+        let length2 = self.rays.length2([first + middle, row]);
+        surface.colours([first, row], scale, scale[middle], length2)
     }
 
     /// Return the light on a pixel of a face without the sun, by channel, and the share of
@@ -197,9 +207,10 @@ impl Shot<'_> {
     /// # Arguments
     /// * `share` - one over the number of pixels between the places.
     #[inline(always)]
-    fn light_between(&self, pixel: [usize; 2], ends: [&[f32; 4]; 2], share: f32) -> Wide {
-        let smooth = ramp([rooted(ends[0], [0.0; 4]), rooted(ends[1], [0.0; 4])], share);
-        let Some(light) = self.light.filter(|_| ends[0][3] + ends[1][3] > 0.0) else {
+    fn light_between(&self, pixel: [usize; 2], ends: [&End; 2], share: f32) -> Wide {
+        let smooth = ramp(ends.map(|end| end.rooted), share);
+        let slopes = ends.map(|end| end.light[3]);
+        let Some(light) = self.light.filter(|_| slopes[0] + slopes[1] > 0.0) else {
             return smooth;
         };
         let points_m = self.rays.points(pixel, lanes(self.depth_m, pixel[0]));
@@ -207,18 +218,36 @@ impl Shot<'_> {
         if reach == [0.0; LANES] {
             return smooth;
         }
-        let sun = |slope: f32| light.sunlight.map(|channel| channel * slope);
-        let sunny =
-            ramp([rooted(ends[0], sun(ends[0][3])), rooted(ends[1], sun(ends[1][3]))], share);
+        let sunny = ends.map(|end| {
+            rooted(&end.light, light.sunlight.map(|channel| channel * end.light[3]))
+        });
+        let sunny = ramp(sunny, share);
         if reach == [1.0; LANES] {
             return sunny;
         }
-        let mut mixed = [0; 4 * LANES];
-        for (i, mixed) in mixed.iter_mut().enumerate() {
-            let reach = whole(reach[i / 4] * 65535.0);
-            *mixed = smooth[i] + high(sunny[i].saturating_sub(smooth[i]), reach);
-        }
-        mixed
+        let reach = reach.map(|share| whole(share * 65535.0));
+        let (smooth, sunny) = (smooth.as_chunks::<8>().0, sunny.as_chunks::<8>().0);
+        wide(|pair| {
+            let (smooth, sunny) = (smooth[pair], sunny[pair]);
+            let more = std::array::from_fn(|i| sunny[i].saturating_sub(smooth[i]));
+            let more = products(&more, &doubled(&reach, pair));
+            std::array::from_fn(|i| smooth[i] + more[i])
+        })
+    }
+}
+
+/// The light at an end of a block, as from [`Shot::light_at`], and the result of [`rooted`] without
+/// the sun.
+#[derive(Clone, Copy)]
+struct End {
+    light: [f32; 4],
+    rooted: [f32; 4],
+}
+
+impl End {
+    #[inline(always)]
+    fn of(light: [f32; 4]) -> Self {
+        Self { light, rooted: rooted(&light, [0.0; 4]) }
     }
 }
 
@@ -252,11 +281,26 @@ fn ramp([start, end]: [[f32; 4]; 2], share: f32) -> Wide {
         // A negative step is one modulo 2^16.
         step[i] = ((end[i] - start[i]) * share + 12_582_912.0).to_bits() as u16;
     }
-    let mut light = [0; 4 * LANES];
-    for (i, light) in light.iter_mut().enumerate() {
-        *light = first[i % 4].wrapping_add(step[i % 4].wrapping_mul(i as u16 / 4));
-    }
-    light
+    let next: [u16; 4] = std::array::from_fn(|i| first[i].wrapping_add(step[i]));
+    let first = beside(first, next);
+    let twice = beside(step, step).map(|step| step.wrapping_mul(2));
+    wide(|pair| {
+        let num = pair as u16;
+        std::array::from_fn(|i| first[i].wrapping_add(twice[i].wrapping_mul(num)))
+    })
+}
+
+/// Return the channels of two pixels.
+#[inline(always)]
+fn beside([a, b, c, d]: [u16; 4], [e, f, g, h]: [u16; 4]) -> Pair {
+    [a, b, c, d, e, f, g, h]
+}
+
+/// Return the numbers of a pair of pixels, for each of their channels.
+#[inline(always)]
+fn doubled(of_pixels: &[u16; LANES], pair: usize) -> Pair {
+    let (left, right) = (of_pixels[2 * pair], of_pixels[2 * pair + 1]);
+    beside([left; 4], [right; 4])
 }
 
 /// Return the colours of a lit surface as a camera responds to them.
@@ -270,14 +314,19 @@ fn respond(surface: &Wide, light: &Wide, open: &[u16; LANES]) -> [u8; 4 * LANES]
     const LINEAR: u16 = (RESPONSE[1] * ONE / (255.0 * BRIGHT) * 65536.0) as u16;
     const SQUARE: u16 =
         (RESPONSE[2] * ONE * 4096.0 / (255.0 * BRIGHT * 255.0 * BRIGHT) * 65536.0) as u16;
-    let mut colours = [0; 4 * LANES];
-    for i in 0..4 * LANES {
-        let light = high(light[i], open[i / 4]);
-        let bright = high(2 * surface[i], light).min(MOST);
-        let square = high(4 * bright, 4 * bright);
-        let response = (RESPONSE[0] * ONE) as u16 + high(bright, LINEAR) - high(square, SQUARE);
-        let level = high(4 * bright, 2 * response).min(WHITE);
-        colours[i] = ((level + 16) >> 5) as u8;
-    }
-    colours
+    let (surface, light) = (surface.as_chunks().0, light.as_chunks().0);
+    let levels = wide(|pair| {
+        let surface: &Pair = &surface[pair];
+        let light = products(&light[pair], &doubled(open, pair));
+        let bright = products(&surface.map(|colour| 2 * colour), &light);
+        let bright = bright.map(|bright| bright.min(MOST));
+        let fourfold = bright.map(|bright| 4 * bright);
+        let square = products(&products(&fourfold, &fourfold), &[SQUARE; 8]);
+        let linear = products(&bright, &[LINEAR; 8]);
+        let response: Pair =
+            std::array::from_fn(|i| 2 * ((RESPONSE[0] * ONE) as u16 + linear[i] - square[i]));
+        let level = products(&fourfold, &response);
+        level.map(|level| (level.min(WHITE) + 16) >> 5)
+    });
+    levels.map(|level| level as u8)
 }
