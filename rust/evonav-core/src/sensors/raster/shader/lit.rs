@@ -304,7 +304,10 @@ fn doubled(of_pixels: &[u16; LANES], pair: usize) -> Pair {
 }
 
 /// Return the colours of a lit surface as a camera responds to them.
-#[inline(always)]
+///
+/// It is not inlined: compilers would take the blocks, which come from several branches, apart into
+/// single numbers.
+#[inline(never)]
 fn respond(surface: &Wide, light: &Wide, open: &[u16; LANES]) -> [u8; 4 * LANES] {
     const MOST: u16 = (BRIGHTEST * 255.0 * BRIGHT) as u16;
     const WHITE: u16 = (255.0 * BRIGHT) as u16;
