@@ -135,6 +135,13 @@ fn bench_raster(c: &mut Criterion) {
     c.bench_function("light/build", |b| {
         b.iter(|| Light::build(&house, &scene, black_box(&mesh)));
     });
+    c.bench_function("light/load_with_light_100_objects", |b| {
+        b.iter(|| {
+            let (house, scene) = self::house();
+            let mesh = SceneMesh::build(&scene);
+            Light::build(&house, &scene, &mesh)
+        });
+    });
     c.bench_function("raycast3d/build", |b| b.iter(|| RayCaster::build(black_box(&mesh))));
 }
 

@@ -218,9 +218,8 @@ impl Shot<'_> {
         if reach == [0.0; LANES] {
             return smooth;
         }
-        let sunny = ends.map(|end| {
-            rooted(&end.light, light.sunlight.map(|channel| channel * end.light[3]))
-        });
+        let sunny = ends
+            .map(|end| rooted(&end.light, light.sunlight.map(|channel| channel * end.light[3])));
         let sunny = ramp(sunny, share);
         if reach == [1.0; LANES] {
             return sunny;

@@ -56,8 +56,7 @@ impl Surface {
         });
         let per_m2 = skin.axes.map(|axis| axis.iter().map(|a| a * a).sum::<f32>());
         let texels = texture.size() as f32 * pixel;
-        let factor =
-            if skin.material.kind.is_picture() { [factor(NEUTRAL); 8] } else { factors };
+        let factor = if skin.material.kind.is_picture() { [factor(NEUTRAL); 8] } else { factors };
         Self {
             texture: Some(texture),
             coordinates,
