@@ -22,6 +22,7 @@ from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
+from evonav.evaluation.run.settings import SimulatorSettings
 from evonav.perception.shorthand import read_word
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import ComparedAgent
@@ -37,7 +38,7 @@ from evonav.statistics import wilson
 from evonav.tasks.listing import TaskFile, task_files
 
 ROOT = Path(__file__).parents[1]
-PAGES = ROOT / "docs" / "results.md", ROOT / "docs" / "results-perception.md"
+PAGES = tuple(ROOT / "docs" / f"{name}.md" for name in ("results", "results-perception", "decision"))
 PLOT = ROOT / "docs" / "images" / "decision-errors.svg"
 HEADLINE = "noisy:perfect,features=true"
 """Perception of the main runs: true masks and labels, and image features by which entries are ranked, as the paper's
@@ -46,9 +47,12 @@ RATES = (0.0, 0.05, 0.1, 0.2, 0.4)
 """Shares of decisions that are another valid answer than the model's own."""
 RANKING_AGENTS = ("fu", "stage-reset", "ftu")
 """Agents that rank entries by image features, and by labels where there are none."""
+WIDE_AGENTS = ("fu", "3d-mem", "msgnav")
+"""Agents that are also run with the camera of 3D-Mem's and MSGNav's released code, 120 degrees wide."""
 DEPARTURES = (
     *(("our fallback for frontiers", ("plus", f"{agent}+"), ("main", agent)) for agent in ("3d-mem", "msgnav")),
     *(("entries ranked by labels", ("labels", agent), ("main", agent)) for agent in RANKING_AGENTS),
+    *(("a camera of 120 degrees", ("wide", agent), ("main", agent)) for agent in WIDE_AGENTS),
 )
 """What is different, and folder and agent of the runs with and without it."""
 ROOM_GROUPS = ((2, 3), (4, 5), (6, 10))
@@ -64,6 +68,8 @@ def main() -> None:
         run_agents(asked.out / "main", agents, tasks, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "labels", RANKING_AGENTS, tasks, Backend(), asked)
+        wide = Backend(perception=read_word(HEADLINE), simulator=SimulatorSettings(hfov_deg=120.0).component())
+        run_agents(asked.out / "wide", WIDE_AGENTS, tasks, wide, asked)
         for rate in RATES:
             run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
     found = parts(asked.out, agents)
