@@ -229,6 +229,8 @@ def departure_table(out: Path, agents: Sequence[str]) -> Table:
         folders = [
             ComparedAgent(name, load_run(out / name), agent, (i, 0)) for i, (name, agent) in enumerate((ours, theirs))
         ]
+        if any(one.agent not in one.run.agents for one in folders):
+            continue
         (found,) = compare(folders, allow_differences=True)
         part = found.parts[0]
         success, spl = part.effects["success"], part.effects["spl"]

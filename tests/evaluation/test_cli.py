@@ -32,6 +32,16 @@ def test_evaluates_bundled_tasks_and_resumes(tmp_path):
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
 
 
+def test_goes_on_in_a_folder_whose_run_ended_as_its_file_was_created(tmp_path):
+    (tmp_path / "records.sqlite").touch()
+    arguments = ("evaluate", "--agent", "stay-still", "--limit", 1, "--workers", 0, "--out", tmp_path)
+    assert run(*arguments).exit_code == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["agents"]["stay-still"]["counts"]["errored"] == 0
+    (tmp_path / "records.sqlite").write_bytes(b"no database" * 100)
+    refused = run(*arguments)
+    assert "file is not a database" in str(refused.exception)
+
+
 def test_lists():
     agents = run("agents").stdout
     assert all(name in agents for name in ("fu", "stage-reset", "ftu", "shortest-path"))

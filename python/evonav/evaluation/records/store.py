@@ -10,7 +10,7 @@ import shutil
 import sqlite3
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -83,6 +83,22 @@ class FailureRow:
     """Empty where a process was lost."""
     is_retried: bool
     """True if the stage was tried again after it."""
+
+
+def holds_run(run_dir: Path) -> bool:
+    """Return whether a run was begun in a folder; a file without tables is of one that ended as it was created.
+
+    Raises:
+        StoreError: The file cannot be read.
+    """
+    path = run_dir / FILE_NAME
+    if not path.is_file():
+        return False
+    try:
+        with closing(sqlite3.connect(path, timeout=30.0)) as db:
+            return bool(db.execute("SELECT 1 FROM sqlite_master WHERE name = 'meta'").fetchall())
+    except sqlite3.Error as error:
+        raise StoreError(f"{path}: {error}") from error
 
 
 class RunStore:

@@ -13,7 +13,7 @@ from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosti
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
@@ -163,18 +163,18 @@ def evaluate_all(
 
 def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> RunJobs:
     """Claim a run's folder and return the jobs that are left."""
-    request = _as_begun(request)
-    config = request.config
-    hosting = _hosting(request, num_workers)
-    worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
-    # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
-    limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     with RunStore(request.run_dir, create=True) as store:
+        request = _as_begun(request, store)
         _claim(store, request)
         if retry_errored:
             _forget_errored(store, request)
         states = store.states()
         floor_plans = store.floor_plan_keys()
+    config = request.config
+    hosting = _hosting(request, num_workers)
+    worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
+    # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
+    limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
     for task in request.tasks:
         stages = range(1, task.num_stages + 1)
@@ -278,19 +278,16 @@ def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
     Raises:
         StoreError: The run cannot be read.
     """
-    if not (run_dir / FILE_NAME).is_file():
+    if not holds_run(run_dir):
         return None
     with RunStore(run_dir) as store:
         config = store.meta("config")
     return config.get("backend") if isinstance(config, dict) else None
 
 
-def _as_begun(request: RunRequest) -> RunRequest:
+def _as_begun(request: RunRequest, store: RunStore) -> RunRequest:
     """Return a request whose run, where an earlier version began it, keeps that version's reference paths."""
-    if not (request.run_dir / FILE_NAME).is_file():
-        return request
-    with RunStore(request.run_dir) as store:
-        stored = store.meta("config")
+    stored = store.meta("config")
     if stored is None or "reference_in_room" in stored["protocol"]:
         return request
     protocol = replace(request.config.protocol, reference_in_room=False)
