@@ -48,16 +48,18 @@ def main() -> None:
         for agent in asked.agents.split(","):
             for rule in RULES:
                 run_agents(asked.out / rule, [agent], tasks, _backend(rule), asked)
-    text, looks = (load_run(asked.out / rule) for rule in RULES)
+    write_parts(parts(*(load_run(asked.out / rule) for rule in RULES)))
+
+
+def parts(text: RecordedRun, looks: RecordedRun) -> dict[str, str]:
+    """The marked parts of the page, by name; draws the plot."""
     given = {agent: list(last_probabilities(looks, agent)) for agent in looks.agents}
     write_plots([reliability_plot(given)], PLOT)
     picture = f"![Share of stages that succeeded by stated probability](images/{PLOT.name})"
-    write_parts(
-        {
-            "looks": comparison_table(text, looks).markdown(),
-            "looks-probabilities": f"{picture}\n\n{probability_table(given).markdown()}",
-        }
-    )
+    return {
+        "looks": comparison_table(text, looks).markdown(),
+        "looks-probabilities": f"{picture}\n\n{probability_table(given).markdown()}",
+    }
 
 
 def _backend(rule: str) -> Backend:

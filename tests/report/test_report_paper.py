@@ -5,6 +5,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import looks_results
 import numpy as np
 import perception_results
 import pytest
@@ -308,6 +309,9 @@ def test_the_pages_have_every_part_that_the_scripts_write(script, write_run: Wri
     marked = re.findall(r"<!-- results: (\S+) -->", page)
     monkeypatch.setattr(perception_results, "IMAGES", run_dir.parent)
     of_perception = perception_results.parts({"noisy:perfect": load_run(run_dir), "noisy:poor": load_run(run_dir)})
-    assert sorted(marked) == sorted(parts | script.large_parts(run_dir) | of_perception)
+    monkeypatch.setattr(looks_results, "PLOT", run_dir.parent / "looks.svg")
+    of_looks = looks_results.parts(load_run(run_dir), load_run(run_dir))
+    assert sorted(marked) == sorted(parts | script.large_parts(run_dir) | of_perception | of_looks)
+    assert "+0.0" in of_looks["looks"]
     assert "| ftu" in parts["table-1"]
     assert script._source("attr-onav-0001k-val-0100-0003-f47224-s0") == "attr-onav-0001k-val-0100"
