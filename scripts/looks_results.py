@@ -6,14 +6,12 @@ evaluates the agents on all tasks of the folders with `--decision text` and with
 other. Run it again to resume; `--write-only` runs nothing.
 """
 
-import argparse
 import re
 from collections.abc import Callable, Iterable, Mapping
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from results import HEADLINE, ROOT, pooled_tasks, run_agents, write_parts
+from results import HEADLINE, ROOT, pooled_tasks, run_agents, run_parser, write_parts
 
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
@@ -29,6 +27,7 @@ from evonav.report.tables.causes import FailureCause
 from evonav.report.tables.table import Table
 from evonav.statistics import paired_effect, wilson
 
+AGENTS = ("fu", "ftu", "stage-reset", "3d-mem", "msgnav")
 PLOT = ROOT / "docs" / "images" / "looks-reliability.svg"
 EDGES = (0, 50, 60, 70, 80, 90, 101)
 """Bounds of the bins of probabilities, in percent."""
@@ -42,7 +41,7 @@ MEASURES: tuple[tuple[str, Callable[[StageMetrics], float]], ...] = (
 
 def main() -> None:
     """See the module."""
-    asked = _arguments()
+    asked = run_parser(__doc__, AGENTS).parse_args()
     if not asked.write_only:
         tasks = pooled_tasks(asked.tasks)
         for agent in asked.agents.split(","):
@@ -153,17 +152,6 @@ def reliability_plot(given: Mapping[str, list[tuple[float, bool]]]) -> CurvePlot
         is_square=True,
         has_diagonal=True,
     )
-
-
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tasks", nargs="+", required=True, help="folders of tasks, each with an optional :LIMIT")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
-    parser.add_argument("--agents", default="fu,ftu,stage-reset,3d-mem,msgnav")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

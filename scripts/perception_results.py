@@ -9,10 +9,9 @@ version of the code.
 
 import argparse
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
-from results import ROOT, pooled_tasks, run_agents, spread, write_parts
+from results import ROOT, pooled_tasks, run_agents, run_parser, spread, write_parts
 
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentSummary, house_of
@@ -205,17 +204,11 @@ def _backend(word: str) -> Backend:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tasks", nargs="+", required=True, help="folders of tasks, each with an optional :LIMIT")
-    parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
-    parser.add_argument("--agents", default=",".join(PAPER_ORDER))
+    parser = run_parser(__doc__, PAPER_ORDER)
     parser.add_argument(
         "--perceptions", default=";".join(PERCEPTIONS), help="words, with ; between them; the best first"
     )
     parser.add_argument("--houses", type=int, default=40)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
     return parser.parse_args()
 
 

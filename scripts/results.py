@@ -295,18 +295,24 @@ def run_agents(
     evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
 
 
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def run_parser(description: str | None, agents: Sequence[str]) -> argparse.ArgumentParser:
+    """The arguments of all scripts that evaluate agents and write a page."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tasks", nargs="+", required=True, help="folders of tasks, each with an optional :LIMIT")
     parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
-    parser.add_argument("--agents", default=",".join(PAPER_ORDER))
+    parser.add_argument("--agents", default=",".join(agents))
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
+    return parser
+
+
+def _arguments() -> argparse.Namespace:
+    parser = run_parser(__doc__, PAPER_ORDER)
     parser.add_argument("--sweep", type=int, default=30, help="houses of the runs with wrong decisions")
     # UniGoal takes several times as long as the others: to be asked for.
     parser.add_argument("--sweep-agents", default=",".join(PAPER_ORDER[1:]), help="agents of those runs")
     parser.add_argument("--large", type=Path, help="a run of the heuristics over all houses, made by `evonav evaluate`")
-    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
     return parser.parse_args()
 
 
