@@ -158,13 +158,14 @@ class FailThenUpdate(FrontierUpdate):
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
         limit = self._verification.hide_after_rejections
-        if limit is None:
-            return super()._is_offered(entry)
+        is_offered = super()._is_offered(entry)
+        if limit is None or not is_offered:
+            return is_offered
         times = sum(
             label == entry.label and math.dist(centre_m, entry.centre_m) <= SAME_PLACE_M
             for _, label, centre_m in self._rejected
         )
-        return times < limit and super()._is_offered(entry)
+        return times < limit
 
 
 class FailThenUpdateRelook(FailThenUpdate):
