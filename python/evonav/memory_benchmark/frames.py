@@ -1,0 +1,31 @@
+"""What a benchmarked memory is given: a stream of posed RGB-D frames with detections. Nothing here is oracle data."""
+
+from dataclasses import dataclass
+
+from evonav.sensors.observation import View
+from evonav.world.simulator import Intrinsics
+
+
+@dataclass(frozen=True, slots=True)
+class StreamInfo:
+    """What a memory learns before the first frame of a stream."""
+
+    intrinsics: Intrinsics
+    labels: tuple[str, ...]
+    """All labels that detections may have."""
+    rate_hz: float
+    """Frames a second within a visit."""
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryFrame:
+    """One frame of a stream."""
+
+    index: int
+    """0-based number in the stream."""
+    time_s: float
+    """Time since the first frame; between two visits it jumps."""
+    visit: int
+    """1-based number of the visit: things move between visits, and in some streams during them."""
+    view: View
+    """Pose, depth, colours and detections."""

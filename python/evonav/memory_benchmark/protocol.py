@@ -1,0 +1,69 @@
+"""The interface of a benchmarked memory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+
+Point3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryEntry:
+    """One object that a memory believes in."""
+
+    entry_id: int
+    """Number of the entry, the same as long as it stands for the same object."""
+    label: str
+    centre_m: Point3
+    """Centre of its axis-aligned box, world frame."""
+    size_m: Point3
+    """Edges of the box."""
+    confidence: float = 1.0
+    """0 to 1."""
+    p_present: float | None = None
+    """Probability that the object is still there, 0 to 1; `None` for a memory that does not say."""
+    first_seen_s: float | None = None
+    """Time of the first frame that supports the entry."""
+    last_seen_s: float | None = None
+    """Time of the last one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One answer to the question where something is."""
+
+    position_m: Point3
+    score: float
+    """Larger is more certain; only the order counts."""
+
+
+class Memory(Protocol):
+    """A scene memory. It may also have `locate` and `num_bytes`, see `CanLocate` and `CountsBytes`."""
+
+    def reset(self, info: StreamInfo) -> None:
+        """Forget everything: a new stream begins."""
+
+    def visit(self, time_s: float) -> None:
+        """Begin a visit; time has passed, and things may have moved."""
+
+    def observe(self, frame: MemoryFrame) -> None:
+        """Integrate a frame; this is what is timed."""
+
+    def entries(self) -> Sequence[MemoryEntry]:
+        """Return all that the memory believes in now; this is not timed."""
+
+
+class CanLocate(Protocol):
+    """A memory that can be asked where something is."""
+
+    def locate(self, text: str, k: int) -> Sequence[Place]:
+        """Return at most `k` places of what `text` names, the best first; this is timed."""
+
+
+class CountsBytes(Protocol):
+    """A memory that knows its size."""
+
+    def num_bytes(self) -> int:
+        """Return the number of bytes that the memory holds."""
