@@ -28,7 +28,7 @@ def contact_sheet(views: Sequence[PictureView], found: Sequence[Sequence[float]]
             colour = FOUND if confidence > 0.0 else MISSED
             drawing.rectangle((left, top, right - 1, bottom - 1), outline=colour, width=2)
             drawing.text((left + 4, top + 2), f"{truth.type} {confidence:.2f}", fill=colour)
-    return _grid(pictures, max(1, math.ceil(math.sqrt(1.5 * len(pictures)))))
+    return grid(pictures, max(1, math.ceil(math.sqrt(1.5 * len(pictures)))))
 
 
 def paired_sheet(recorded: Sequence[NDArray[np.uint8]], ours: Sequence[NDArray[np.uint8]]) -> Image.Image:
@@ -44,10 +44,11 @@ def paired_sheet(recorded: Sequence[NDArray[np.uint8]], ours: Sequence[NDArray[n
     for index, picture in zip(chosen, ours, strict=False):
         theirs = Image.fromarray(recorded[index]).resize((side_px, side_px), Image.Resampling.BOX)
         pictures += [theirs, Image.fromarray(picture)]
-    return _grid(pictures, 4)
+    return grid(pictures, 4)
 
 
-def _grid(pictures: Sequence[Image.Image], num_cols: int) -> Image.Image:
+def grid(pictures: Sequence[Image.Image], num_cols: int) -> Image.Image:
+    """Return pictures of one size in rows."""
     width, height = pictures[0].width + GAP_PX, pictures[0].height + GAP_PX
     num_rows = math.ceil(len(pictures) / num_cols)
     sheet = Image.new("RGB", (num_cols * width + GAP_PX, num_rows * height + GAP_PX), "white")

@@ -1,11 +1,11 @@
 """Agents against each other and beside the paper: runs them, and writes the marked parts of the pages of results.
 
-    python scripts/results.py --out out/results --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/attr:40
+    python scripts/results.py --out out/results --tasks TASKS/hard TASKS/tiny-val:10 --small TASKS/attr
 
-evaluates all six agents on all tasks of the folders (the first 40 of the last), then agents that depart from the
-originals or from the paper, then five agents on a subset with decisions that go wrong at stated rates, and writes
-tables and a plot. Run it again to resume; `--write-only` runs nothing. A folder of results holds one version of the
-code: give another version another folder.
+evaluates all six agents on all tasks of the folders (the first 10 of the last), and on those of small houses, then
+agents that depart from the originals or from the paper, then five agents on a subset with decisions that go wrong at
+stated rates, and writes tables and a plot. A house may have tasks of several seeds. Run it again to resume;
+`--write-only` runs nothing. A folder of results holds one version of the code: give another version another folder.
 """
 
 import argparse
@@ -66,16 +66,16 @@ def main() -> None:
     subset = spread(tasks, asked.sweep)
     if not asked.write_only:
         run_agents(asked.out / "main", agents, tasks, Backend(perception=read_word(HEADLINE)), asked)
+        if asked.small:
+            small = pooled_tasks(asked.small)
+            run_agents(asked.out / "small", agents, small, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "labels", RANKING_AGENTS, tasks, Backend(), asked)
         wide = Backend(perception=read_word(HEADLINE), simulator=SimulatorSettings(hfov_deg=120.0).component())
         run_agents(asked.out / "wide", WIDE_AGENTS, tasks, wide, asked)
         for rate in RATES:
             run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
-    found = parts(asked.out, agents)
-    if asked.large is not None:
-        found |= large_parts(asked.large)
-    write_parts(found)
+    write_parts(parts(asked.out, agents))
     sys.stdout.write(f"{PLOT}\n")
 
 
@@ -105,6 +105,7 @@ def noisy_backend(rate: float) -> Backend:
 def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plot."""
     run = load_run(out / "main")
+    small = [load_run(folder)] if (folder := out / "small").exists() else []
     behaviour = behaviour_of(run)
     main_table, relocation, far, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
@@ -119,7 +120,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "table-2": relocation.markdown(),
         "table-2-far": far.markdown(),
         "stage-1": first.markdown(),
-        "reweighted": reweighted_table(run, "procthor-10k").markdown(),
+        "reweighted": reweighted_table([run, *small], "procthor-10k").markdown(),
         "order": order.markdown(),
         "differences": differences.markdown(),
         "rooms": room_table(run).markdown(),
@@ -132,20 +133,20 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "counters": counter_table(behaviour).markdown(),
         "effort": effort_table(run).markdown(),
         "errors": errors,
-    }
+    } | (small_parts(small[0]) if small else {})
 
 
-def large_parts(run_dir: Path) -> dict[str, str]:
-    """The marked parts on a run of the heuristics over all houses."""
-    run = load_run(run_dir)
-    main_table, relocation, _, first, _, differences = paper_tables(run)
+def small_parts(run: RecordedRun) -> dict[str, str]:
+    """The marked parts on small houses."""
+    main_table, relocation, far, first, order, differences = paper_tables(run)
     return {
-        "large-setting": setting_table(run).markdown(),
-        "large-1": main_table.markdown(),
-        "large-2": relocation.markdown(),
-        "large-first": first.markdown(),
-        "large-differences": differences.markdown(),
-        "large-rooms": room_table(run).markdown(),
+        "small-setting": setting_table(run).markdown(),
+        "small-1": main_table.markdown(),
+        "small-2": relocation.markdown(),
+        "small-2-far": far.markdown(),
+        "small-first": first.markdown(),
+        "small-order": order.markdown(),
+        "small-differences": differences.markdown(),
     }
 
 
@@ -176,11 +177,13 @@ def setting_table(run: RecordedRun) -> Table:
     """Houses and stages by where the tasks come from."""
     rows = []
     groups: dict[str, list[tuple[int, int]]] = {}
+    houses: dict[str, set[str]] = {}
     strata: dict[str, Counter[str]] = {}
     for task in run.tasks():
-        name = _source(task.task_id)
+        name, house, _ = _parts_of(task.task_id)
         num_rooms = len(task.maps[1].rooms) if 1 in task.maps else 0
         groups.setdefault(name, []).append((num_rooms, task.num_stages))
+        houses.setdefault(name, set()).add(house)
         counts = strata.setdefault(name, Counter())
         first = run.agents[0]
         for stage in range(1, task.num_stages + 1):
@@ -188,6 +191,7 @@ def setting_table(run: RecordedRun) -> Table:
             if record is not None:
                 counts["first" if stage == 1 else "moved" if record.target.is_relocated else "unmoved"] += 1
     groups["all"] = [pair for part in groups.values() for pair in part]
+    houses["all"] = set().union(*houses.values())
     strata["all"] = sum(strata.values(), Counter())
     for name, part in groups.items():
         rooms = [num_rooms for num_rooms, _ in part]
@@ -195,15 +199,16 @@ def setting_table(run: RecordedRun) -> Table:
         rows.append(
             (
                 name,
+                str(len(houses[name])),
                 str(len(part)),
                 f"{min(rooms)}-{max(rooms)} (mean {sum(rooms) / len(rooms):.1f})",
                 str(sum(num for _, num in part)),
                 *(str(counts[stratum]) for stratum in ("first", "moved", "unmoved")),
             )
         )
-    columns = ("Houses from", "houses", "rooms", "stages", "stage 1", "relocated", "not relocated")
-    config = run.config
-    note = f"One task a house, seed {config.get('seed', 0)} for tasks and agents, evonav {config.get('evonav', '')}."
+    columns = ("Houses from", "houses", "tasks", "rooms", "stages", "stage 1", "relocated", "not relocated")
+    config, seeds = run.config, ", ".join(sorted({_parts_of(task_id)[2] for task_id in run.num_stages}))
+    note = f"Seeds of the tasks: {seeds}; of the agents: {config.get('seed', 0)}; evonav {config.get('evonav', '')}."
     return Table("Houses", columns, tuple(rows), (note,))
 
 
@@ -276,9 +281,10 @@ def _rate(counts: tuple[int, int]) -> str:
     return NONE if n == 0 else f"{rate(successes / n, wilson(successes, n))}, n = {n}"
 
 
-def _source(task_id: str) -> str:
-    """The dataset in a task's id, which goes on with the number of the house, a hash and a seed."""
-    return re.sub(r"-\d+-[0-9a-f]{6}-s\d+$", "", task_id)
+def _parts_of(task_id: str) -> tuple[str, str, str]:
+    """The dataset, the house and the seed in a task's id."""
+    found = re.fullmatch(r"((.*)-\d+-[0-9a-f]{6})-s(\d+)", task_id)
+    return (found[2], found[1], found[3]) if found else (task_id, task_id, NONE)
 
 
 def run_agents(
@@ -312,7 +318,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--sweep", type=int, default=30, help="houses of the runs with wrong decisions")
     # UniGoal takes several times as long as the others: to be asked for.
     parser.add_argument("--sweep-agents", default=",".join(PAPER_ORDER[1:]), help="agents of those runs")
-    parser.add_argument("--large", type=Path, help="a run of the heuristics over all houses, made by `evonav evaluate`")
+    parser.add_argument("--small", nargs="*", default=(), help="folders of tasks in small houses, reported apart")
     return parser.parse_args()
 
 

@@ -142,7 +142,7 @@ def test_reweighted_rates_are_means_of_groups_by_their_share_of_the_mix(tmp_path
             plan = plan.model_copy(update={"rooms": tuple(plan.rooms[:1]) * count})
             store.add_floor_plan(task, 1, plan.model_dump_json())
     run_dir = record_run(tmp_path / "run", records, dict.fromkeys("abcdef", 2), ["fu"])
-    table = reweighted_table(load_run(run_dir), "procthor-10k")
+    table = reweighted_table([load_run(run_dir)], "procthor-10k")
     (row,) = cells(table).values()
     # A house's weight is that of its group by the number of houses; a house counts with all its stages.
     mean = (4 / 2 * 1 + 2 / 1 * 0 + 5 / 2 * 3) / (4 / 2 * 2 + 2 / 1 * 1 + 5 / 2 * 4)
@@ -152,7 +152,7 @@ def test_reweighted_rates_are_means_of_groups_by_their_share_of_the_mix(tmp_path
     assert row["SR % moved"].startswith(f"{100 * later:.1f}")
     assert row["SR % not moved"] == "–"
     with pytest.raises(InvalidArgumentError, match="procthor-10k"):
-        reweighted_table(load_run(run_dir), "procthor")
+        reweighted_table([load_run(run_dir)], "procthor")
 
 
 def test_agents_that_the_paper_lacks_stand_without_its_figures(tmp_path: Path) -> None:
@@ -311,7 +311,8 @@ def test_the_pages_have_every_part_that_the_scripts_write(script, write_run: Wri
     of_perception = perception_results.parts({"noisy:perfect": load_run(run_dir), "noisy:poor": load_run(run_dir)})
     monkeypatch.setattr(looks_results, "PLOT", run_dir.parent / "looks.svg")
     of_looks = looks_results.parts(load_run(run_dir), load_run(run_dir))
-    assert sorted(marked) == sorted(parts | script.large_parts(run_dir) | of_perception | of_looks)
+    assert sorted(marked) == sorted(parts | script.small_parts(load_run(run_dir)) | of_perception | of_looks)
     assert "+0.0" in of_looks["looks"]
     assert "| ftu" in parts["table-1"]
-    assert script._source("attr-onav-0001k-val-0100-0003-f47224-s0") == "attr-onav-0001k-val-0100"
+    dataset, house = "attr-onav-0001k-val-0100", "attr-onav-0001k-val-0100-0003-f47224"
+    assert script._parts_of(f"{house}-s2") == (dataset, house, "2")

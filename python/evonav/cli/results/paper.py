@@ -61,7 +61,7 @@ def paper(
         raise StoreError(f"{run}: no stage is scored yet; `evonav evaluate` with the same options resumes the run")
     tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
     if reweight is not None:
-        tables.append(reweighted_table(loaded, reweight, perception.value))
+        tables.append(reweighted_table([loaded], reweight, perception.value))
     show_tables(tables)
     runs: dict[Perception, RecordedRun] = {perception.value: loaded}
     if latex is not None and prediction is not None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import house_of, success_and_spl
 from evonav.evaluation.metrics.stage_metrics import stratum_of
 from evonav.evaluation.records.schema import StageRecord
@@ -25,23 +26,28 @@ COLUMNS = {
 """Columns by the stratum of the stages that count; `None` for all."""
 
 
-def reweighted_table(run: RecordedRun, mix: str, perception: Perception = "gt") -> Table:
-    """Return SR and SPL with the weights that give the run's houses the room counts of a data set.
+def reweighted_table(runs: Sequence[RecordedRun], mix: str, perception: Perception = "gt") -> Table:
+    """Return SR and SPL with the weights that give the houses of some runs the room counts of a data set.
 
     Args:
-        run: A run whose maps are recorded.
+        runs: Runs on different tasks, whose maps are recorded.
         mix: Name of the data set: `procthor-10k`, the rooms of the published generator's houses with two rooms or more.
         perception: The half of the paper's tables beside it.
 
     Raises:
         InvalidArgumentError: The mix is unknown, or has none of the houses.
-        StoreError: The run cannot be read.
+        StoreError: A run cannot be read.
     """
-    tasks = list(run.num_stages)
-    weighting = reweight(mix, _num_rooms(run, tasks), [None] * len(tasks))
+    num_rooms = {task: count for run in runs for task, count in _num_rooms(run).items()}
+    tasks = list(num_rooms)
+    weighting = reweight(mix, list(num_rooms.values()), [None] * len(tasks))
+    by_agent: dict[str, list[StageRecord]] = {}
+    for run in runs:
+        for agent, records in run.records_by_agent().items():
+            by_agent.setdefault(agent, []).extend(records)
     rows = []
-    for agent, records in run.records_by_agent().items():
-        scored = [record for record in records if record.is_scored]
+    for agent in agents_in_order(by_agent):
+        scored = [record for record in by_agent[agent] if record.is_scored]
         cells = []
         for name, stratum in COLUMNS.items():
             part = [record for record in scored if stratum is None or stratum_of(record) == stratum]
@@ -61,11 +67,11 @@ def reweighted_table(run: RecordedRun, mix: str, perception: Perception = "gt") 
     return Table(f"Reweighted to the rooms of {mix}", columns, tuple(rows), (note,))
 
 
-def _num_rooms(run: RecordedRun, tasks: Sequence[str]) -> list[int]:
+def _num_rooms(run: RecordedRun) -> dict[str, int]:
     """Return the number of rooms of each task's house; 0 where its map is not recorded."""
     with RunStore(run.run_dir) as store:
-        maps = (next(iter(store.maps(task)), None) for task in tasks)
-        return [0 if plan is None else len(plan.rooms) for plan in maps]
+        maps = {task: next(iter(store.maps(task)), None) for task in run.num_stages}
+        return {task: 0 if plan is None else len(plan.rooms) for task, plan in maps.items()}
 
 
 def _estimate(
