@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from benches.table import Row, compare
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
 from evonav.memory.presence import DepthEvidence
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
+from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import compare
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
 
@@ -33,6 +34,8 @@ points of each of the 100 entries in that frame's depth image; the peer projects
 once, and its counts are checked to be the same.
 """
 
+MADE = "made"
+"""The house of all inputs: they are made up, and have no interval by house."""
 SIDE_PX = 300
 BOX_M = 0.4
 _Call = Callable[[int], object]
@@ -78,7 +81,7 @@ def _visibility() -> list[Row]:
     def ours(number: int) -> VisibleOccupancy:
         return visible_occupancy(grid, poses[number], _INTRINSICS, 3.0)
 
-    return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, len(poses), repeats=20)
+    return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, [MADE] * len(poses), calls=20)
 
 
 def _explored_floor() -> OccupancyMap:
@@ -111,7 +114,7 @@ def _frontiers() -> list[Row]:
     found = {tuple(cell) for frontier in seen.update_frontiers(_AGENT_M) for cell in frontier.cells.tolist()}
     if {cell for region in regions for cell in region} != found:
         raise AssertionError("the peer found other frontiers")
-    return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, 200)
+    return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, [MADE] * 200)
 
 
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.float32)
@@ -144,7 +147,7 @@ def _distances() -> list[Row]:
 
     if len(targets_m) < 5 or not np.allclose(ours(0), peer(0), rtol=0.1):
         raise AssertionError("the peer found other distances")
-    return compare("distances to frontiers, 400x400", ours, {"SciPy, Dijkstra on 8-connected cells": peer}, 40)
+    return compare("distances to frontiers, 400x400", ours, {"SciPy, Dijkstra on 8-connected cells": peer}, [MADE] * 40)
 
 
 def _distances_scipy(
@@ -311,7 +314,7 @@ def _object_frame() -> list[Row]:
         return _associate_open3d(stored, view)
 
     faiss.omp_set_num_threads(1)
-    return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, num)
+    return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, [MADE] * num)
 
 
 def _depth_evidence() -> list[Row]:
@@ -328,7 +331,7 @@ def _depth_evidence() -> list[Row]:
     found = [[e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view] for e in ours(0)]
     if found != peer(0).tolist():
         raise AssertionError("the peer counts otherwise")
-    return compare("depth evidence, 100 entries", ours, {"NumPy, all points at once": peer}, 100, repeats=5)
+    return compare("depth evidence, 100 entries", ours, {"NumPy, all points at once": peer}, [MADE] * 100, calls=5)
 
 
 def _depth_evidence_numpy(clouds: list[NDArray[np.float32]], view: View) -> NDArray[np.int64]:
