@@ -25,7 +25,7 @@ class Figure:
     by_house: Mapping[str, float] = field(default_factory=dict)
     """The same number of each house alone, where it is known."""
     kind: Kind = "cost"
-    """The factor of a cost counts, and less is better; the difference of a rate of 0 to 1 counts, and more is better."""
+    """Less of a cost is better, and its factor counts; more of a rate of 0 to 1 is better, by its difference."""
 
 
 @dataclass(frozen=True, slots=True)
