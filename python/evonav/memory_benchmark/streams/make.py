@@ -1,25 +1,19 @@
-"""Make the plan of a stream: what changes when, and where the camera goes."""
+"""Make streams: from a description to the plan that its frames are rendered from."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field, replace
-from itertools import islice
-
-import numpy as np
+import json
+from dataclasses import asdict, replace
 
 from evonav._core import House
 from evonav.errors import HouseError
 from evonav.house.files import stream_houses
-from evonav.memory_benchmark.streams.evolution import HOURS_BETWEEN_VISITS, houses_of_visits
-from evonav.memory_benchmark.streams.plan import Plan, Scene, cached_plan
+from evonav.memory_benchmark.streams.glances import glances
+from evonav.memory_benchmark.streams.growth import growth, growth_houses
+from evonav.memory_benchmark.streams.live import live
+from evonav.memory_benchmark.streams.plan import Plan, cached_plan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
-from evonav.memory_benchmark.streams.spec import RATE_HZ, Kind, StreamSpec
-from evonav.memory_benchmark.streams.walk import generator_of, walk
+from evonav.memory_benchmark.streams.spec import StreamSpec
+from evonav.memory_benchmark.streams.visits import visits
 from evonav.tasks.records import sha256_of
-from evonav.world.embedded import EmbeddedSimulator
-from evonav.world.pose import Pose
-
-PAUSE_S = 3600.0 * HOURS_BETWEEN_VISITS
-"""Time from the last frame of a visit to the first of the next."""
 
 
 def make_stream(spec: StreamSpec, *, rgb: bool = False) -> RenderedStream:
@@ -36,11 +30,32 @@ def make_stream(spec: StreamSpec, *, rgb: bool = False) -> RenderedStream:
 
 
 def plan_of(spec: StreamSpec) -> Plan:
-    """Return a stream's plan, from the cache folder if it is there."""
+    """Return a stream's plan, from the cache folder if it is there.
+
+    Raises:
+        HouseError: The house cannot be read, or gives no stream of this kind.
+    """
     house = read_house(spec.house)
     # Errors of perception change neither houses nor walks.
-    values = asdict(replace(spec, kind="S2" if spec.kind == "S8" else spec.kind, perception=""))
-    return cached_plan({"spec": values, "house": sha256_of(house.to_json().encode())}, lambda: make_plan(spec, house))
+    decides = asdict(replace(spec, kind="S2" if spec.kind == "S8" else spec.kind, perception=""))
+    houses = growth_houses(spec, house) if spec.kind == "S7" else [house]
+    digests = sha256_of(json.dumps([one.to_json() for one in houses]).encode())
+    return cached_plan({"spec": decides, "houses": digests}, lambda: make_plan(spec, house))
+
+
+def make_plan(spec: StreamSpec, house: House) -> Plan:
+    """Make the plan of a stream that begins in a house, without the cache.
+
+    Raises:
+        HouseError: The house gives no stream of this kind.
+    """
+    if spec.kind == "S6":
+        return glances(spec, house)
+    if spec.kind == "S7":
+        return growth(spec, growth_houses(spec, house))
+    if spec.kind == "S9":
+        return live(spec, house)
+    return visits(spec, house)
 
 
 def read_house(name: str) -> House:
@@ -53,72 +68,3 @@ def read_house(name: str) -> House:
     if found is None:
         raise HouseError(f"{name}: no house")
     return found
-
-
-def make_plan(spec: StreamSpec, house: House) -> Plan:
-    """Make the plan of a stream in a house, without the cache.
-
-    Raises:
-        HouseError: The house gives no stream of this kind.
-    """
-    return visits(spec, house)
-
-
-@dataclass(slots=True)
-class Frames:
-    """The frames of a plan while it is made."""
-
-    scenes: list[int] = field(default_factory=list)
-    visits: list[int] = field(default_factory=list)
-    times_s: list[float] = field(default_factory=list)
-    poses: list[tuple[float, float, float, float]] = field(default_factory=list)
-
-    def add(self, scene: int, visit: int, poses: Iterable[Pose]) -> None:
-        """Add frames of a scene, at the rate of the camera; a new visit comes after a pause."""
-        for pose in poses:
-            time_s = 0.0
-            if self.times_s:
-                time_s = self.times_s[-1] + (1.0 / RATE_HZ if self.visits[-1] == visit else PAUSE_S)
-            self.scenes.append(scene)
-            self.visits.append(visit)
-            self.times_s.append(time_s)
-            self.poses.append((pose.x_m, pose.z_m, pose.yaw_rad, pose.horizon_rad))
-
-    def plan(self, scenes: Iterable[Scene], checkpoints: tuple[tuple[int, int], ...] = ()) -> Plan:
-        """Return the plan of these frames."""
-        return Plan(
-            tuple(scenes),
-            np.array(self.scenes, np.int64),
-            np.array(self.visits, np.int64),
-            np.array(self.times_s, np.float64),
-            np.array(self.poses, np.float64).reshape(-1, 4),
-            checkpoints,
-        )
-
-
-def visits(spec: StreamSpec, house: House) -> Plan:
-    """Plan one visit of each arrangement of the house; each begins where the last one ended, or near it."""
-    kind: Kind = "S2" if spec.kind == "S8" else spec.kind
-    houses = houses_of_visits(kind, house, spec.seed, allow_unknown_assets=spec.allow_unknown_assets)
-    frames, at = Frames(), None
-    for number, house_json in enumerate(houses):
-        poses = list(islice(walk_in(spec, house_json, at, f"visit {number + 1}"), spec.frames_a_visit))
-        frames.add(number, number + 1, poses)
-        at = poses[-1]
-    return frames.plan(Scene(house_json) for house_json in houses)
-
-
-def walk_in(spec: StreamSpec, house_json: str, at: Pose | None, name: str) -> Iterator[Pose]:
-    """Yield the poses of a walk without an end.
-
-    Args:
-        spec: The stream.
-        house_json: The house.
-        at: Pose to begin at, or near it; `None` for the house's own start.
-        name: Name of the walk: every walk has draws of its own.
-    """
-    simulator = EmbeddedSimulator(spec.camera, allow_unknown_assets=spec.allow_unknown_assets)
-    simulator.reset(house_json, at)
-    kind = "S2" if spec.kind == "S8" else spec.kind
-    generator = generator_of(kind, spec.house_name, spec.seed, name)
-    yield from walk(simulator, House(house_json, name=spec.house), generator)

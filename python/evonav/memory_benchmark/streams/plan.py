@@ -7,6 +7,7 @@ import hashlib
 import json
 import lzma
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -106,12 +107,9 @@ def cached_plan(decides: Mapping[str, Any], make: Callable[[], Plan]) -> Plan:
     """
     text = json.dumps({"plan": PLAN_VERSION, "evonav": __version__, **decides}, sort_keys=True)
     path = plan_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.json.xz"
-    try:
+    with suppress(OSError, ValueError):
         return Plan.from_bytes(path.read_bytes())
-    except (OSError, ValueError):
-        plan = make()
-    try:
+    plan = make()
+    with suppress(OSError, EvonavError):
         write_atomically(path, plan.to_bytes())
-    except (OSError, EvonavError):
-        return plan
     return plan

@@ -125,17 +125,13 @@ class RenderedStream:
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
         """Render the stream, one frame at a time."""
-        scenes, _ = self._world
         perception: Perception = read_word(self.spec.perception).create()
-        rgb = self.rgb or perception.needs_rgb
-        simulator, current = self._simulator(), -1
-        for index, number in enumerate(self.plan.frame_scenes.tolist()):
-            scene, bodies = self.plan.scenes[number], scenes[number]
+        current = -1
+        for index, (frame, bodies) in enumerate(self._rendered(rgb=self.rgb or perception.needs_rgb)):
+            number = int(self.plan.frame_scenes[index])
             if number != current:
-                simulator.reset(scene.house_json)
                 perception.begin_stage(self._stage(number + 1, bodies.all))
                 current = number
-            frame = moved(simulator.render(self.plan.pose(index), rgb=rgb, instances=True), scene)
             percept = perception.perceive([frame])[0]
             view = View(
                 percept.pose,
@@ -152,6 +148,26 @@ class RenderedStream:
                 detected_ids(percept.detections, frame, bodies.all),
             )
             yield MemoryFrame(index, float(self.plan.times_s[index]), int(self.plan.visits[index]), view), truth
+
+    def evidence(self, range_m: float) -> Iterator[tuple[Frame, dict[str, int], dict[int, int]]]:
+        """Render the stream without perception; yield each frame with its `visible_px` and `empty_px`.
+
+        Args:
+            range_m: Largest distance on the ground plane of what counts.
+        """
+        for frame, bodies in self._rendered(rgb=False):
+            yield frame, visible_px(frame, bodies.all, range_m), empty_px(frame, bodies.vacated, range_m)
+
+    def _rendered(self, *, rgb: bool) -> Iterator[tuple[Frame, _Bodies]]:
+        """Yield the simulator's frames, in the frame of the stream's world."""
+        scenes, simulator, current = self._world[0], self._simulator(), -1
+        for index, number in enumerate(self.plan.frame_scenes.tolist()):
+            scene = self.plan.scenes[number]
+            if number != current:
+                simulator.reset(scene.house_json)
+                current = number
+            frame = simulator.render(self.plan.pose(index), rgb=rgb, instances=True)
+            yield moved(frame, scene), scenes[number]
 
     def _simulator(self) -> EmbeddedSimulator:
         return EmbeddedSimulator(self.spec.camera, allow_unknown_assets=self.spec.allow_unknown_assets)

@@ -33,8 +33,8 @@ GROUND_TRUTH = "gt"
 NUM_HOUSES, NUM_SEEDS = 5, 3
 MIN_ROOMS, MAX_ROOMS = 3, 5
 """Numbers of rooms of the houses that are chosen: a visit of the default length sees most of such a house."""
-FRAMES_A_VISIT = 150
-DAY_FRAMES = 90
+FRAMES_A_VISIT = 120
+DAY_FRAMES = 75
 """Frames of a visit of S5: a part of the house, so that what changed is often seen late."""
 RATE_HZ = 2.0
 HORIZONTAL_FOV_DEG = 90.0
