@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from evonav.report.machine import machine_name
 from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import machine_name
 
 README = Path(__file__).with_name("README.md")
 _INTRODUCTION = """# Benchmarks

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.report.regression import Figure, changes
 from evonav.speed_benchmark.records import Row, Speeds, read_speeds, write_speeds
+from evonav.speed_benchmark.regression import Figure, changes
 from evonav.speed_benchmark.run import against, markdown_of, run_section, speed_table, table_of
 from evonav.speed_benchmark.timing import MODULES, Sampling, compare, one_core, rows_of
 
@@ -138,10 +138,3 @@ def test_a_change_must_be_worse_in_houses_than_chance_explains():
     before = Figure(1.0, dict.fromkeys(houses, 1.0))
     verdicts = changes({"noisy": before, "steady": before}, {"noisy": noisy, "steady": steady, "new": steady})
     assert [(change.name, change.is_worse) for change in verdicts] == [("noisy", False), ("steady", True)]
-
-
-@pytest.mark.parametrize(("now", "is_worse"), [(0.9, False), (0.86, False), (0.8, True)])
-def test_a_rate_is_worse_when_it_falls(now, is_worse):
-    (change,) = changes({"f1": Figure(0.9, kind="rate")}, {"f1": Figure(now, kind="rate")})
-    assert change.is_worse == is_worse
-    assert str(change).startswith(f"f1: 0.900 -> {now:.3f} (")

@@ -5,11 +5,12 @@ from typing import Any, Protocol
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
-from evonav.report.regression import Change, Figure, changes
+from evonav.report.machine import machine_name
 from evonav.report.tables.numbers import NONE
 from evonav.report.tables.table import Table
 from evonav.speed_benchmark.records import Row, Speeds
-from evonav.speed_benchmark.timing import Sampling, machine_name
+from evonav.speed_benchmark.regression import Change, Figure, changes
+from evonav.speed_benchmark.timing import Sampling
 from evonav.statistics import Interval
 
 

@@ -2,19 +2,17 @@
 
 import gc
 import os
-import platform
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from evonav.component import optional_module
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.speed_benchmark.records import Row
-from evonav.statistics import ClusterBootstrap, Interval, percentile_interval
+from evonav.statistics import ClusterBootstrap
 
 NUM_RESAMPLES = 2000
 INSTALL = "'evonav[bench]'"
@@ -153,14 +151,14 @@ def rows_of(
     bootstrap = ClusterBootstrap(houses, num_resamples=NUM_RESAMPLES)
 
     least_ms = 1e-6  # no clock is finer, and a time of 0 has no ratio
-    ms, ms_ci95 = _median(ours_ms, bootstrap)
+    ours = bootstrap.median(ours_ms)
     by_house: dict[str, list[float]] = {}
     for house, time_ms in zip(houses, ours_ms, strict=True):
         by_house.setdefault(house, []).append(time_ms)
     alone = Row(
         operation=operation,
-        ms=ms,
-        ms_ci95=ms_ci95,
+        ms=float(np.median(ours_ms)),
+        ms_ci95=ours.ci95,
         ms_by_house={house: float(np.median(times_ms)) for house, times_ms in by_house.items()},
         n=len(ours_ms),
         facts=dict(facts or {}),
@@ -168,20 +166,10 @@ def rows_of(
     rows = []
     for name, times_ms in peers_ms.items():
         ratios = [peer / max(our, least_ms) for peer, our in zip(times_ms, ours_ms, strict=True)]
-        ratio, ratio_ci95 = _median(ratios, bootstrap)
-        beside = {"peer": name, "peer_ms": float(np.median(times_ms)), "ratio": ratio, "ratio_ci95": ratio_ci95}
+        ratio = bootstrap.median(ratios)
+        beside = {"peer": name, "peer_ms": float(np.median(times_ms)), "ratio": ratio.value, "ratio_ci95": ratio.ci95}
         rows.append(alone.model_copy(update=beside))
     return rows or [alone]
-
-
-def _median(values: Sequence[float], bootstrap: ClusterBootstrap) -> tuple[float, Interval | None]:
-    """Return the median with its interval, in every resample the mean of the two values in the middle."""
-    ordered, order = np.sort(values), np.argsort(values, kind="stable")
-    num_up_to = np.cumsum(bootstrap.draws[:, bootstrap.cluster_of[order]], axis=1)  # (R, N)
-    total = num_up_to[:, -1:]
-    places = [(num_up_to <= middle).sum(axis=1) for middle in ((total - 1) // 2, total // 2)]
-    resampled = ordered[np.stack(places)].mean(axis=0)
-    return float(np.median(values)), percentile_interval(resampled, bootstrap.num_clusters)
 
 
 @contextmanager
@@ -196,13 +184,3 @@ def one_core() -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, allowed)
-
-
-def machine_name() -> str:
-    """Return processor, system and version of Python."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.is_file():
-        lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
-        model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), model)
-    return f"{model}, {platform.system()}, Python {platform.python_version()}"
