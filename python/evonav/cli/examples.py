@@ -55,6 +55,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bench gym": ("evonav bench gym --envs 1,16 --peer sync",),
     "bench agents": ("evonav bench agents --agent fu --no-growth",),
     "bench generation": ("evonav bench generation --limit 100",),
+    "bench memory export": ("evonav bench memory export out/streams --streams S1 --quick --layout replica",),
+    "bench memory score": (
+        "evonav bench memory score out/streams",
+        "evonav bench memory score out/streams/S1_bundled-0001_0 answers.jsonl --name mine",
+    ),
     "strip": ("evonav strip out/run --agent fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
     "tasks generate": (

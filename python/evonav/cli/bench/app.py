@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from evonav.cli.bench.memory import memory_app
 from evonav.cli.display import EXIT_INTERRUPTED, progress_bar, show_tables
 from evonav.cli.group import Command, new_app
 from evonav.cli.options.shared import HOUSES, Agents, Limit, listed, numbers_of
@@ -18,7 +19,8 @@ if TYPE_CHECKING:  # the command must start fast
 EXIT_WORSE = 1
 """Exit code where `--against` finds something worse."""
 
-bench_app = new_app(help="Measure evonav's speed on this machine, beside other libraries.")
+bench_app = new_app(help="Measure scene memories, and evonav's speed on this machine.")
+bench_app.add_typer(memory_app, name="memory")
 
 Repeats = Annotated[int, typer.Option(min=1, metavar="N", help="Number of times that everything is measured.")]
 Peers = Annotated[
