@@ -77,8 +77,8 @@ def is_taken(place: SceneObject, before: Bodies, now: Bodies) -> bool:
 
 
 def _overlap(a: SceneObject, b: SceneObject) -> bool:
-    sides = zip(a.centre_m, a.size_m, b.centre_m, b.size_m, strict=True)
-    return all((size + other_size) / 2.0 - abs(at - other) > TOUCH_M for at, size, other, other_size in sides)
+    edges = zip(a.centre_m, a.size_m, b.centre_m, b.size_m, strict=True)
+    return all((size + other_size) / 2.0 - abs(at - other) > TOUCH_M for at, size, other, other_size in edges)
 
 
 def visible_px(frame: Frame, bodies: Bodies, range_m: float = EVIDENCE_RANGE_M) -> dict[str, int]:
@@ -167,14 +167,14 @@ def _rectangle(corners: F64, intrinsics: Intrinsics) -> tuple[NDArray[np.int64],
     """Return the rows and columns that a projected box covers; all of them if a corner is not in front."""
     if np.isnan(corners).all():
         return np.arange(0), np.arange(0)
-    sides = []
+    edges = []
     for axis, length in ((1, intrinsics.height_px), (0, intrinsics.width_px)):
         first, last = 0, length
         if not np.isnan(corners).any():
             first = max(0, math.floor(corners[:, axis].min()))
             last = min(length, math.ceil(corners[:, axis].max()))
-        sides.append(np.arange(first, max(first, last)))
-    return sides[0], sides[1]
+        edges.append(np.arange(first, max(first, last)))
+    return edges[0], edges[1]
 
 
 def _distance_m(pose: Pose, body: SceneObject) -> float:

@@ -20,10 +20,12 @@ MAX_GLANCES = 5
 """Largest number of frames of a visit that show a changed place."""
 SIDE_RAD = math.radians(45.0)
 """Largest angle, at the place, between the first glance and another: all come from one side."""
+EVIDENT_PX = 25
+"""Pixels from which a glance is evidence, as in ground-truth perception."""
 HIDDEN_SHARE = 0.5
 """A place is partly hidden if at most this share of its box's pixels in the image shows it."""
-CANDIDATES = 3
-"""Frames walked for each frame of a visit: those that show too much are left out."""
+CANDIDATES = 2
+"""Frames candidates for each frame of a visit: those that show too much are left out."""
 
 I64 = NDArray[np.int64]
 
@@ -35,6 +37,8 @@ class _Look:
     bearing_rad: float
     """Direction from the place to the camera."""
     is_hidden: bool
+    is_evident: bool
+    """Whether it shows at least `EVIDENT_PX` pixels of the place."""
 
 
 def glances(spec: StreamSpec, house: House) -> Plan:
@@ -42,7 +46,7 @@ def glances(spec: StreamSpec, house: House) -> Plan:
 
     A changed place is the old box of an object that has gone, until it is taken, and an object that has moved or is
     new, in this visit or before. It counts as shown with one pixel, at any distance. Frames in which all such places
-    are partly hidden are preferred; others are taken for places that have no glance else.
+    are partly hidden are preferred; others are taken for places that would have no glance of `EVIDENT_PX` else.
 
     Args:
         spec: The stream.
@@ -51,26 +55,26 @@ def glances(spec: StreamSpec, house: House) -> Plan:
     Raises:
         HouseError: The house does not change at any attempt.
     """
-    walked = visits(replace(spec, frames_a_visit=CANDIDATES * spec.frames_a_visit), house)
-    stream = RenderedStream(spec, walked)
-    looks = _looks(stream)
-    kept = np.concatenate(
+    candidates = visits(replace(spec, frames_a_visit=CANDIDATES * spec.frames_a_visit), house)
+    stream = RenderedStream(spec, candidates)
+    shown_in = _glances_of(stream)
+    frames = np.concatenate(
         [
-            _kept(np.flatnonzero(walked.visits == visit), looks, spec.frames_a_visit)
-            for visit in np.unique(walked.visits)
+            _selected(np.flatnonzero(candidates.visits == visit), shown_in, spec.frames_a_visit)
+            for visit in np.unique(candidates.visits)
         ]
     )
     return replace(
-        walked,
-        frame_scenes=walked.frame_scenes[kept],
-        visits=walked.visits[kept],
-        times_s=walked.times_s[kept],
-        poses=walked.poses[kept],
+        candidates,
+        frame_scenes=candidates.frame_scenes[frames],
+        visits=candidates.visits[frames],
+        times_s=candidates.times_s[frames],
+        poses=candidates.poses[frames],
     )
 
 
-def _looks(stream: RenderedStream) -> list[Mapping[Hashable, _Look]]:
-    """Return each frame's looks at changed places."""
+def _glances_of(stream: RenderedStream) -> list[Mapping[Hashable, _Look]]:
+    """Return the changed places that each frame shows."""
     found: list[Mapping[Hashable, _Look]] = []
     old = {number: change.before for number, change in enumerate(stream.changes) if change.before is not None}
     new: dict[str, SceneObject] = {}
@@ -91,33 +95,32 @@ def _look(frame: Frame, place: SceneObject, count: int) -> _Look:
     nothing = np.full_like(frame.depth_m, np.inf)
     in_box = num_looks_through(nothing, frame.pose, frame.intrinsics, place)
     bearing_rad = math.atan2(frame.pose.x_m - place.centre_m[0], frame.pose.z_m - place.centre_m[2])
-    return _Look(bearing_rad, count <= HIDDEN_SHARE * in_box)
+    return _Look(bearing_rad, count <= HIDDEN_SHARE * in_box, count >= EVIDENT_PX)
 
 
-def _kept(frames: I64, looks: list[Mapping[Hashable, _Look]], num_frames: int) -> I64:
+def _selected(frames: I64, shown_in: list[Mapping[Hashable, _Look]], num_frames: int) -> I64:
     """Return the frames of one visit that stay, ascending."""
-    counts, sides = Counter[Hashable](), dict[Hashable, float]()
+    counts, bearings_rad, evident = Counter[Hashable](), dict[Hashable, float](), set[Hashable]()
     glanced: list[int] = []
 
     def is_allowed(shown: Mapping[Hashable, _Look]) -> bool:
         return all(
             counts[place] < MAX_GLANCES
-            and abs(math.remainder(look.bearing_rad - sides.get(place, look.bearing_rad), math.tau)) <= SIDE_RAD
+            and abs(math.remainder(look.bearing_rad - bearings_rad.get(place, look.bearing_rad), math.tau)) <= SIDE_RAD
             for place, look in shown.items()
         )
 
     for needs_hidden in (True, False):
         for index in frames.tolist():
-            shown = looks[index]
-            is_wanted = (
-                all(look.is_hidden for look in shown.values())
-                if needs_hidden
-                else any(counts[place] == 0 for place in shown)
-            )
-            if shown and index not in glanced and is_wanted and is_allowed(shown) and len(glanced) < num_frames:
+            shown = shown_in[index]
+            new = {place for place, look in shown.items() if look.is_evident} - evident
+            is_wanted = all(look.is_hidden for look in shown.values()) if needs_hidden else bool(new)
+            is_wanted &= any(look.is_evident for look in shown.values())
+            if index not in glanced and is_wanted and is_allowed(shown) and len(glanced) < num_frames:
                 glanced.append(index)
                 counts.update(list(shown))
+                evident |= new
                 for place, look in shown.items():
-                    sides.setdefault(place, look.bearing_rad)
-    others = [index for index in frames.tolist() if not looks[index]]
+                    bearings_rad.setdefault(place, look.bearing_rad)
+    others = [index for index in frames.tolist() if not shown_in[index]]
     return np.array(sorted([*glanced, *others[: num_frames - len(glanced)]]), np.int64)

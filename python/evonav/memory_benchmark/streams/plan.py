@@ -21,7 +21,7 @@ from evonav.house.procthor10k import cache_folder
 from evonav.parallel.folders import write_atomically
 from evonav.world.pose import Pose
 
-PLAN_VERSION = 1
+PLAN_VERSION = 2
 """Part of every hash: it changes with the code that makes plans."""
 
 
@@ -50,7 +50,7 @@ class Plan:
     poses: NDArray[np.float64]
     """`(F, 4)` x, z, yaw and horizon in the frame of the scene's house; metres and radians."""
     checkpoints: tuple[tuple[int, int], ...] = ()
-    """Of S7: a number of objects, and the index of the frame at which so many have been seen."""
+    """Numbers of objects of S7, each with the index of the frame at which so many have been seen."""
 
     def pose(self, index: int) -> Pose:
         """Return the pose of a frame in the frame of its scene's house."""

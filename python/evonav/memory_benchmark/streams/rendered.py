@@ -37,7 +37,7 @@ class _Bodies:
     """The bodies of one scene, in the frame of the stream's world."""
 
     all: tuple[SceneObject, ...]
-    """In instance order."""
+    """The simulator's bodies, in instance order."""
     objects: tuple[SceneObject, ...]
     """All that stands in the world while the scene is shown."""
     vacated: tuple[tuple[int, SceneObject], ...]
@@ -47,11 +47,14 @@ class _Bodies:
 class RenderedStream:
     """A `Stream` that the embedded simulator renders."""
 
+    has_truth = True
+    """Always true; streams in files may lack their truth."""
+
     def __init__(self, spec: StreamSpec, plan: Plan, *, rgb: bool = False) -> None:
         """Make a stream; nothing is rendered yet.
 
         Args:
-            spec: What the stream is.
+            spec: All that decides the stream.
             plan: Its plan.
             rgb: Whether frames have colours, which cost more than the rest.
         """
@@ -76,7 +79,7 @@ class RenderedStream:
 
     @property
     def info(self) -> StreamInfo:
-        """What a memory is told; the labels are all of ProcTHOR's types, whatever the house holds."""
+        """The public facts that a memory is told; the labels are all of ProcTHOR's types, whatever the house holds."""
         return StreamInfo(self.spec.camera.intrinsics, PROCTHOR_TYPES, RATE_HZ)
 
     @property
@@ -86,7 +89,7 @@ class RenderedStream:
 
     @property
     def checkpoints(self) -> Sequence[tuple[int, int]]:
-        """Of S7: a number of objects, and the index of the frame at which so many have been seen."""
+        """Numbers of objects of S7, each with the index of the frame at which so many have been seen."""
         return self.plan.checkpoints
 
     @property

@@ -25,7 +25,7 @@ TITLES: dict[Kind, str] = {
     "S8": "groups move, and perception errs",
     "S9": "things move during a visit",
 }
-"""What happens in each kind of stream."""
+"""The event of each kind of stream."""
 NOISES = ("noisy:good", "noisy:yolo-world-like", "noisy:poor")
 """Perceptions of S8; the last one errs about depth and pose, too."""
 GROUND_TRUTH = "gt"
@@ -54,8 +54,11 @@ class StreamSpec:
     perception: str = GROUND_TRUTH
     """Short name of the perception, see `evonav.perception.shorthand`."""
     frames_a_visit: int = FRAMES_A_VISIT
-    """Frames of one visit. S9's only visit has twice as many, a visit of S6 may have fewer, and S7 goes on with a visit
-    of this length in another house until it has seen enough objects."""
+    """Frames of one visit.
+
+    S9's only visit has twice as many, a visit of S6 may have fewer, and S7 goes on with a tour of this length in
+    another house until it has seen enough objects.
+    """
     max_objects: int = 800
     """Number of objects after which S7 ends."""
     allow_unknown_assets: bool = False
