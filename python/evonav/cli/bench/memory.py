@@ -154,16 +154,18 @@ def export(
     """Write streams as files, for systems in C++, in ROS or on another machine."""
     from evonav.memory_benchmark.streams import make_stream
     from evonav.memory_benchmark.streams.export import export_stream
+    from evonav.memory_benchmark.streams.export.layouts import LAYOUTS
 
-    if layout not in ("tum", "replica"):
-        raise typer.BadParameter(f"--layout {layout}: expected tum or replica")
+    layout_name = next((known for known in LAYOUTS if known == layout), None)
+    if layout_name is None:
+        raise typer.BadParameter(f"--layout {layout}: expected {' or '.join(LAYOUTS)}")
     specs = chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     with status("Writing streams") as show:
         for spec in specs:
             name = folder_of(spec.name)
             show(name)
             truth = None if oracle is None else oracle / f"{name}.jsonl.xz"
-            written = export_stream(make_stream(spec, rgb=colours), out / name, layout, oracle=truth)  # type: ignore[arg-type]
+            written = export_stream(make_stream(spec, rgb=colours), out / name, layout_name, oracle=truth)
             typer.echo(f"{out / name}: {counted(written.num_frames, 'frame')}")
 
 
