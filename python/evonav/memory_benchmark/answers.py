@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.counted import counted
 from evonav.errors import EvonavError
 from evonav.memory_benchmark.protocol import MemoryEntry, Place
 
@@ -24,6 +25,10 @@ MAX_SHOWN = 120
 
 FailureKind = Literal["load", "raised", "hung", "died", "answer"]
 """`load`: it could not be made. `raised`, `hung`, `died`: a call ended so. `answer`: it answered what is no answer."""
+
+
+Hosting = Literal["here", "process", "offline"]
+"""The place where a memory runs: this process, its own, or elsewhere, with its answers in a file."""
 
 
 class MemoryFailedError(EvonavError):
@@ -164,7 +169,8 @@ def read_num_bytes(answer: object, num_entries: int) -> int:
         raise _wrong("num_bytes()", answer, "must not be negative")
     least = num_entries * MIN_ENTRY_BYTES
     if answer < least:
-        raise _wrong("num_bytes()", answer, f"{num_entries} entries alone take at least {least} bytes")
+        verb = "takes" if num_entries == 1 else "take"
+        raise _wrong("num_bytes()", answer, f"{counted(num_entries, 'entry')} alone {verb} at least {least} bytes")
     return int(answer)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from evonav.component import Component
 from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting, AgentProcess
 from evonav.evaluation.records.schema import ErrorKind
-from evonav.memory_benchmark.answers import MAX_ENTRIES, Entries, FailureKind, MemoryFailedError, checked
+from evonav.memory_benchmark.answers import MAX_ENTRIES, Entries, FailureKind, Hosting, MemoryFailedError, checked
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
 from evonav.memory_benchmark.protocol import Memory, Place
@@ -31,6 +31,8 @@ class _MemoryProcess(AgentProcess):
 
 class RemoteMemory:
     """A memory in a process of its own; its answers were checked there and are read as plain data."""
+
+    hosting: Hosting = "process"
 
     def __init__(self, memory: Component[Memory], *, timeout_s: float, memory_mb: int | None = None) -> None:
         """Start the process and make the memory in it.
