@@ -92,5 +92,5 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="has no line"):
         score(STREAM, tmp_path / "empty.jsonl")
     (tmp_path / "text.jsonl").write_text("hello\n")
-    with pytest.raises(StoreError, match="line 1: .*Invalid JSON"):
+    with pytest.raises(StoreError, match=r"line 1: .*Invalid JSON"):
         score(STREAM, tmp_path / "text.jsonl")

@@ -15,6 +15,8 @@ from evonav.world.simulator import SceneObject
 
 NONE = -1
 """Match of a stale entry."""
+_BLOCK = 20_000
+"""Entries that are matched at a time: a memory may answer a million."""
 
 
 class Boxes:
@@ -64,6 +66,9 @@ class Boxes:
             labels: `N` labels.
             centres_m: `(N, 3)` centres.
         """
+        if len(labels) > _BLOCK:
+            blocks = range(0, len(labels), _BLOCK)
+            return np.concatenate([self.match(labels[i : i + _BLOCK], centres_m[i : i + _BLOCK]) for i in blocks])
         entries, bodies, distances_m = self.pairs(labels, centres_m)
         is_near = distances_m <= STALE_MARGIN_M
         entries, bodies, distances_m = entries[is_near], bodies[is_near], distances_m[is_near]
