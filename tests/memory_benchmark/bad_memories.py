@@ -35,6 +35,13 @@ class Good:
         return 1000
 
 
+class Empty(Good):
+    """Remembers nothing."""
+
+    def entries(self) -> Sequence[MemoryEntry]:
+        return []
+
+
 class Raises(Good):
     def observe(self, frame: Any) -> None:
         if frame.index == 3:

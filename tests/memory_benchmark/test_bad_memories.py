@@ -22,7 +22,7 @@ STREAM = HandMade([Shot(MUG, visible={"mug": 50})] * 60)
 @pytest.mark.parametrize(
     ("name", "kind", "message", "frame"),
     [
-        ("Raises", "raised", "observe() raises KeyError: 'no such voxel' [bad_memories:41 in observe]", 3),
+        ("Raises", "raised", "observe() raises KeyError: 'no such voxel' [bad_memories:48 in observe]", 3),
         ("Hangs", "hung", "no answer to `observe` within 1 s", 3),
         ("Dies", "died", "the memory's process died (exit code 7)", 3),
         ("NanBoxes", "answer", "entries()[1].centre_m = (1.0, nan, 0.0): must be finite", 0),
@@ -66,6 +66,15 @@ def test_good_memory_gives_the_same_wherever_it_runs() -> None:
     assert there.size is not None
     assert there.size.num_bytes == 1000
     assert there.size.peak_rss_mb is not None
+
+
+def test_memory_without_entries_keeps_the_contract() -> None:
+    result = measure(f"{FILE}:Empty", STREAM)
+    assert result.failure is None, result.failure
+    assert result.update is not None
+    assert (result.update.seen, result.update.seen_remembered) == (1, 0)
+    assert result.size is not None
+    assert result.size.bytes_per_entry is None
 
 
 def test_other_bits_in_the_second_run_are_found() -> None:

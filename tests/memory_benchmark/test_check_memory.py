@@ -59,6 +59,12 @@ def test_object_map_keeps_the_contract() -> None:
     assert repr(report).startswith("ObjectMapMemory: keeps the contract\npass  importable   it has reset")
 
 
+def test_example_keeps_the_contract() -> None:
+    report = check_memory(f"{FILE.parents[2] / 'examples' / 'own_memory.py'}:OwnMemory")
+    assert report.is_ok, report
+    assert verdicts(report)["remembers"] == "pass"
+
+
 def test_named_memory_that_keeps_an_entry_over_a_reset() -> None:
     report = check_memory(f"{FILE}:Good")
     assert not report.is_ok

@@ -77,6 +77,8 @@ class Entries:
 
 
 _FIELDS = ("centre_m",) * 3 + ("size_m",) * 3 + ("confidence", "p_present", "first_seen_s", "last_seen_s")
+NUM_COLUMNS = len(_FIELDS)
+"""Columns of `Entries.numbers`."""
 _NUM_GIVEN = 7
 """Columns that every entry has."""
 _NAN = math.nan
@@ -94,10 +96,10 @@ def read_entries(answer: object) -> Entries:
         raise MemoryFailedError("answer", f"entries(): {len(answer)} entries, must be at most {MAX_ENTRIES}")
     try:
         rows = [_row(entry) for entry in answer]
-        numbers = np.array(rows) if rows else np.empty((0, len(_FIELDS)))
+        numbers = np.array(rows) if rows else np.empty((0, NUM_COLUMNS))
         ids = np.array([entry.entry_id for entry in answer]) if rows else np.empty(0, np.int64)
         labels = tuple(entry.label for entry in answer)
-        is_typed = numbers.shape == (len(rows), len(_FIELDS)) and numbers.dtype.kind in "fi" and ids.dtype.kind in "iu"
+        is_typed = numbers.shape == (len(rows), NUM_COLUMNS) and numbers.dtype.kind in "fi" and ids.dtype.kind in "iu"
     except (AttributeError, TypeError, ValueError, OverflowError):
         is_typed = False
     if not is_typed or not all(isinstance(label, str) for label in labels):
