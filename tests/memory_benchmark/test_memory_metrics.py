@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from evonav.evaluation.episode.staleness import matched_object
 from evonav.memory_benchmark.metrics.belief import BeliefSums, calibration_error
-from evonav.memory_benchmark.metrics.change_f1 import Snapshot, change_counts
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts, Snapshot, change_counts
 from evonav.memory_benchmark.metrics.matching import NONE, Boxes
 from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
 from evonav.memory_benchmark.metrics.size import byte_note, growth_per_minute
@@ -38,7 +38,10 @@ def test_match_is_that_of_the_evaluation(bodies: list, entries: list) -> None:
     objects = [SceneObject(str(i), label, "object", centre_m, SIZE_M) for i, (label, centre_m) in enumerate(bodies)]
     boxes = Boxes(objects)
     by_label = {label: [one for one in objects if one.category == label] for label in ("Mug", "Plate")}
-    found = boxes.match([label for label, _ in entries], np.array([c for _, c in entries]).reshape(-1, 3))
+    found, is_covered = boxes.match([label for label, _ in entries], np.array([c for _, c in entries]).reshape(-1, 3))
+    for body_index, one in enumerate(boxes.bodies):
+        near = [matched_object(label, centre_m, {one.category: [one]}) for label, centre_m in entries]
+        assert is_covered[body_index] == any(match is one for match in near)
     for (label, centre_m), match in zip(entries, found.tolist(), strict=True):
         expected = matched_object(label, centre_m, by_label)
         actual = None if match == NONE else boxes.bodies[match]
@@ -159,9 +162,13 @@ def test_change_counts_over_three_visits() -> None:
     first = Snapshot(frozenset({old}), frozenset({old}), frozenset({old}), frozenset())
     stale = Snapshot(frozenset({old}), frozenset({new}), frozenset({old, new}), frozenset({old}))
     right = Snapshot(frozenset({new}), frozenset({new}), frozenset({old, new}), frozenset({old}))
-    assert change_counts([first, right]) == (2, 0, 0)  # gone and come
-    assert change_counts([first, stale]) == (0, 0, 2)
-    # The third visit tells the change from the first on, and to the second it is a false appearance.
-    assert change_counts([first, stale, right]) == (2, 1, 2)
+    assert change_counts([first, right]) == (ChangeCounts(hits=1), ChangeCounts(hits=1))
+    assert change_counts([first, stale]) == (ChangeCounts(misses=1), ChangeCounts(misses=1))
+    # The third visit tells the change from the first on, and from the second on a false appearance.
+    gone, come = change_counts([first, stale, right])
+    assert gone == ChangeCounts(hits=1, misses=1)
+    assert come == ChangeCounts(hits=1, false_alarms=1, misses=1)
     unseen = Snapshot(frozenset({old}), frozenset({new}), frozenset({old}), frozenset())
-    assert change_counts([first, unseen]) == (0, 0, 0)
+    assert change_counts([first, unseen]) == (ChangeCounts(), ChangeCounts())
+    taken = Snapshot(frozenset(), frozenset({new}), frozenset({old}), frozenset(), taken=frozenset({old}))
+    assert change_counts([first, taken]) == (ChangeCounts(), ChangeCounts())

@@ -9,6 +9,7 @@ import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.figures import FIGURES, estimates, ratios
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts
 from evonav.memory_benchmark.metrics.size import Size
 from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
@@ -31,7 +32,7 @@ HOUSES = ("a", "b", "c", "d", "e", "f")
 COUNTS = UpdateCounts(
     removals=10, removals_done=8, additions=4, additions_done=3, moves=5, moves_done=1, standing=200, false_forgets=2,
     entries=50, right_entries=40, seen=60, seen_remembered=45, remembered=40, duplicates=4,
-    change_hits=6, change_false_alarms=2, change_misses=2,
+    gone=ChangeCounts(2, 2, 0), come=ChangeCounts(4, 0, 2),
 )  # fmt: skip
 
 
@@ -93,6 +94,8 @@ def test_figures_of_known_counts() -> None:
     assert values["precision"] == pytest.approx(0.8)
     assert values["recall"] == pytest.approx(0.75)
     assert values["change_f1"] == pytest.approx(12 / 16)
+    assert values["disappeared_f1"] == pytest.approx(4 / 6)
+    assert values["appeared_f1"] == pytest.approx(8 / 10)
     assert values["half_life_frames"] == 3.0  # half of twelve spells end at 3 frames
     assert values["half_life_s"] == 1.5
     assert values["never_cleared"] == pytest.approx(100 * 5 / 12)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from evonav.memory_benchmark.metrics.belief import NUM_BINS, calibration_error
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
 from evonav.memory_benchmark.metrics.speed import Percentiles
 from evonav.memory_benchmark.metrics.staleness import Clock, SpellKind, durations_of, risk_table, survival
@@ -191,9 +192,9 @@ def _size(name: str) -> Callable[[StreamResult], float | None]:
     return lambda stream: None if stream.size is None else getattr(stream.size, name)
 
 
-def _change_counts(counts: UpdateCounts) -> tuple[float, float]:
-    errors = counts.change_false_alarms + counts.change_misses
-    return 2.0 * counts.change_hits, 2.0 * counts.change_hits + errors
+def _f1(*counts: ChangeCounts) -> tuple[float, float]:
+    hits = 2.0 * sum(one.hits for one in counts)
+    return hits, hits + sum(one.false_alarms + one.misses for one in counts)
 
 
 def _removal_f1(counts: UpdateCounts) -> tuple[float, float]:
@@ -242,7 +243,9 @@ _UPDATES = [
     Figure("duplicates", "%", "lower", _of_counts(lambda counts: (counts.duplicates, counts.remembered), 100.0)),
     Figure("precision", "", "higher", _of_counts(lambda counts: (counts.right_entries, counts.entries))),
     Figure("recall", "", "higher", _of_counts(lambda counts: (counts.seen_remembered, counts.seen))),
-    Figure("change_f1", "", "higher", _of_counts(_change_counts)),
+    Figure("change_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone, counts.come))),
+    Figure("disappeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone))),
+    Figure("appeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.come))),
 ]
 _STALENESS = [
     Figure("half_life_frames", "frames", "lower", _half_life("evident", "frames")),

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 MAX_SAMPLES = 200
 """Samples of a stream that a record keeps."""
-MIN_SPREAD = 20
+MIN_SPREAD = 50
 """Smallest difference of the numbers of entries from which a slope over entries is taken."""
 MIN_FRAMES = 100
 """Smallest number of frames from which a slope over frames is taken."""
