@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import pytest
 from hand_made import HandMade, Scripted, Shot, body, entry
 
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.protocol import MemoryEntry
 from evonav.memory_benchmark.records import StreamResult
@@ -134,7 +135,7 @@ def test_forgetting_at_the_start_of_a_visit_is_forgetting() -> None:
 def test_memory_that_forgets_everything_has_no_recall() -> None:
     update = judged([*FIRST, *removal(evidence_at=5)], [REMOVED], lambda i: []).update
     assert (update.seen, update.seen_remembered, update.standing, update.removals) == (3, 0, 0, 0)
-    assert (update.change_hits, update.change_false_alarms, update.change_misses) == (0, 0, 0)
+    assert (update.gone, update.come) == (ChangeCounts(), ChangeCounts())
 
 
 def test_moved_object_is_no_false_forget() -> None:
@@ -178,11 +179,11 @@ def test_entry_with_a_small_probability_is_not_believed() -> None:
 def test_change_f1_over_two_visits() -> None:
     shots = [*FIRST, *removal(evidence_at=5)]
     told = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE] if i < 7 else [PLATE]).update
-    assert (told.change_hits, told.change_false_alarms, told.change_misses) == (1, 0, 0)
+    assert (told.gone, told.come) == (ChangeCounts(hits=1), ChangeCounts())
     silent = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE]).update
-    assert (silent.change_hits, silent.change_false_alarms, silent.change_misses) == (0, 0, 1)
+    assert (silent.gone, silent.come) == (ChangeCounts(misses=1), ChangeCounts())
     wrong = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE] if i < 7 else [entry(1, 1.0)]).update
-    assert (wrong.change_hits, wrong.change_false_alarms, wrong.change_misses) == (0, 1, 1)
+    assert wrong.gone == ChangeCounts(false_alarms=1, misses=1)
 
 
 def test_entries_asked_for_less_often() -> None:
@@ -190,3 +191,16 @@ def test_entries_asked_for_less_often() -> None:
     result = judged(shots, [REMOVED], lambda i: [PLATE] if i >= 7 else [entry(1, 1.0), PLATE], every=3)
     (evident,) = (spell for spell in result.spells if spell.kind == "evident")
     assert (evident.lasted.frames, evident.is_over) == (3, True)  # asked after frames 5 and 8
+
+
+def test_entry_that_is_nearer_to_another_object_is_not_forgotten() -> None:
+    near = body("cup", 1.12)  # it comes next to the mug, and nearer to the mug's entry
+    shots = [*FIRST, *[Shot((*BEFORE, near), 2, {"cup": 30})] * 4]
+    added = Change("cup", "Mug", "added", 4, None, near)
+    update = judged(shots, [added], lambda i: [entry(1, 1.25), PLATE]).update
+    assert (update.standing, update.false_forgets) == (5, 0)
+
+
+def test_doors_and_windows_do_not_count() -> None:
+    update = judged(FIRST, [], lambda i: [entry(1, 1.0), PLATE, entry(3, 8.0, "Doorway", p=0.9)]).update
+    assert (update.entries, update.right_entries) == (2, 2)

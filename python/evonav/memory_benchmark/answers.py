@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.counted import counted
 from evonav.errors import EvonavError
 from evonav.memory_benchmark.protocol import MemoryEntry, Place
 
@@ -24,6 +25,10 @@ MAX_SHOWN = 120
 
 FailureKind = Literal["load", "raised", "hung", "died", "answer"]
 """`load`: it could not be made. `raised`, `hung`, `died`: a call ended so. `answer`: it answered what is no answer."""
+
+
+Hosting = Literal["here", "process", "offline"]
+"""The place where a memory runs: this process, its own, or elsewhere, with its answers in a file."""
 
 
 class MemoryFailedError(EvonavError):
@@ -72,6 +77,8 @@ class Entries:
 
 
 _FIELDS = ("centre_m",) * 3 + ("size_m",) * 3 + ("confidence", "p_present", "first_seen_s", "last_seen_s")
+NUM_COLUMNS = len(_FIELDS)
+"""Columns of `Entries.numbers`."""
 _NUM_GIVEN = 7
 """Columns that every entry has."""
 _NAN = math.nan
@@ -89,10 +96,10 @@ def read_entries(answer: object) -> Entries:
         raise MemoryFailedError("answer", f"entries(): {len(answer)} entries, must be at most {MAX_ENTRIES}")
     try:
         rows = [_row(entry) for entry in answer]
-        numbers = np.array(rows) if rows else np.empty((0, len(_FIELDS)))
+        numbers = np.array(rows) if rows else np.empty((0, NUM_COLUMNS))
         ids = np.array([entry.entry_id for entry in answer]) if rows else np.empty(0, np.int64)
         labels = tuple(entry.label for entry in answer)
-        is_typed = numbers.shape == (len(rows), len(_FIELDS)) and numbers.dtype.kind in "fi" and ids.dtype.kind in "iu"
+        is_typed = numbers.shape == (len(rows), NUM_COLUMNS) and numbers.dtype.kind in "fi" and ids.dtype.kind in "iu"
     except (AttributeError, TypeError, ValueError, OverflowError):
         is_typed = False
     if not is_typed or not all(isinstance(label, str) for label in labels):
@@ -164,7 +171,8 @@ def read_num_bytes(answer: object, num_entries: int) -> int:
         raise _wrong("num_bytes()", answer, "must not be negative")
     least = num_entries * MIN_ENTRY_BYTES
     if answer < least:
-        raise _wrong("num_bytes()", answer, f"{num_entries} entries alone take at least {least} bytes")
+        verb = "takes" if num_entries == 1 else "take"
+        raise _wrong("num_bytes()", answer, f"{counted(num_entries, 'entry')} alone {verb} at least {least} bytes")
     return int(answer)
 
 

@@ -21,6 +21,7 @@ from evonav.memory_benchmark.metrics.tracked_change import TrackedChange, tracke
 from evonav.memory_benchmark.metrics.update import EVIDENCE_PX, UpdateCounts
 from evonav.memory_benchmark.protocol import Place
 from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import SceneObject
 
 BELIEVED_P = 0.5
@@ -38,10 +39,21 @@ class _Scene:
     is_object: NDArray[np.bool_]
     num_matched: NDArray[np.intp]
     """Right entries of each object in the last answer."""
+    is_covered: NDArray[np.bool_]
+    """Whether an entry of the object's label was near it in the last answer, perhaps nearer to another object."""
     was_remembered: NDArray[np.bool_]
     """Whether the object had a right entry in this visit or just before it."""
     is_lost: NDArray[np.bool_]
     """Whether it lost one in this visit."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """The last answer of a visit. Doors and windows are not counted."""
+
+    entries: Entries
+    num_believed: int
+    num_right: int
 
 
 @dataclass(slots=True)
@@ -63,7 +75,7 @@ class Judge:
     _stale: Boxes = field(default_factory=lambda: Boxes(()))
     _stale_changes: list[TrackedChange] = field(default_factory=list)
     _believed_old: frozenset[PlaceKey] = frozenset()
-    _answer: tuple[Entries, NDArray[np.intp]] | None = None
+    _answer: _Answer | None = None
     _digest: "hashlib._Hash" = field(default_factory=hashlib.sha256)
 
     def look(self, frame: MemoryFrame, truth: FrameTruth) -> None:
@@ -87,17 +99,20 @@ class Judge:
         scene = self._scene
         assert scene is not None, "a frame comes first"
         self._digest.update(entries.ids.tobytes() + entries.numbers.tobytes() + "\0".join(entries.labels).encode())
-        is_first = self._answer is None
-        matches = scene.boxes.match(entries.labels, entries.centres_m)
-        self._answer = (entries, matches)
-        if is_first:
-            self.belief.take(entries.p_present, matches != NONE)
-        is_believed = ~(entries.p_present < BELIEVED_P)
-        num_matched = np.bincount(matches[is_believed & (matches != NONE)], minlength=len(scene.boxes))
-        is_remembered = num_matched > 0
-        scene.is_lost |= (scene.num_matched > 0) & ~is_remembered
-        scene.was_remembered |= is_remembered
+        is_object = np.array([label not in STRUCTURE_TYPES for label in entries.labels], np.bool_)
+        is_believed = is_object & ~(entries.p_present < BELIEVED_P)
+        if self._answer is None:
+            self._take_belief(entries)
+        matches = np.full(len(entries), NONE, np.intp)
+        believed = np.flatnonzero(is_believed)
+        labels = [entries.labels[index] for index in believed.tolist()]
+        matches[believed], scene.is_covered = scene.boxes.match(labels, entries.centres_m[believed])
+        num_matched = np.bincount(matches[matches != NONE], minlength=len(scene.boxes))
+        # An entry that is nearer to another object now was not forgotten.
+        scene.is_lost |= (scene.num_matched > 0) & ~scene.is_covered
+        scene.was_remembered |= num_matched > 0
         scene.num_matched = num_matched
+        self._answer = _Answer(entries, len(believed), int((matches != NONE).sum()))
         self._believe_changes(entries, np.flatnonzero(is_believed & (matches == NONE)))
 
     def end_visit(self) -> None:
@@ -105,8 +120,7 @@ class Judge:
         scene, counts = self._scene, self.counts
         if scene is None or self._answer is None:
             return
-        entries, matches = self._answer
-        self.belief.take(entries.p_present, matches != NONE)
+        self._take_belief(self._answer.entries)
         self._close_standing(np.ones(len(scene.boxes), np.bool_))
         is_remembered = scene.num_matched > 0
         scene.was_remembered, scene.is_lost = is_remembered.copy(), np.zeros_like(is_remembered)
@@ -114,20 +128,20 @@ class Judge:
             self._judge_removal(one)
             self._judge_arrival(one)
         is_seen = np.array([key in self.seen for key in scene.keys], np.bool_) & scene.is_object
-        is_believed = ~(entries.p_present < BELIEVED_P)
-        counts.entries += int(is_believed.sum())
-        counts.right_entries += int((is_believed & (matches != NONE)).sum())
+        counts.entries += self._answer.num_believed
+        counts.right_entries += self._answer.num_right
         counts.seen += int(is_seen.sum())
         counts.seen_remembered += int((is_seen & is_remembered).sum())
         counts.remembered += int(is_remembered.sum())
         counts.duplicates += int(np.maximum(scene.num_matched - 1, 0).sum())
-        right = {key for key, num in zip(scene.keys, scene.num_matched.tolist(), strict=True) if num}
+        covered = {key for key, is_covered in zip(scene.keys, scene.is_covered.tolist(), strict=True) if is_covered}
         self.snapshots.append(
             Snapshot(
-                believed=frozenset(right) | self._believed_old,
+                believed=frozenset(covered) | self._believed_old,
                 present=frozenset(scene.keys),
                 seen=frozenset(self.seen),
                 seen_empty=frozenset(one.old_key for one in self.tracked if one.old_key and one.is_evident),
+                taken=frozenset(one.old_key for one in self.tracked if one.old_key and not one.is_open),
             )
         )
         self._answer = None
@@ -162,14 +176,23 @@ class Judge:
 
     def end(self) -> tuple[UpdateCounts, list[Spell]]:
         """Close the stream, and return its counts and spells."""
-        hits, false_alarms, misses = change_counts(self.snapshots)
-        counts = replace(self.counts, change_hits=hits, change_false_alarms=false_alarms, change_misses=misses)
-        return counts, [spell for one in self.tracked for spell in one.spells()]
+        gone, come = change_counts(self.snapshots)
+        return replace(self.counts, gone=gone, come=come), [spell for one in self.tracked for spell in one.spells()]
 
     @property
     def digest(self) -> str:
         """Digest of all answers so far: equal for equal bits."""
         return self._digest.hexdigest()
+
+    def _take_belief(self, entries: Entries) -> None:
+        scene, p = self._scene, entries.p_present
+        assert scene is not None
+        given = [
+            index for index in np.flatnonzero(~np.isnan(p)).tolist() if entries.labels[index] not in STRUCTURE_TYPES
+        ]
+        if given:
+            matches, _ = scene.boxes.match([entries.labels[index] for index in given], entries.centres_m[given])
+            self.belief.take(p[given], matches != NONE)
 
     def _advance(self, frame: MemoryFrame) -> None:
         last, clocks = self._frame, self.clocks
@@ -219,6 +242,7 @@ class Judge:
             index_of={body.id: index for index, body in enumerate(boxes.bodies)},
             is_object=np.array([body.kind == "object" for body in boxes.bodies], np.bool_),
             num_matched=np.zeros(size, np.intp),
+            is_covered=np.zeros(size, np.bool_),
             was_remembered=np.zeros(size, np.bool_),
             is_lost=np.zeros(size, np.bool_),
         )
@@ -227,6 +251,7 @@ class Judge:
             pairs = [(source[key], index) for index, key in enumerate(keys) if key in source]
             old, now = np.array(pairs, np.intp).reshape(-1, 2).T
             scene.num_matched[now] = before.num_matched[old]
+            scene.is_covered[now] = before.is_covered[old]
             scene.was_remembered[now] = before.was_remembered[old]
             scene.is_lost[now] = before.is_lost[old]
             is_gone = np.ones(len(before.boxes), np.bool_)
@@ -241,7 +266,7 @@ class Judge:
         was_remembered, is_lost = scene.was_remembered & of, scene.is_lost & of
         counts.standing += int(was_remembered.sum())
         counts.false_forgets += int(is_lost.sum())
-        counts.false_forgets_at_end += int((is_lost & (scene.num_matched == 0)).sum())
+        counts.false_forgets_at_end += int((is_lost & ~scene.is_covered).sum())
 
     def _believe_changes(self, entries: Entries, unmatched: NDArray[np.intp]) -> None:
         """Note which left places have an entry, and which new places have one."""
@@ -294,4 +319,4 @@ class Judge:
 
 def _is_uncovered(body: SceneObject, boxes: Boxes) -> bool:
     """Return whether an entry at the centre of a body would be stale."""
-    return bool(boxes.match([body.category], np.array([body.centre_m], np.float64))[0] == NONE)
+    return bool(boxes.match([body.category], np.array([body.centre_m], np.float64))[0][0] == NONE)

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.answers import FailureKind
+from evonav.memory_benchmark.answers import FailureKind, Hosting
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
 from evonav.memory_benchmark.metrics.size import Size
 from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
@@ -65,7 +65,7 @@ class StreamResult(_Record):
     stream: str
     kind: str
     house: str
-    hosting: Literal["here", "process", "offline"]
+    hosting: Hosting
     num_frames: int
     """Frames that it was given."""
     num_visits: int

@@ -1,22 +1,23 @@
 """Run a memory through a stream: time it, judge it, and let a failure cost it this stream only."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.memory_benchmark.answers import MemoryFailedError
-from evonav.memory_benchmark.frames import MemoryFrame
+from evonav.memory_benchmark.answers import Entries, Hosting, MemoryFailedError
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost, LocalMemory
 from evonav.memory_benchmark.hosting.process import RemoteMemory
 from evonav.memory_benchmark.judge import Judge
 from evonav.memory_benchmark.metrics import size, speed
 from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
-from evonav.memory_benchmark.protocol import Memory
+from evonav.memory_benchmark.protocol import Memory, Place
 from evonav.memory_benchmark.records import Belief, Failure, Speed, StreamResult
 from evonav.memory_benchmark.truth import Stream
 
@@ -25,8 +26,6 @@ NUM_WARM_UP = 20
 NUM_QUERIES = 10
 """Labels that are asked for at the end of a visit."""
 
-HostedMemory = LocalMemory | RemoteMemory
-"""A memory as the runner sees it; every call may raise `MemoryFailedError`."""
 MemorySource = str | Component[Memory] | Callable[[], Memory]
 """`./file.py:Class` or `package.module:Class`, the same with options, or a function that makes a memory."""
 
@@ -60,6 +59,38 @@ class Settings:
             raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be positive")
 
 
+class HostedMemory(Protocol):
+    """A memory as the runner sees it; every call may raise `MemoryFailedError`."""
+
+    hosting: Hosting
+    can_locate: bool
+    rss_bytes: int | None
+    """Resident memory of its own process after the last call; `None` without one."""
+    peak_rss_bytes: int | None
+    """Peak of it, known after `num_bytes`."""
+
+    def reset(self, info: StreamInfo) -> object:
+        """Begin a stream."""
+
+    def visit(self, time_s: float) -> Cost | None:
+        """Begin a visit."""
+
+    def observe(self, frame: MemoryFrame) -> Cost | None:
+        """Hand over a frame; return what it cost, if that is known."""
+
+    def entries(self) -> Entries:
+        """Return the entries."""
+
+    def num_bytes(self, num_entries: int) -> int | None:
+        """Return the size that the memory tells; `None` if it tells none."""
+
+    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+        """Ask where something is."""
+
+    def close(self) -> None:
+        """Let go of the memory."""
+
+
 def measure(memory: MemorySource, stream: Stream, settings: Settings | None = None) -> StreamResult:
     """Run a memory through a stream and judge it.
 
@@ -69,7 +100,7 @@ def measure(memory: MemorySource, stream: Stream, settings: Settings | None = No
     Args:
         memory: The memory; a fresh one is made.
         stream: The stream.
-        settings: How it is run.
+        settings: Place and limits of the run, and how often the memory is asked.
 
     Returns:
         The result; one with a `failure` and without figures if the memory raised, hung, died or answered wrongly.
@@ -78,14 +109,25 @@ def measure(memory: MemorySource, stream: Stream, settings: Settings | None = No
         InvalidArgumentError: A function was to run in its own process.
     """
     settings = settings or Settings()
-    result = _Run(stream, settings).result(memory)
+    result = judge_memory(lambda: host(memory, settings), stream, settings)
     if not settings.runs_twice or result.failure is not None:
         return result
-    again = _Run(stream, settings).result(memory)
+    again = judge_memory(lambda: host(memory, settings), stream, settings)
     return result.model_copy(update={"is_deterministic": again.digest == result.digest})
 
 
-def host(memory: MemorySource, settings: Settings) -> HostedMemory:
+def judge_memory(new_memory: Callable[[], HostedMemory], stream: Stream, settings: Settings) -> StreamResult:
+    """Run a hosted memory through a stream and judge it.
+
+    Args:
+        new_memory: Makes the memory; it is closed at the end.
+        stream: The stream.
+        settings: They say how often it is asked.
+    """
+    return _Run(stream, settings).result(new_memory)
+
+
+def host(memory: MemorySource, settings: Settings) -> LocalMemory | RemoteMemory:
     """Make a memory, in this process or in its own.
 
     Raises:
@@ -111,7 +153,7 @@ class _Times:
 
     observe: list[Cost] = field(default_factory=list)
     locate: list[Cost] = field(default_factory=list)
-    visit: list[Cost] = field(default_factory=list)
+    visit: list[Cost | None] = field(default_factory=list)
     frames: list[int] = field(default_factory=list)
     num_entries: list[int] = field(default_factory=list)
     rss_mb: list[float] = field(default_factory=list)
@@ -128,14 +170,14 @@ class _Run:
         self._num_frames = self._num_visits = 0
         self._is_answer_due = False
         self._num_entries = 0
-        self._hosting = "here"
+        self._hosting: Hosting = "here"
 
-    def result(self, memory: MemorySource) -> StreamResult:
+    def result(self, new_memory: Callable[[], HostedMemory]) -> StreamResult:
         try:
-            with closing(host(memory, self._settings)) as hosted:
-                self._hosting = "process" if isinstance(hosted, RemoteMemory) else "here"
-                self._through(hosted)
-                return self._judged(hosted)
+            with closing(new_memory()) as memory:
+                self._hosting = memory.hosting
+                self._through(memory)
+                return self._judged(memory)
         except MemoryFailedError as error:
             frame = None if self._frame is None else self._frame.index
             return self._record(failure=Failure(kind=error.kind, message=str(error), frame=frame))
@@ -154,7 +196,7 @@ class _Run:
             self._is_answer_due = True
             if self._num_frames % self._settings.every == 0:
                 self._ask(memory)
-            if self._num_frames > NUM_WARM_UP:
+            if self._num_frames > NUM_WARM_UP and cost is not None:
                 self._times.observe.append(cost)
                 self._times.frames.append(self._num_frames)
                 self._times.num_entries.append(self._num_entries)
@@ -206,14 +248,15 @@ class _Run:
         wall = speed.percentiles([cost.wall_s for cost in times.observe])
         if wall is None:
             return None
-        cpu_ms = [cost.cpu_s * 1e3 for cost in times.observe]
-        samples = speed.thinned(times.frames, times.num_entries, cpu_ms)
+        cpu_s = _known(cost.cpu_s for cost in times.observe)
+        seconds = cpu_s or [cost.wall_s for cost in times.observe]
+        samples = speed.thinned(times.frames, times.num_entries, np.array(seconds) * 1e3)
         return Speed(
-            observe_cpu=speed.percentiles([cost.cpu_s for cost in times.observe]),
+            observe_cpu=speed.percentiles(cpu_s),
             observe_wall=wall,
-            locate_cpu=speed.percentiles([cost.cpu_s for cost in times.locate]),
+            locate_cpu=speed.percentiles(_known(cost.cpu_s for cost in times.locate)),
             locate_wall=speed.percentiles([cost.wall_s for cost in times.locate]),
-            visit_wall_max_ms=max(cost.wall_s for cost in times.visit) * 1e3,
+            visit_wall_max_ms=max((cost.wall_s * 1e3 for cost in times.visit if cost is not None), default=None),
             real_time_factor=speed.real_time_factor(wall.mean_ms / 1e3, self._stream.info.rate_hz),
             slope_per_100_entries_ms=speed.slope_per_100_entries(samples),
             slope_per_1000_frames_ms=speed.slope_per_1000_frames(samples),
@@ -247,3 +290,7 @@ class _Run:
             "num_changes": len(stream.changes),
         }
         return StreamResult.model_validate({**fixed, **parts})
+
+
+def _known(values: Iterable[float | None]) -> list[float]:
+    return [value for value in values if value is not None]

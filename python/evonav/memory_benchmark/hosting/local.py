@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from evonav.agents.hosting.error_text import describe
-from evonav.memory_benchmark.answers import Entries, MemoryFailedError, read_entries, read_num_bytes, read_places
+from evonav.memory_benchmark.answers import (
+    Entries,
+    Hosting,
+    MemoryFailedError,
+    read_entries,
+    read_num_bytes,
+    read_places,
+)
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.protocol import Memory, Place
 
@@ -21,14 +28,18 @@ T = TypeVar("T")
 class Cost:
     """The cost of a call."""
 
-    cpu_s: float
-    """CPU time of the whole process while the call ran: threads that the memory starts count, too."""
+    cpu_s: float | None
+    """CPU time of the whole process while the call ran: threads that the memory starts count, too.
+
+    `None` where it is not known.
+    """
     wall_s: float
 
 
 class LocalMemory:
     """A memory in this process. A call that raises or answers wrongly is a `MemoryFailedError`."""
 
+    hosting: Hosting = "here"
     rss_bytes: int | None = None
     """Resident memory of its own process: it has none."""
     peak_rss_bytes: int | None = None

@@ -13,7 +13,15 @@ import numpy as np
 from evonav.component import Component
 from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting, AgentProcess
 from evonav.evaluation.records.schema import ErrorKind
-from evonav.memory_benchmark.answers import MAX_ENTRIES, Entries, FailureKind, MemoryFailedError, checked
+from evonav.memory_benchmark.answers import (
+    MAX_ENTRIES,
+    NUM_COLUMNS,
+    Entries,
+    FailureKind,
+    Hosting,
+    MemoryFailedError,
+    checked,
+)
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
 from evonav.memory_benchmark.protocol import Memory, Place
@@ -31,6 +39,8 @@ class _MemoryProcess(AgentProcess):
 
 class RemoteMemory:
     """A memory in a process of its own; its answers were checked there and are read as plain data."""
+
+    hosting: Hosting = "process"
 
     def __init__(self, memory: Component[Memory], *, timeout_s: float, memory_mb: int | None = None) -> None:
         """Start the process and make the memory in it.
@@ -73,14 +83,13 @@ class RemoteMemory:
         parts = self._ask("entries")["entries"]
         try:
             ids = np.frombuffer(base64.b64decode(parts["ids"]), np.int64)
-            numbers = np.frombuffer(base64.b64decode(parts["numbers"]), np.float64).reshape(len(ids), -1)
+            numbers = np.frombuffer(base64.b64decode(parts["numbers"]), np.float64).reshape(-1, NUM_COLUMNS)
             entries = Entries(ids, tuple(map(str, parts["labels"])), numbers)
-            is_table = (numbers.shape[1:] == (10,) and len(entries.labels) == len(ids)) or not len(ids)
         except (KeyError, TypeError, ValueError) as error:
             raise MemoryFailedError("died", f"malformed response: entries: {error}") from None
-        if not is_table:
-            raise MemoryFailedError("died", "malformed response: entries: no table")
-        return checked(entries) if len(ids) else Entries(ids, (), np.empty((0, 10)))
+        if not len(ids) == len(numbers) == len(entries.labels):
+            raise MemoryFailedError("died", "malformed response: entries: columns of different lengths")
+        return checked(entries)
 
     def num_bytes(self, num_entries: int) -> int | None:
         """Return the size that the memory tells; `None` if it tells none."""

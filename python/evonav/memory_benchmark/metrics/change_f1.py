@@ -27,27 +27,38 @@ class Snapshot:
     """Places at which the object was seen so far."""
     seen_empty: frozenset[PlaceKey]
     """Left places that were seen empty so far."""
+    taken: frozenset[PlaceKey] = frozenset()
+    """Left places at which another object of the label stands: entries there are no claims about the one that left."""
 
 
-def change_counts(snapshots: Sequence[Snapshot]) -> tuple[int, int, int]:
+@dataclass(slots=True)
+class ChangeCounts:
+    """Claims of one sort: that something is gone, or that it has come."""
+
+    hits: int = 0
+    false_alarms: int = 0
+    misses: int = 0
+
+
+def change_counts(snapshots: Sequence[Snapshot]) -> tuple[ChangeCounts, ChangeCounts]:
     """Count changes that a memory claims truly, falsely and not at all, over all pairs of query time < robot time.
 
     A claim is a place that the memory believed in at one of the two times only. A change that was not claimed is
     counted if there was evidence of it by the robot time.
 
     Returns:
-        True positives, false positives and false negatives.
+        Counts of what is gone, and of what has come.
     """
-    hits = false_alarms = misses = 0
+    gone, come = ChangeCounts(), ChangeCounts()
     for query, robot in combinations(snapshots, 2):
-        claimed_gone = (query.believed - robot.believed) & query.present
-        hits += len(claimed_gone - robot.present)
-        false_alarms += len(claimed_gone & robot.present)
-        still_believed = query.believed & robot.believed & query.present
-        misses += len((still_believed - robot.present) & robot.seen_empty)
-        claimed_new = (robot.believed - query.believed) & robot.present
-        hits += len(claimed_new - query.present)
+        known = query.believed & query.present - robot.taken
+        claimed_gone = known - robot.believed
+        gone.hits += len(claimed_gone - robot.present)
+        gone.false_alarms += len(claimed_gone & robot.present)
+        gone.misses += len((known & robot.believed & robot.seen_empty) - robot.present)
+        claimed_come = (robot.believed - query.believed) & robot.present
+        come.hits += len(claimed_come - query.present)
         # What was never seen before the query time is a discovery, and no claim of a change.
-        false_alarms += len(claimed_new & query.present & query.seen)
-        misses += len(((robot.present - query.present) & robot.seen) - robot.believed)
-    return hits, false_alarms, misses
+        come.false_alarms += len(claimed_come & query.present & query.seen)
+        come.misses += len(((robot.present - query.present) & robot.seen) - robot.believed)
+    return gone, come

@@ -15,6 +15,8 @@ from evonav.world.simulator import SceneObject
 
 NONE = -1
 """Match of a stale entry."""
+_BLOCK = 20_000
+"""Entries that are matched at a time: a memory may answer a million."""
 
 
 class Boxes:
@@ -57,19 +59,29 @@ class Boxes:
         gaps_m = np.maximum(gaps_m, 0.0)
         return entries, bodies, np.sqrt(np.einsum("ij,ij->i", gaps_m, gaps_m))
 
-    def match(self, labels: Sequence[str], centres_m: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Return the body of each entry: `(N,)` indices, `NONE` for a stale entry.
+    def match(
+        self, labels: Sequence[str], centres_m: NDArray[np.float64]
+    ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Match entries with bodies.
 
         Args:
             labels: `N` labels.
             centres_m: `(N, 3)` centres.
+
+        Returns:
+            `(N,)` index of the body of each entry, `NONE` for a stale entry; and `(M,)` whether each body has an entry
+            of its label within `STALE_MARGIN_M`, even if another body is nearer to that entry.
         """
-        entries, bodies, distances_m = self.pairs(labels, centres_m)
-        is_near = distances_m <= STALE_MARGIN_M
-        entries, bodies, distances_m = entries[is_near], bodies[is_near], distances_m[is_near]
-        offsets_m = centres_m[entries] - self.centres_m[bodies]
-        order = np.lexsort((np.einsum("ij,ij->i", offsets_m, offsets_m), distances_m, entries))
-        first = np.unique(entries[order], return_index=True)[1]
         matches = np.full(len(labels), NONE, np.intp)
-        matches[entries[order][first]] = bodies[order][first]
-        return matches
+        is_covered = np.zeros(len(self), np.bool_)
+        for start in range(0, len(labels), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            entries, bodies, distances_m = self.pairs(labels[block], centres_m[block])
+            is_near = distances_m <= STALE_MARGIN_M
+            entries, bodies, distances_m = entries[is_near], bodies[is_near], distances_m[is_near]
+            is_covered[bodies] = True
+            offsets_m = centres_m[block][entries] - self.centres_m[bodies]
+            order = np.lexsort((np.einsum("ij,ij->i", offsets_m, offsets_m), distances_m, entries))
+            first = np.unique(entries[order], return_index=True)[1]
+            matches[start + entries[order][first]] = bodies[order][first]
+        return matches, is_covered

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 MAX_SAMPLES = 200
 """Samples of a stream that a record keeps."""
-MIN_SPREAD = 20
+MIN_SPREAD = 50
 """Smallest difference of the numbers of entries from which a slope over entries is taken."""
 MIN_FRAMES = 100
 """Smallest number of frames from which a slope over frames is taken."""
@@ -28,11 +28,12 @@ class Percentiles:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The middle of some consecutive frames."""
+    """The medians of some consecutive frames."""
 
     frame: float
     entries: float
-    cpu_ms: float
+    ms: float
+    """CPU time, or wall time where that alone is known."""
 
 
 def percentiles(seconds: ArrayLike) -> Percentiles | None:
@@ -44,9 +45,9 @@ def percentiles(seconds: ArrayLike) -> Percentiles | None:
     return Percentiles(times_ms.size, float(times_ms.mean()), p50, p95, p99, float(times_ms.max()))
 
 
-def thinned(frames: ArrayLike, entries: ArrayLike, cpu_ms: ArrayLike, num: int = MAX_SAMPLES) -> list[Sample]:
+def thinned(frames: ArrayLike, entries: ArrayLike, times_ms: ArrayLike, num: int = MAX_SAMPLES) -> list[Sample]:
     """Return at most `num` samples: medians over equal parts of the frames."""
-    columns = np.column_stack([frames, entries, cpu_ms]).astype(np.float64)
+    columns = np.column_stack([frames, entries, times_ms]).astype(np.float64)
     parts = np.array_split(columns, num) if len(columns) > num else list(columns[:, None])
     return [Sample(*np.median(part, axis=0).tolist()) for part in parts]
 
@@ -70,7 +71,7 @@ def theil_sen(x: NDArray[np.float64], y: NDArray[np.float64], is_pair: NDArray[n
 
 
 def slope_per_100_entries(samples: Sequence[Sample]) -> float | None:
-    """Return how many CPU ms a call takes more for 100 more entries (Theil-Sen).
+    """Return how many ms a call takes more for 100 more entries (Theil-Sen).
 
     Returns:
         `None` if the number of entries spreads by less than `MIN_SPREAD`.
@@ -78,12 +79,12 @@ def slope_per_100_entries(samples: Sequence[Sample]) -> float | None:
     entries = np.array([sample.entries for sample in samples])
     if not entries.size or np.ptp(entries) < MIN_SPREAD:
         return None
-    slope = theil_sen(entries, np.array([sample.cpu_ms for sample in samples]))
+    slope = theil_sen(entries, np.array([sample.ms for sample in samples]))
     return None if slope is None else 100.0 * slope
 
 
 def slope_per_1000_frames(samples: Sequence[Sample]) -> float | None:
-    """Return how many CPU ms a call takes more after 1,000 more frames with as many entries: Theil-Sen over such pairs.
+    """Return how many ms a call takes more after 1,000 more frames with as many entries: Theil-Sen over such pairs.
 
     As many entries are numbers that differ by at most 2%, or by one.
 
@@ -96,7 +97,7 @@ def slope_per_1000_frames(samples: Sequence[Sample]) -> float | None:
     is_equal = np.abs(entries[:, None] - entries[None, :]) <= np.maximum(1.0, 0.02 * larger)
     if not (is_equal & (frames[None, :] - frames[:, None] >= MIN_FRAMES)).any():
         return None
-    slope = theil_sen(frames, np.array([sample.cpu_ms for sample in samples]), is_equal)
+    slope = theil_sen(frames, np.array([sample.ms for sample in samples]), is_equal)
     return None if slope is None else 1000.0 * slope
 
 

@@ -71,9 +71,7 @@ class Survival:
         return np.where(is_half.any(axis=-1), first, math.inf)
 
 
-def kaplan_meier(
-    durations: NDArray[np.float64], is_over: NDArray[np.bool_], weights: NDArray[np.float64] | None = None
-) -> Survival:
+def kaplan_meier(durations: NDArray[np.float64], is_over: NDArray[np.bool_]) -> Survival:
     """Estimate a survival curve from spells of which some were not watched to their end.
 
     Source: Kaplan & Meier, "Nonparametric Estimation from Incomplete Observations", JASA 1958. A spell that is censored
@@ -82,14 +80,30 @@ def kaplan_meier(
     Args:
         durations: `(N,)`.
         is_over: `(N,)` false for a censored spell.
-        weights: `(..., N)` weight of each spell, such as how often a resample draws its house; default: one each.
     """
-    weights = np.ones(len(durations)) if weights is None else weights
+    ends, at_risk, over = risk_table(durations, is_over)
+    return survival(ends, at_risk.sum(axis=0), over.sum(axis=0))
+
+
+def risk_table(
+    durations: NDArray[np.float64], is_over: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return what the estimate needs of each spell; sums over spells may be weighted.
+
+    Returns:
+        `(T,)` different durations with an end; `(N, T)` whether a spell is at risk there, and whether it ends there.
+    """
     ends = np.unique(durations[is_over])
-    at_risk = weights @ (durations[:, None] >= ends).astype(np.float64)
-    over = weights @ ((durations[:, None] == ends) & is_over[:, None]).astype(np.float64)
+    at_risk = (durations[:, None] >= ends).astype(np.float64)
+    over = ((durations[:, None] == ends) & is_over[:, None]).astype(np.float64)
+    return ends, at_risk, over
+
+
+def survival(ends: NDArray[np.float64], at_risk: NDArray[np.float64], over: NDArray[np.float64]) -> Survival:
+    """Return the curve of sums of a `risk_table`, `(..., T)`."""
     left = 1.0 - np.divide(over, at_risk, out=np.zeros_like(over), where=at_risk > 0)
-    return Survival(ends, np.cumprod(left, axis=-1))
+    shares: NDArray[np.float64] = np.cumprod(left, axis=-1, dtype=np.float64)
+    return Survival(ends, shares)
 
 
 def durations_of(

@@ -1,6 +1,8 @@
 """Count what a memory removes, adds, moves, forgets and doubles, given evidence."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 
 EVIDENCE_PX = 25
 """Pixels in one frame from which on it shows an object, or shows that a place is empty."""
@@ -40,7 +42,7 @@ class UpdateCounts:
     """Objects with a right entry, at the ends of all visits."""
     duplicates: int = 0
     """Right entries beyond an object's first, at the ends of all visits."""
-    change_hits: int = 0
-    """True positives of `change_f1`."""
-    change_false_alarms: int = 0
-    change_misses: int = 0
+    gone: ChangeCounts = field(default_factory=ChangeCounts)
+    """Claims that something is gone, see `change_f1`."""
+    come: ChangeCounts = field(default_factory=ChangeCounts)
+    """Claims that something has come."""
