@@ -22,7 +22,7 @@ from evonav.memory_benchmark.truth import Change, FrameTruth
 from evonav.perception import Perception, StageScene
 from evonav.perception.shorthand import read_word
 from evonav.sensors.observation import View, VisibleOccupancy
-from evonav.tasks.language import PROCTHOR_TYPES
+from evonav.tasks.language import PROCTHOR_TYPES, STRUCTURE_TYPES
 from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import Frame, SceneObject
@@ -80,7 +80,7 @@ class RenderedStream:
     @property
     def info(self) -> StreamInfo:
         """The public facts that a memory is told; the labels are all of ProcTHOR's types, whatever the house holds."""
-        return StreamInfo(self.spec.camera.intrinsics, PROCTHOR_TYPES, RATE_HZ)
+        return StreamInfo(self.spec.camera.intrinsics, (*PROCTHOR_TYPES, *STRUCTURE_TYPES), RATE_HZ)
 
     @property
     def num_frames(self) -> int:

@@ -198,4 +198,6 @@ def _record(kind: type[R], path: Path, text: str) -> R:
     try:
         return kind.model_validate_json(text)
     except ValidationError as error:
-        raise StoreError(f"{path}: {error}") from error
+        problem = error.errors()[0]
+        place = ".".join(map(str, problem["loc"])) or "JSON"
+        raise StoreError(f"{path}: field `{place}`: {problem['msg']}; it is in {text[:200]!r}") from error
