@@ -27,7 +27,7 @@ def test_agents_with_object_entries_of_ours_take_a_rule() -> None:
 
 def test_a_rule_that_does_not_exist_is_named_with_the_nearest() -> None:
     for is_in_process in (True, False):
-        with pytest.raises(InvalidArgumentError, match="no forgetting rule 'baies': did you mean `bayes`[?]$"):
+        with pytest.raises(InvalidArgumentError, match=r"no forgetting rule 'baies': did you mean `bayes`[?]$"):
             check_agent_name("fu@baies", is_in_process=is_in_process)
 
 

@@ -1,6 +1,6 @@
 //! What an object map needs to forget: entries in view, points that are seen through, its size.
 
-use std::mem::size_of;
+use std::{collections::BTreeSet, mem::size_of};
 
 use evonav_core::{
     memory::objects::{
@@ -200,12 +200,19 @@ fn the_size_is_that_of_points_and_tables() {
     let empty = ObjectMap::new(ObjectMapConfig::default()).unwrap();
     assert_eq!(empty.num_bytes(), size_of::<ObjectMap>());
     let map = map_of(&[(0.0, 0.0, 2.0), (0.0, 2.0, 1.5)]);
-    let num_points: usize = map.entries().iter().map(|entry| entry.cloud.points().len()).sum();
-    // Three coordinates and a link a point; the tables take at most 64 bytes a point more here,
-    // where hardly two points share a block, and an entry less than 2,000 bytes.
-    let least = num_points * (size_of::<Point>() + size_of::<u32>());
-    let num_entries = map.entries().len();
-    let most = 2 * least + num_points * 300 + num_entries * 2000;
+    let num_blocks = |points: &[Point], edge_m: f32| {
+        let blocks = points.iter().map(|point| point.map(|v| (v / edge_m).floor() as i32));
+        blocks.collect::<BTreeSet<_>>().len()
+    };
+    // Three coordinates and a link a point; a bit a voxel and a number a cell, in blocks of 64.
+    let estimate = |points: &[Point]| {
+        points.len() * (size_of::<Point>() + size_of::<u32>())
+            + num_blocks(points, 0.04) * size_of::<u64>()
+            + num_blocks(points, 0.1) * 64 * size_of::<u32>()
+    };
+    let least: usize = map.entries().iter().map(|entry| estimate(entry.cloud.points())).sum();
+    // Vectors and hash tables have at most about as much room again, and blocks a key each.
+    let most = 3 * least + map.entries().len() * 2000;
     assert!((least..most).contains(&map.num_bytes()), "{least} {} {most}", map.num_bytes());
     let mut fewer = map.clone();
     fewer.remove(map.entries()[0].id);
