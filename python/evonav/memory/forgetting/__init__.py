@@ -1,9 +1,9 @@
 """Rules that decide what an object map forgets, each from a published system."""
 
 from evonav.memory.forgetting.bayes import Bayes
-from evonav.memory.forgetting.looks import FailedLook, LastWins, Never, Reset
+from evonav.memory.forgetting.one_view import FailedLook, LastWins, Never, Reset
 from evonav.memory.forgetting.points import SeeThrough, ShareDeleted
-from evonav.memory.forgetting.registry import RULES, make
+from evonav.memory.forgetting.registry import RULES, check_name, make
 from evonav.memory.forgetting.rule import ForgettingRule
 from evonav.memory.forgetting.votes import RayVotes, StatusWindow
 
@@ -19,5 +19,6 @@ __all__ = [
     "SeeThrough",
     "ShareDeleted",
     "StatusWindow",
+    "check_name",
     "make",
 ]

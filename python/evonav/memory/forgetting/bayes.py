@@ -3,7 +3,14 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from evonav.memory.forgetting.rule import EntryStates, ForgettingRule, detected_ids, expected_px, looks, remove_all
+from evonav.memory.forgetting.rule import (
+    EntryStates,
+    ForgettingRule,
+    detected_ids,
+    expected_px,
+    look_at_places,
+    remove_all,
+)
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import EvidenceConfig, Presence, PresenceConfig, judge_presence
 from evonav.sensors.observation import View
@@ -44,7 +51,7 @@ class Bayes(ForgettingRule):
     min_shown: float = 0.5
     """It must also show at least this share of the points that are in view or hidden."""
     min_px: float = 64.0
-    """Where a surface is seen, a detection is missing only if the object would cover about this many pixels."""
+    """Smallest number of pixels that the object would cover, if a missing detection on a surface is to count."""
     evidence: EvidenceConfig = field(default_factory=EvidenceConfig)
     """Parameters of the comparison of points with depth."""
     _p: EntryStates[float] = field(init=False, repr=False, default_factory=EntryStates)
@@ -67,7 +74,7 @@ class Bayes(ForgettingRule):
             p = self._p.get(entry_id, self.prior)
             self._p[entry_id] = self._posterior(p, self.detection_rate, self.false_positive_rate)
         gone = []
-        for look in looks(map_, view, update, self.evidence):
+        for look in look_at_places(map_, view, update, self.evidence):
             if look.is_detected or not look.is_clear(self.min_points, self.min_shown):
                 continue
             presence = judge_presence(look.evidence, is_detected=False, config=_PRESENCE)

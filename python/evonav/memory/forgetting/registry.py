@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from evonav.errors import InvalidArgumentError
 from evonav.memory.forgetting.bayes import Bayes
-from evonav.memory.forgetting.looks import FailedLook, LastWins, Never, Reset
+from evonav.memory.forgetting.one_view import FailedLook, LastWins, Never, Reset
 from evonav.memory.forgetting.points import SeeThrough, ShareDeleted
 from evonav.memory.forgetting.rule import ForgettingRule
 from evonav.memory.forgetting.votes import RayVotes, StatusWindow

@@ -1,4 +1,4 @@
-"""What all forgetting rules share: when they are asked, and how they look at remembered places."""
+"""Define what all forgetting rules share: their interface, and one view of remembered places."""
 
 import math
 from abc import ABC, abstractmethod
@@ -52,7 +52,7 @@ class ForgettingRule(ABC):
         Args:
             map_: The map, which has integrated the view; what is forgotten is removed from it.
             view: The view.
-            update: What `ObjectMap.update` returned for it.
+            update: The result of `ObjectMap.update` for it.
             time_s: Time since the first view of all.
 
         Returns:
@@ -68,7 +68,7 @@ class ForgettingRule(ABC):
 
 
 class EntryStates(dict[int, State], Generic[State]):
-    """What a rule keeps for each entry."""
+    """States that a rule stores by entry."""
 
     def follow(self, update: ObjectUpdate) -> None:
         """Drop the states of the entries that a clean-up removed or merged into others, which keep their own."""
@@ -82,7 +82,7 @@ class EntryStates(dict[int, State], Generic[State]):
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What one view shows at the place of an entry."""
+    """The evidence of one view about one entry."""
 
     entry_id: int
     evidence: DepthEvidence
@@ -113,7 +113,7 @@ def detected_ids(update: ObjectUpdate) -> list[int]:
     return sorted({entry_id for entry_id in update.entry_ids if entry_id is not None})
 
 
-def looks(map_: ObjectMap, view: View, update: ObjectUpdate, config: EvidenceConfig) -> Iterator[Look]:
+def look_at_places(map_: ObjectMap, view: View, update: ObjectUpdate, config: EvidenceConfig) -> Iterator[Look]:
     """Return what a view shows at the places of all entries in it, as far as detections count.
 
     Only entries with their boxes in view are compared with the depth image, in one call.

@@ -4,7 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from evonav.memory.forgetting.rule import EntryStates, ForgettingRule, Look, expected_px, looks, remove_all
+from evonav.memory.forgetting.rule import EntryStates, ForgettingRule, Look, expected_px, look_at_places, remove_all
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import EvidenceConfig
 from evonav.sensors.observation import View
@@ -18,8 +18,8 @@ class RayVotes(ForgettingRule):
     from a ray that passes through it, and none from a ray that ends before it. Votes are counted in bins of time, and
     a window slides over the bins: an object changed where the absent share of a window exceeds 0.6. Khronos' bins have
     5 s and its window 5 bins; here a bin is a view that votes, so that it means the same at any frame rate. Khronos
-    reads all rays after the fact, in both directions of time; here windows end at the present view, and one needs
-    `min_looks` views, so that one look never decides.
+    reads all rays after the fact, in both directions of time; here windows end at the present view, which
+    must itself show more empty space than surface, and have `min_looks` views at least, so that one look never decides.
     """
 
     name: ClassVar[str] = "ray-votes"
@@ -40,13 +40,14 @@ class RayVotes(ForgettingRule):
         """Count this view's votes; forget the entries that are voted absent."""
         self._votes.follow(update)
         gone = []
-        for look in looks(map_, view, update, self.evidence):
+        for look in look_at_places(map_, view, update, self.evidence):
             evidence = look.evidence
             if evidence.num_not_hidden < self.min_votes:
                 continue
             votes = self._votes.setdefault(look.entry_id, deque(maxlen=self.window))
             votes.append((evidence.num_supported, evidence.num_see_through))
-            if not look.is_detected and self._is_voted_absent(votes):
+            is_empty = evidence.num_see_through > evidence.num_supported and not look.is_detected
+            if is_empty and self._is_voted_absent(votes):
                 gone.append(look.entry_id)
                 del self._votes[look.entry_id]
         return remove_all(map_, gone)
@@ -98,7 +99,7 @@ class StatusWindow(ForgettingRule):
         """Count the missing detections of this view; forget the entries that have been pending for long."""
         self._num_missed.follow(update)
         gone = []
-        for look in looks(map_, view, update, self.evidence):
+        for look in look_at_places(map_, view, update, self.evidence):
             if look.is_detected:
                 self._num_missed[look.entry_id] = 0
             elif self._is_expected(map_, look, view):

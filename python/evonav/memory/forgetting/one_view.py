@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from evonav.memory.forgetting.rule import ForgettingRule, looks, remove_all
+from evonav.memory.forgetting.rule import ForgettingRule, look_at_places, remove_all
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import EvidenceConfig, Presence, PresenceConfig, judge_presence
 from evonav.sensors.observation import View
@@ -62,7 +62,7 @@ class LastWins(ForgettingRule):
             map_,
             [
                 look.entry_id
-                for look in looks(map_, view, update, self.evidence)
+                for look in look_at_places(map_, view, update, self.evidence)
                 if not look.is_detected
                 and look.is_clear(self.min_points, self.min_shown)
                 and look.evidence.num_see_through > look.evidence.num_supported
@@ -87,7 +87,7 @@ class FailedLook(ForgettingRule):
 
     def after_update(self, map_: ObjectMap, view: View, update: ObjectUpdate, time_s: float) -> tuple[int, ...]:
         """Forget the entries that this view shows to be absent."""
-        found = looks(map_, view, update, self.evidence)
+        found = look_at_places(map_, view, update, self.evidence)
         absent = Presence.NO
         return remove_all(
             map_,
