@@ -211,6 +211,9 @@ def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
     top = 1.15 * max([1.0, *(end for end in ends if end is not None and math.isfinite(end))])
     largest = max([0.0, *(dot.size or 0.0 for dot in plot.dots)])
     axes.set_xscale("log")
+    axes.margins(x=0.15)
+    for axis in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        axis(lambda value, _: f"{value:g}")
     for k, dot in enumerate(sorted(plot.dots, key=lambda dot: -(dot.size or 0.0))):
         colour, y = COLOURS[k % len(COLOURS)], top if dot.y is None else dot.y
         area = 20 + (600 * (dot.size or 0.0) / largest if largest else 0.0)
@@ -223,18 +226,18 @@ def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
         text = f"{dot.name}: {_short_number(dot.x)}, {reached}{', ' if dot.size_text else ''}{dot.size_text}"
         look: dict[str, Any] = {"facecolors": "none" if dot.y is None else colour, "edgecolors": colour, "alpha": 0.75}
         axes.scatter([dot.x], [y], s=area, clip_on=False, gid=TOOLTIP + clean(text), **look)
-    _name_dots(axes, [(dot.x, top if dot.y is None else dot.y, dot.name) for dot in plot.dots], top)
+    places = [(dot.x, top if dot.y is None else dot.y, dot.name) for dot in plot.dots]
+    _name_dots(axes, places, top, gap_pt=4 + 14 * (largest > 0))
     axes.set_ylim(bottom=0, top=top)
     axes.grid(axis="y")
     axes.set_xlabel(clean(plot.x_label))
     axes.set_ylabel(clean(plot.y_label))
-    if plot.beyond:
-        axes.annotate(
-            clean(plot.beyond), (1.01, 1.0), xycoords="axes fraction", va="center", color=SOFT, fontsize=SMALL
-        )
+    if any(dot.y is None for dot in plot.dots):
+        look = {"xycoords": "axes fraction", "va": "bottom", "color": SOFT, "fontsize": SMALL}
+        axes.annotate(clean(f"open: {plot.beyond}"), (0.0, 1.06), **look)
 
 
-def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]], top: float) -> None:
+def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]], top: float, gap_pt: float) -> None:
     """Write names right of dots, each below the one before where they would lie on each other."""
     taken: list[tuple[float, float]] = []
     for x, y, name in sorted(places, key=lambda place: -place[1]):
@@ -243,7 +246,7 @@ def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]], top: fl
             height -= 0.05 * top
         taken.append((x, height))
         place: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": SMALL, "color": INK}
-        axes.annotate(clean(name), (x, height), xytext=(9, 0), **place)
+        axes.annotate(clean(name), (x, height), xytext=(gap_pt, 0), **place)
 
 
 def _draw_confusions(axes: "Axes", plot: ConfusionPlot) -> None:
