@@ -8,8 +8,9 @@ import pytest
 import evonav
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.memory_benchmark.streams import KINDS, StreamSpec, make_stream, reference_specs
-from evonav.memory_benchmark.streams.make import make_plan, plan_of, read_house
+from evonav.memory_benchmark.streams.make import make_plan, plan_of
 from evonav.memory_benchmark.streams.plan import Plan, cached_plan, plan_folder
+from evonav.memory_benchmark.streams.spec import read_house
 
 SMALL = StreamSpec("S1", "bundled:4", frames_a_visit=12)
 
@@ -35,6 +36,19 @@ def test_houses_of_a_file_of_ones_own_are_taken(tmp_path):
     assert [spec.house for spec in specs[::3]] == [f"{file}:3", f"{file}:4"]
     assert specs[0].name == "S0/mine-0003/0"
     assert make_stream(specs[0]).num_frames == specs[0].frames_a_visit
+
+
+def test_houses_of_a_list_and_of_a_folder_are_found_by_their_names(tmp_path):
+    houses = evonav.load_houses("bundled")[:4]
+    (tmp_path / "list.json").write_text("[" + ",".join(house.to_json() for house in houses) + "]")
+    (tmp_path / "one.json").write_text(houses[2].to_json())
+    names = [spec.house for spec in reference_specs(tmp_path, kinds=["S0"])[::3]]
+    assert names == [f"{tmp_path}/list.json:1[2]", f"{tmp_path}/list.json:1[3]", f"{tmp_path}/one.json:1"]
+    assert [read_house(name).to_json() for name in names] == [houses[at].to_json() for at in (2, 3, 2)]
+    with pytest.raises(HouseError, match=r"list.json:1\[7\]: no such house in"):
+        read_house(f"{tmp_path}/list.json:1[7]")
+    with pytest.raises(HouseError, match="bundled:999"):
+        read_house("bundled:999")
 
 
 def test_houses_with_too_few_rooms_are_refused(tmp_path):

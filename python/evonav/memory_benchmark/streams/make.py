@@ -4,14 +4,12 @@ import json
 from dataclasses import asdict, replace
 
 from evonav._core import House
-from evonav.errors import HouseError
-from evonav.house.files import stream_houses
 from evonav.memory_benchmark.streams.glances import glances
 from evonav.memory_benchmark.streams.growth import growth, growth_houses
 from evonav.memory_benchmark.streams.live import live
 from evonav.memory_benchmark.streams.plan import Plan, cached_plan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
-from evonav.memory_benchmark.streams.spec import StreamSpec
+from evonav.memory_benchmark.streams.spec import StreamSpec, read_house
 from evonav.memory_benchmark.streams.visits import visits
 from evonav.tasks.records import sha256_of
 
@@ -56,15 +54,3 @@ def make_plan(spec: StreamSpec, house: House) -> Plan:
     if spec.kind == "S9":
         return live(spec, house)
     return visits(spec, house)
-
-
-def read_house(name: str) -> House:
-    """Return the house with this name, such as `bundled:3`.
-
-    Raises:
-        HouseError: There is none.
-    """
-    found = next(stream_houses(name), None)
-    if found is None:
-        raise HouseError(f"{name}: no house")
-    return found

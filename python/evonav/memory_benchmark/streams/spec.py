@@ -1,12 +1,12 @@
 """Describe one stream of the memory benchmark, and list the streams of the default benchmark."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Literal, get_args
 
+from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.house.files import BUNDLED, stream_houses
 from evonav.world.simulator import SimulatorConfig, vertical_fov_deg
@@ -150,13 +150,21 @@ def chosen_houses(houses: str | Path, count: int) -> list[str]:
 
 
 def source_of(house: str) -> str:
-    """Return the file of a house that is named by file and number: `bundled` of `bundled:3`."""
-    file, colon, number = house.rpartition(":")
-    return file if colon and number.isdigit() else house
+    """Return the file of a house that is named by file and place: `bundled` of `bundled:3`."""
+    return re.sub(r":\d+(\[\d+\])?$", "", house)
 
 
-def other_houses(house: str) -> Iterator[str]:
-    """Yield the names of all houses of the same file, those after this one first, without this one."""
-    names = [one.name for one in stream_houses(source_of(house))]
-    at = names.index(house) if house in names else 0
-    yield from islice(names[at:] + names[:at], 1, None)
+def read_house(name: str) -> House:
+    """Return the house with this name, such as `bundled:3` or, in a file with a list of houses, `mine.json:1[4]`.
+
+    Raises:
+        HouseError: There is none, or it cannot be read.
+    """
+    source = source_of(name)
+    # The reader of houses finds a numbered one without parsing those before it; it knows no other places.
+    is_numbered = name[-1:].isdigit() and (source == BUNDLED or Path(source).is_file())
+    houses = stream_houses(name if is_numbered else source)
+    found = next((house for house in houses if is_numbered or name in (house.name, source)), None)
+    if found is None:
+        raise HouseError(f"{name}: no such house in {source}")
+    return found
