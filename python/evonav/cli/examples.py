@@ -117,6 +117,8 @@ PAGES = {
     "video": "report.md",
     "rerun": "report.md",
     "paper": "reproduce.md",
+    "bench memory export": "memory-benchmark.md",
+    "bench memory score": "memory-benchmark.md",
     **dict.fromkeys(
         ("bench render", "bench navigation", "bench gym", "bench agents", "bench generation"), "benchmarks.md"
     ),

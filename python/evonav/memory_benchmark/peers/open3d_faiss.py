@@ -22,7 +22,7 @@ from evonav.world.pose import Pose
 
 INSTALL = "'evonav[bench]'"
 NUMBER_BYTES = 100
-"""About what the numbers of an entry take."""
+"""Approximate size of the numbers of an entry."""
 
 
 @dataclass

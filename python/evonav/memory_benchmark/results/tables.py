@@ -82,7 +82,7 @@ def memory_tables(result: BenchmarkResult) -> list[Table]:
     found = scores(result)
     tables = [_table("Memories", result, found, COLUMNS, None, NOTES), _table("More", result, found, MORE, None)]
     kinds = kinds_of(result.memories)
-    titles: dict[str, str] = {str(name): words for name, words in TITLES.items()}
+    titles: dict[str, str] = {str(name): title for name, title in TITLES.items()}
     for kind in kinds if len(kinds) > 1 else ():
         title = f"{kind}: {titles[kind]}" if kind in titles else kind
         tables.append(_table(title, result, scores(result, kind), COLUMNS, kind))
