@@ -125,6 +125,9 @@ def parse(arguments: list[str]) -> None:
     command: Any = typer.main.get_command(app)
     context, rest = typer.Context(command), arguments
     while hasattr(command, "commands"):
+        if command.invoke_without_command and rest[0].startswith("-"):
+            command.make_context(command.name, list(rest), parent=context)
+            return
         assert rest[0] in command.commands, f"no command {rest[0]}"
         _, command, rest = command.resolve_command(context, rest)  # which adds the options of its settings
         if not rest:
