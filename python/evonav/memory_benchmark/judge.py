@@ -85,13 +85,12 @@ class Judge:
             self._change_scene(frame.index, truth.objects)
         scene = self._scene
         assert scene is not None
-        for object_id, num_px in truth.visible_px.items():
-            if num_px >= EVIDENCE_PX and (index := scene.index_of.get(object_id)) is not None:
-                self.seen.add(scene.keys[index])
+        seen_ids = {one for one in truth.detected_ids if one and truth.visible_px.get(one, 0) >= EVIDENCE_PX}
+        self.seen.update(scene.keys[index] for one in seen_ids if (index := scene.index_of.get(one)) is not None)
         for one in self.tracked:
             if one.is_open and truth.empty_px.get(one.index, 0) >= EVIDENCE_PX:
                 one.empty.look(self.clocks)
-            if one.is_current and one.new_key and truth.visible_px.get(one.change.object_id, 0) >= EVIDENCE_PX:
+            if one.is_current and one.new_key and one.change.object_id in seen_ids:
                 one.found.look(self.clocks)
 
     def believe(self, entries: Entries) -> None:
