@@ -160,6 +160,7 @@ def test_moved_object_is_no_false_forget() -> None:
     update = judged(shots, [MOVED], lambda i: [entry(1, 1.0 if i < 4 else 3.0), PLATE]).update
     assert (update.standing, update.false_forgets) == (3, 0)
     assert (update.moves, update.moves_done) == (1, 1)
+    assert (update.gone, update.come) == (ChangeCounts(hits=1), ChangeCounts(hits=1))
 
 
 def test_object_put_back_ends_the_spell() -> None:

@@ -133,6 +133,10 @@ class Judge:
         counts.seen_remembered += int((is_seen & is_remembered).sum())
         counts.remembered += int(is_remembered.sum())
         counts.duplicates += int(np.maximum(scene.num_matched - 1, 0).sum())
+        self._take_snapshot(scene)
+        self._answer = None
+
+    def _take_snapshot(self, scene: _Scene) -> None:
         covered = {key for key, is_covered in zip(scene.keys, scene.is_covered.tolist(), strict=True) if is_covered}
         self.snapshots.append(
             Snapshot(
@@ -143,7 +147,6 @@ class Judge:
                 taken=frozenset(one.old_key for one in self.tracked if one.old_key and not one.is_open),
             )
         )
-        self._answer = None
 
     def labels_to_ask(self) -> list[str]:
         """Return the labels of objects that stand where they were seen, sorted: what a memory can be asked for."""
@@ -208,6 +211,8 @@ class Judge:
 
     def _change_scene(self, frame: int, objects: Sequence[SceneObject]) -> None:
         before = self._scene
+        if before is not None and self._answer is not None:  # in the middle of a visit
+            self._take_snapshot(before)
         new = [one for one in enumerate(self.changes) if one[1].frame <= frame][len(self.tracked) :]
         remembered = {} if before is None else dict(zip(before.keys, before.num_matched.tolist(), strict=True))
         boxes = Boxes(objects)
