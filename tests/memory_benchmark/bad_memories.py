@@ -48,6 +48,11 @@ class Raises(Good):
             raise KeyError("no such voxel")
 
 
+class Exits(Good):
+    def observe(self, frame: Any) -> None:
+        raise SystemExit(3)
+
+
 class Hangs(Good):
     def observe(self, frame: Any) -> None:
         if frame.index == 3:

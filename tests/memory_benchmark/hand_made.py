@@ -41,6 +41,8 @@ class Shot:
     visit: int = 1
     visible: Mapping[str, int] = field(default_factory=dict)
     empty: Mapping[int, int] = field(default_factory=dict)
+    detected: Sequence[str] | None = None
+    """Default: all that is visible."""
 
 
 @dataclass
@@ -61,7 +63,8 @@ class HandMade:
                 time_s += 1.0 / RATE_HZ if shot.visit == last.visit else 3600.0
             last = shot
             frame = MemoryFrame(index, time_s, shot.visit, view(0.5 * index))
-            yield frame, FrameTruth(shot.objects, shot.visible, shot.empty, ())
+            detected = tuple(shot.visible) if shot.detected is None else shot.detected
+            yield frame, FrameTruth(shot.objects, shot.visible, shot.empty, detected)
 
 
 class Scripted:

@@ -23,6 +23,7 @@ STREAM = HandMade([Shot(MUG, visible={"mug": 50})] * 60)
     ("name", "kind", "message", "frame"),
     [
         ("Raises", "raised", "observe() raises KeyError: 'no such voxel' [bad_memories:48 in observe]", 3),
+        ("Exits", "raised", "observe() raises SystemExit: 3", 0),
         ("Hangs", "hung", "no answer to `observe` within 1 s", 3),
         ("Dies", "died", "the memory's process died (exit code 7)", 3),
         ("NanBoxes", "answer", "entries()[1].centre_m = (1.0, nan, 0.0): must be finite", 0),
@@ -44,7 +45,7 @@ def test_failure_in_its_own_process(name: str, kind: str, message: str, frame: i
     assert result.spells == ()
 
 
-@pytest.mark.parametrize("name", ["Raises", "NanBoxes", "Million", "AnswersNone"])
+@pytest.mark.parametrize("name", ["Raises", "Exits", "NanBoxes", "Million", "AnswersNone"])
 def test_failure_is_the_same_in_this_process(name: str) -> None:
     here = measure(getattr(bad_memories, name), STREAM)
     there = measure(f"{FILE}:{name}", STREAM)
@@ -143,6 +144,8 @@ def test_answers_that_are_no_entries(answer: object) -> None:
 def test_places_and_sizes_are_checked() -> None:
     place = Place((1.0, 2.0, 3.0), 0.5)
     assert read_places([place], 1) == [place]
+    best = Place((0.0, 0.0, 0.0), 0.9)
+    assert read_places([place, best], 2) == [best, place]
     for answer, message in [
         ([place, place], "2 places, must be at most 1"),
         ([3], "must be a Place"),

@@ -116,6 +116,23 @@ def test_addition_seen_late() -> None:
     assert too_late.spells[0].is_over
 
 
+def test_object_that_perception_missed_was_not_seen() -> None:
+    added = Change("cup", "Mug", "added", 4, None, body("cup", 7.0))
+    shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 60}, detected=())] * 6]
+    result = judged(shots, [added], lambda i: [entry(1, 1.0), PLATE])
+    assert result.spells == ()
+    assert (result.update.additions, result.update.seen) == (0, 4)
+
+
+def test_added_object_that_is_forgotten_later_was_found() -> None:
+    added = Change("cup", "Mug", "added", 4, None, body("cup", 7.0))
+    shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 25})] * 6]
+    old = [entry(1, 1.0), PLATE]
+    result = judged(shots, [added], lambda i: [*old, entry(9, 7.1)] if i in (6, 7) else old)
+    assert result.spells == (Spell("appeared", 0, Clocks(2, 1.0, 1.0, 3), is_over=True),)
+    assert (result.update.additions_done, result.update.false_forgets) == (0, 1)
+
+
 def test_false_forget() -> None:
     shots = [*FIRST, *[Shot(BEFORE, 2)] * 4]
     both = [entry(1, 1.0), PLATE]
@@ -143,6 +160,7 @@ def test_moved_object_is_no_false_forget() -> None:
     update = judged(shots, [MOVED], lambda i: [entry(1, 1.0 if i < 4 else 3.0), PLATE]).update
     assert (update.standing, update.false_forgets) == (3, 0)
     assert (update.moves, update.moves_done) == (1, 1)
+    assert (update.gone, update.come) == (ChangeCounts(hits=1), ChangeCounts(hits=1))
 
 
 def test_object_put_back_ends_the_spell() -> None:

@@ -137,7 +137,7 @@ def checked(entries: Entries) -> Entries:
 
 
 def read_places(answer: object, k: int) -> list[Place]:
-    """Return a memory's answer to `locate`.
+    """Return a memory's answer to `locate`, by falling score; of equal scores, the first one comes first.
 
     Raises:
         MemoryFailedError: It is no sequence of at most `k` finite places.
@@ -156,7 +156,7 @@ def read_places(answer: object, k: int) -> list[Place]:
         if not all(map(math.isfinite, (x_m, y_m, z_m, score))):
             raise _wrong(f"locate()[{index}]", place, "must be finite")
         places.append(Place((x_m, y_m, z_m), score))
-    return places
+    return sorted(places, key=lambda place: -place.score)
 
 
 def read_num_bytes(answer: object, num_entries: int) -> int:

@@ -18,6 +18,9 @@ from evonav.statistics import ClusterBootstrap, Estimate
 BASELINE = "never"
 """The memory that others are compared with: it integrates and never forgets."""
 
+NUM_RESAMPLES = 2_000
+"""Resamples of houses: five of them have only 126 different ones."""
+
 Streams = Sequence[StreamResult]
 Better = Literal["lower", "higher"]
 
@@ -51,7 +54,7 @@ def estimates(result: MemoryResult, kind: str | None = None) -> dict[str, Estima
 
 def bootstrap_of(streams: Streams) -> ClusterBootstrap:
     """Return the resamples of the houses of some streams."""
-    return ClusterBootstrap([stream.house for stream in streams])
+    return ClusterBootstrap([stream.house for stream in streams], num_resamples=NUM_RESAMPLES)
 
 
 def paired(ours: Streams, theirs: Streams) -> tuple[list[StreamResult], list[StreamResult]]:

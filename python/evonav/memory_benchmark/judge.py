@@ -85,13 +85,12 @@ class Judge:
             self._change_scene(frame.index, truth.objects)
         scene = self._scene
         assert scene is not None
-        for object_id, num_px in truth.visible_px.items():
-            if num_px >= EVIDENCE_PX and (index := scene.index_of.get(object_id)) is not None:
-                self.seen.add(scene.keys[index])
+        seen_ids = {one for one in truth.detected_ids if one and truth.visible_px.get(one, 0) >= EVIDENCE_PX}
+        self.seen.update(scene.keys[index] for one in seen_ids if (index := scene.index_of.get(one)) is not None)
         for one in self.tracked:
             if one.is_open and truth.empty_px.get(one.index, 0) >= EVIDENCE_PX:
                 one.empty.look(self.clocks)
-            if one.is_current and one.new_key and truth.visible_px.get(one.change.object_id, 0) >= EVIDENCE_PX:
+            if one.is_current and one.new_key and one.change.object_id in seen_ids:
                 one.found.look(self.clocks)
 
     def believe(self, entries: Entries) -> None:
@@ -134,6 +133,10 @@ class Judge:
         counts.seen_remembered += int((is_seen & is_remembered).sum())
         counts.remembered += int(is_remembered.sum())
         counts.duplicates += int(np.maximum(scene.num_matched - 1, 0).sum())
+        self._take_snapshot(scene)
+        self._answer = None
+
+    def _take_snapshot(self, scene: _Scene) -> None:
         covered = {key for key, is_covered in zip(scene.keys, scene.is_covered.tolist(), strict=True) if is_covered}
         self.snapshots.append(
             Snapshot(
@@ -144,7 +147,6 @@ class Judge:
                 taken=frozenset(one.old_key for one in self.tracked if one.old_key and not one.is_open),
             )
         )
-        self._answer = None
 
     def labels_to_ask(self) -> list[str]:
         """Return the labels of objects that stand where they were seen, sorted: what a memory can be asked for."""
@@ -209,6 +211,8 @@ class Judge:
 
     def _change_scene(self, frame: int, objects: Sequence[SceneObject]) -> None:
         before = self._scene
+        if before is not None and self._answer is not None:  # in the middle of a visit
+            self._take_snapshot(before)
         new = [one for one in enumerate(self.changes) if one[1].frame <= frame][len(self.tracked) :]
         remembered = {} if before is None else dict(zip(before.keys, before.num_matched.tolist(), strict=True))
         boxes = Boxes(objects)

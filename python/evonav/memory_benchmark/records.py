@@ -130,7 +130,7 @@ def write_result(result: BenchmarkResult, path: Path) -> None:
         StoreError: The file cannot be written.
     """
     try:
-        path.write_text(result.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        path.write_text(result.model_dump_json() + "\n", encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
 

@@ -250,7 +250,8 @@ class _Run:
             return None
         cpu_s = _known(cost.cpu_s for cost in times.observe)
         seconds = cpu_s or [cost.wall_s for cost in times.observe]
-        samples = speed.thinned(times.frames, times.num_entries, np.array(seconds) * 1e3)
+        times_ms = np.array(seconds) * 1e3
+        samples = speed.thinned(times.frames, times.num_entries, times_ms)
         return Speed(
             observe_cpu=speed.percentiles(cpu_s),
             observe_wall=wall,
@@ -260,7 +261,7 @@ class _Run:
             real_time_factor=speed.real_time_factor(wall.mean_ms / 1e3, self._stream.info.rate_hz),
             slope_per_100_entries_ms=speed.slope_per_100_entries(samples),
             slope_per_1000_frames_ms=speed.slope_per_1000_frames(samples),
-            samples=tuple(samples),
+            samples=tuple(speed.thinned(times.frames, times.num_entries, times_ms, speed.NUM_STORED)),
         )
 
     def _size(self, num_bytes: int | None, memory: HostedMemory) -> size.Size:

@@ -52,7 +52,7 @@ class LocalMemory:
         """
         try:
             self._memory = factory()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise MemoryFailedError("load", f"cannot be made: {describe(error, caller=PACKAGE)}") from error
         missing = [name for name in ("reset", "visit", "observe", "entries") if not callable(_get(self._memory, name))]
         if missing:
@@ -97,7 +97,7 @@ class LocalMemory:
         wall_ns, cpu_ns = time.perf_counter_ns(), time.process_time_ns()
         try:
             answer = function()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise MemoryFailedError("raised", f"{call}() raises {describe(error, caller=PACKAGE)}") from error
         cpu_ns = time.process_time_ns() - cpu_ns
         return answer, Cost(cpu_ns * 1e-9, (time.perf_counter_ns() - wall_ns) * 1e-9)

@@ -17,7 +17,7 @@ PlaceKey = tuple[str, int]
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The state at the end of a visit."""
+    """The state at the end of a visit, or before a change in the middle of one."""
 
     believed: frozenset[PlaceKey]
     """Places at which the memory has an entry."""

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 MAX_SAMPLES = 200
-"""Samples of a stream that a record keeps."""
+"""Samples that slopes are taken of."""
+NUM_STORED = 50
+"""Samples of a stream in its record."""
 MIN_SPREAD = 50
 """Smallest difference of the numbers of entries from which a slope over entries is taken."""
 MIN_FRAMES = 100

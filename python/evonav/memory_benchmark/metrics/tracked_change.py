@@ -10,8 +10,10 @@ from evonav.memory_benchmark.truth import Change
 
 @dataclass(slots=True)
 class _Wait:
-    """A wait for a state that must stay; it counts from the first evidence on."""
+    """A wait for a state; it counts from the first evidence on."""
 
+    must_stay: bool
+    """Whether a state that is lost again was not reached: an entry that comes back was not cleared."""
     start: Clocks | None = None
     evidence_frames: int = 0
     done: Clocks | None = None
@@ -23,9 +25,11 @@ class _Wait:
             self.start = replace(now, evidence_frames=0)
 
     def answer(self, now: Clocks, is_done: bool) -> None:
-        """Take an answer; a state that is lost again was not reached."""
         now = self.last = replace(now, evidence_frames=self.evidence_frames)
-        self.done = (self.done or now) if is_done else None
+        if is_done:
+            self.done = self.done or now
+        elif self.must_stay:
+            self.done = None
 
 
 @dataclass(slots=True)
@@ -105,8 +109,8 @@ def tracked(index: int, change: Change, began: Clocks, num_before: int, *, is_re
         old_key=None if change.before is None else (change.object_id, num_before),
         new_key=(change.object_id, num_before + 1) if _is_elsewhere(change) else None,
         is_remembered=is_remembered,
-        empty=_Wait(),
-        found=_Wait(),
+        empty=_Wait(must_stay=True),
+        found=_Wait(must_stay=False),
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 
 EVIDENCE_PX = 25
-"""Pixels in one frame from which on it shows an object, or shows that a place is empty."""
+"""Pixels in one frame from which on it is evidence of an object that is detected in it, or of an empty place."""
 
 
 @dataclass(slots=True)
