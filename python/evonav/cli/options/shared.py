@@ -35,7 +35,7 @@ Forgetting = Annotated[
     typer.Option(
         "--forgetting",
         metavar="RULE",
-        help="Rule by which the agents forget object entries, such as bayes (docs/memory.md); an agent is then called "
+        help="Rule by which the agents forget object entries, such as bayes; an agent is then called "
         f"fu@bayes, as it may be given to --agent, too. {_SEVERAL} Default: none, as in the paper.",
         autocompletion=completion.forgetting_rules,
     ),
