@@ -34,6 +34,7 @@ from evonav.world.simulator import Intrinsics
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PARSED_ONLY = {
+    "evonav bench": "minutes: tests/cli/test_bench_memory.py and tests/speed_benchmark run these commands, smaller",
     "evonav demo": "what `make demo` does; tests/e2e",
     "evonav doctor": "depends on the machine; tests of its own",
     "evonav houses fetch": "network",
