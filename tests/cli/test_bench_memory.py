@@ -69,7 +69,7 @@ def test_answers_to_exported_streams_score_as_the_memory_in_process_does(layout,
         lines.append({"frame": frame.index, "seconds": 0.01, "entries": [asdict(one) for one in memory.entries()]})
     (folder / "entries.jsonl").write_text("\n".join(map(json.dumps, lines)))
     scored = tmp_path / "scored"
-    run = bench("score", streams, "--oracle", tmp_path / "truth", "--name", "mine", "--out", scored)
+    run = bench("score", streams, "--oracle", tmp_path / "truth", "--system", "mine", "--out", scored)
     assert run.exit_code == 0, run.output
     (mine,) = json.loads((scored / "result.json").read_text())["memories"]
     assert mine["memory"] == "mine"

@@ -58,7 +58,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bench memory export": ("evonav bench memory export out/streams --streams S1 --quick --layout replica",),
     "bench memory score": (
         "evonav bench memory score out/streams",
-        "evonav bench memory score out/streams/S1_bundled-0001_0 answers.jsonl --name mine",
+        "evonav bench memory score out/streams/S1_bundled-0001_0 answers.jsonl --system mine",
     ),
     "strip": ("evonav strip out/run --agent fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),

@@ -10,7 +10,7 @@ import typer
 from evonav.cli.bench.memory import memory_app
 from evonav.cli.display import EXIT_INTERRUPTED, progress_bar, show_tables
 from evonav.cli.group import Command, new_app
-from evonav.cli.options.shared import HOUSES, Agents, Limit, listed, numbers_of
+from evonav.cli.options.shared import HOUSES, Against, Agents, Limit, listed, numbers_of
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.speed_benchmark.records import Row
@@ -33,14 +33,6 @@ Peers = Annotated[
     ),
 ]
 BenchOut = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder to write JSON and Markdown to.")]
-Against = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE",
-        help="JSON file of an earlier run: what became worse by more than a quarter, and more than the intervals "
-        "explain, is listed, and the exit code is 1.",
-    ),
-]
 
 
 def _run(

@@ -9,7 +9,7 @@ import typer
 
 from evonav.cli.display import interruptible, progress_bar, show_tables, status
 from evonav.cli.group import Command, new_app
-from evonav.cli.options.shared import EXIT_INCOMPLETE, HOUSES, listed, numbers_of
+from evonav.cli.options.shared import EXIT_INCOMPLETE, HOUSES, Against, listed, numbers_of
 from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
@@ -41,15 +41,14 @@ Perception = Annotated[
     ),
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Take one house and one seed.")]
-ResultOut = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder of the records and the report.")]
-Against = Annotated[
+Oracle = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE",
-        help="result.json of an earlier run: what became worse by more than the intervals explain is listed, and the "
-        "exit code is 1.",
+        metavar="FOLDER",
+        help="Folder of the truth, to keep it from the system that is measured. Default: beside the frames.",
     ),
 ]
+ResultOut = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder of the records and the report.")]
 
 
 @memory_app.callback(
@@ -143,13 +142,7 @@ def export(
     perception: Perception = None,
     quick: Quick = False,
     colours: Annotated[bool, typer.Option(help="Write colour images too.")] = True,
-    oracle: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Folder for the truth, to keep it from the system that is measured. Default: beside the frames.",
-        ),
-    ] = None,
+    oracle: Oracle = None,
 ) -> None:
     """Write streams as files, for systems in C++, in ROS or on another machine."""
     from evonav.memory_benchmark.streams import make_stream
@@ -183,10 +176,8 @@ def score(
             "the file in the folder of each.",
         ),
     ] = Path("entries.jsonl"),
-    name: Annotated[str, typer.Option(metavar="NAME", help="Name of the system in the tables.")] = "offline",
-    oracle: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder of the truth. Default: beside the frames.")
-    ] = None,
+    system: Annotated[str, typer.Option(metavar="NAME", help="Name of the system in the tables.")] = "offline",
+    oracle: Oracle = None,
     out: ResultOut = Path("out/memory-score"),
     against: Against = None,
 ) -> None:
@@ -211,7 +202,7 @@ def score(
             records.append(score_stream(read_exported(folder, oracle=truth), file))
     from evonav import __version__
 
-    scored = (MemoryResult(memory=name, streams=tuple(records)),)
+    scored = (MemoryResult(memory=system, streams=tuple(records)),)
     result = BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=scored)
     _show(result, out, 0)
     if earlier is not None and against is not None:

@@ -154,6 +154,14 @@ AnyAsset = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
 OldJsonFile = Annotated[Path | None, typer.Option("--json-file", metavar="FILE", hidden=True)]
 """The option that the old `--json FILE` stands for (`evonav.cli.old_names`)."""
+Against = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="JSON file of an earlier run: figures that became worse by more than chance explains are listed, and the "
+        "exit code is 1.",
+    ),
+]
 RetryErrored = Annotated[
     bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]
