@@ -4,12 +4,16 @@ What follows the names, from the first option on, is the sections' own (`configu
 """
 
 import importlib
-import os
 import sys
+from contextlib import nullcontext
 from itertools import takewhile
 
 from benches.table import write_section
+from evonav.speed_benchmark.timing import Sampling, one_core
 
+PRODUCT = {"agents", "generation", "gym", "navigation", "rendering"}
+"""Sections of `evonav bench`, modules of `evonav.speed_benchmark`; the other modules are beside this one."""
+ON_ALL_CORES = {"gym"}
 SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
@@ -22,7 +26,8 @@ SECTIONS = {
     "rendering": "Rendering",
     "thor": "AI2-THOR engine",
 }
-"""Module by title. A module has `NOTES` (Markdown) and `run()`, which gives a list of `Row` or a table."""
+"""Title by module. A module has `NOTES` (Markdown) and `run()`, which gives a list of `Row` or a table, or
+`measure(Sampling)`, which yields rows."""
 
 
 def main() -> None:
@@ -32,15 +37,16 @@ def main() -> None:
     if not set(names) <= SECTIONS.keys() or (options and not names):
         known = "\n".join(f"  {name:14} {title}" for name, title in sorted(SECTIONS.items()))
         sys.exit(f"usage: python -m benches [NAME ... [OPTION ...]]\n{known}")
-    if hasattr(os, "sched_setaffinity"):  # or peers with threads of their own would be charged for all of them
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     for name in names or SECTIONS:
-        module = importlib.import_module(f"benches.{name}")
+        module = importlib.import_module(f"{'evonav.speed_benchmark' if name in PRODUCT else 'benches'}.{name}")
         if options and not hasattr(module, "configure"):
             sys.exit(f"{name} takes no options")
         if options:
             module.configure(options)
-        sys.stdout.write(write_section(SECTIONS[name], module.NOTES, module.run()) + "\n")
+        # Or peers with threads of their own would be charged for all of them.
+        with nullcontext() if name in ON_ALL_CORES else one_core():
+            rows = list(module.measure(Sampling())) if name in PRODUCT else module.run()
+        sys.stdout.write(write_section(SECTIONS[name], module.NOTES, rows) + "\n")
 
 
 if __name__ == "__main__":

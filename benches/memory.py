@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import cv2
 import faiss
@@ -12,11 +11,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from benches.table import Row, compare
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
 from evonav.memory.presence import DepthEvidence
+from evonav.memory_benchmark.peers.open3d_faiss import Cloud, associate, axes_of, detect, merged
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
+from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import compare
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
 
@@ -33,6 +34,8 @@ points of each of the 100 entries in that frame's depth image; the peer projects
 once, and its counts are checked to be the same.
 """
 
+MADE = "made"
+"""The house of all inputs: they are made up, and have no interval by house."""
 SIDE_PX = 300
 BOX_M = 0.4
 _Call = Callable[[int], object]
@@ -78,7 +81,7 @@ def _visibility() -> list[Row]:
     def ours(number: int) -> VisibleOccupancy:
         return visible_occupancy(grid, poses[number], _INTRINSICS, 3.0)
 
-    return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, len(poses), repeats=20)
+    return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, [MADE] * len(poses), calls=20)
 
 
 def _explored_floor() -> OccupancyMap:
@@ -111,7 +114,7 @@ def _frontiers() -> list[Row]:
     found = {tuple(cell) for frontier in seen.update_frontiers(_AGENT_M) for cell in frontier.cells.tolist()}
     if {cell for region in regions for cell in region} != found:
         raise AssertionError("the peer found other frontiers")
-    return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, 200)
+    return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, [MADE] * 200)
 
 
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.float32)
@@ -144,7 +147,7 @@ def _distances() -> list[Row]:
 
     if len(targets_m) < 5 or not np.allclose(ours(0), peer(0), rtol=0.1):
         raise AssertionError("the peer found other distances")
-    return compare("distances to frontiers, 400x400", ours, {"SciPy, Dijkstra on 8-connected cells": peer}, 40)
+    return compare("distances to frontiers, 400x400", ours, {"SciPy, Dijkstra on 8-connected cells": peer}, [MADE] * 40)
 
 
 def _distances_scipy(
@@ -175,23 +178,12 @@ def _boxes() -> NDArray[np.float64]:
     return np.stack([i % 10 * 0.8, 0.2 + 0.05 * (i % 7), i // 10 * 0.8], axis=1)
 
 
-def _axes(pose: Pose) -> NDArray[np.float64]:
-    """Rows: right, down, forward."""
-    sin, cos, tilt, level = (
-        math.sin(pose.yaw_rad),
-        math.cos(pose.yaw_rad),
-        math.sin(pose.horizon_rad),
-        math.cos(pose.horizon_rad),
-    )
-    return np.array([[cos, 0, -sin], [-sin * tilt, -level, -cos * tilt], [sin * level, -tilt, cos * level]])
-
-
 def _look(boxes: NDArray[np.float64], x_m: float, height_m: float, z_m: float, yaw_rad: float, tilt_rad: float) -> View:
     """Depth and masks of boxes, ray by ray; masks count in their order."""
     pose = Pose(x_m, height_m, z_m, yaw_rad, tilt_rad)
     uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
     local = np.stack([*np.meshgrid(uv, uv), np.ones((SIDE_PX, SIDE_PX))], axis=-1)
-    rays = local @ _axes(pose)
+    rays = local @ axes_of(pose)
     depth_m = np.full((SIDE_PX, SIDE_PX), np.inf, np.float32)
     masks = np.full((SIDE_PX, SIDE_PX), -1, np.int32)
     for index, box in enumerate(boxes):
@@ -229,78 +221,33 @@ def _frame() -> View:
     return _view(view.pose, view.depth_m, number_of[view.detections.masks], 20)
 
 
-@dataclass
-class _Cloud:
-    """An object as ConceptGraphs keeps it."""
-
-    points: o3d.geometry.PointCloud
-    box: o3d.geometry.OrientedBoundingBox
-    label: str
-
-
-def _cloud(points: NDArray[np.float64]) -> o3d.geometry.PointCloud:
-    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+def _stored(entries: ObjectMap) -> list[Cloud]:
+    """The entries of a map as the peer keeps them."""
+    stored = []
+    for entry in entries.entries:
+        points = entries.points_m(entry.id)
+        assert points is not None
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.astype(np.float64)))
+        stored.append(Cloud(cloud, entry.label, box=cloud.get_oriented_bounding_box(robust=True)))
+    return stored
 
 
-def _largest_cluster(cloud: o3d.geometry.PointCloud) -> o3d.geometry.PointCloud:
-    labels = np.asarray(cloud.cluster_dbscan(eps=0.1, min_points=10))
-    if not (labels >= 0).any():
-        return cloud
-    return cloud.select_by_index(np.flatnonzero(labels == np.bincount(labels[labels >= 0]).argmax()))
-
-
-def _detect_open3d(view: View) -> list[_Cloud]:
-    uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
-    u, v = np.meshgrid(uv, uv)
-    axes, camera_m = _axes(view.pose), view.pose.position_m
-    clouds = []
-    for number, label in enumerate(view.detections.labels):
-        mask = view.detections.masks == number
-        depth = view.depth_m[mask].astype(np.float64)
-        points = np.stack([u[mask] * depth, v[mask] * depth, depth], axis=1) @ axes + camera_m
-        cloud = _largest_cluster(_cloud(points).voxel_down_sample(0.01))
-        clouds.append(_Cloud(cloud, cloud.get_oriented_bounding_box(robust=True), label))
-    return clouds
-
-
-def _associate_open3d(stored: list[_Cloud], view: View) -> list[int]:
-    """Entry of each detection, -1 for a new one; entries are not changed, merged ones are made and dropped."""
-    found = _detect_open3d(view)
-    points = [np.asarray(cloud.points.points, np.float32) for cloud in stored]
-    bounds = [(p.min(0), p.max(0)) for p in points]
-    indices = []
-    for entry in points:
-        index = faiss.IndexFlatL2(3)
-        index.add(entry)
-        indices.append(index)
-    matches = []
-    for detection in found:
-        query = np.asarray(detection.points.points, np.float32)
-        low, high = query.min(0), query.max(0)
-        scores = np.zeros(len(stored))
-        for i, (entry_low, entry_high) in enumerate(bounds):
-            if (low <= entry_high).all() and (entry_low <= high).all():
-                distances2, _ = indices[i].search(query, 1)
-                scores[i] = float((distances2 < 0.025**2).mean()) + (detection.label == stored[i].label)
-        best = int(scores.argmax())
-        matches.append(best if scores[best] > 1.2 else -1)
-        if matches[-1] >= 0:
-            merged = (stored[best].points + detection.points).voxel_down_sample(0.01)
-            merged.get_oriented_bounding_box(robust=True)
+def _associate_open3d(stored: list[Cloud], view: View, config: ObjectMapConfig) -> list[int | None]:
+    """Entry of each detection, `None` for a new one; entries are not changed, merged ones are made and dropped."""
+    found = detect(view, config)
+    matches = associate(stored, found, config)
+    for match, detection in zip(matches, found, strict=True):
+        if match is not None and detection is not None:
+            merged(stored[match], detection, config)
     return matches
 
 
 def _object_frame() -> list[Row]:
     view, num = _frame(), 7
     maps = [_full_map() for _ in range(num)]
-    first = maps[0]
-    stored = []
-    for entry in first.entries:
-        points = first.points_m(entry.id)
-        assert points is not None
-        cloud = _cloud(points.astype(np.float64))
-        stored.append(_Cloud(cloud, cloud.get_oriented_bounding_box(robust=True), entry.label))
-    theirs = [first.entries[i].id if i >= 0 else None for i in _associate_open3d(stored, view)]
+    first, config = maps[0], maps[0].config
+    stored = _stored(first)
+    theirs = [None if i is None else first.entries[i].id for i in _associate_open3d(stored, view, config)]
     if list(_full_map().update(view).entry_ids) != theirs or len(first) != 100:
         raise AssertionError("the peer associates otherwise")
 
@@ -308,10 +255,10 @@ def _object_frame() -> list[Row]:
         return maps[number].update(view)
 
     def peer(_: int) -> object:
-        return _associate_open3d(stored, view)
+        return _associate_open3d(stored, view, config)
 
     faiss.omp_set_num_threads(1)
-    return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, num)
+    return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, [MADE] * num)
 
 
 def _depth_evidence() -> list[Row]:
@@ -328,13 +275,13 @@ def _depth_evidence() -> list[Row]:
     found = [[e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view] for e in ours(0)]
     if found != peer(0).tolist():
         raise AssertionError("the peer counts otherwise")
-    return compare("depth evidence, 100 entries", ours, {"NumPy, all points at once": peer}, 100, repeats=5)
+    return compare("depth evidence, 100 entries", ours, {"NumPy, all points at once": peer}, [MADE] * 100, calls=5)
 
 
 def _depth_evidence_numpy(clouds: list[NDArray[np.float32]], view: View) -> NDArray[np.int64]:
     """`(E, 4)` counts for 256 points of each cloud: seen through, supported, occluded, out of view."""
     points = np.stack([cloud[np.arange(256) * len(cloud) // 256] for cloud in clouds])
-    x, y, z = np.moveaxis((points.astype(np.float64) - view.pose.position_m) @ _axes(view.pose).T, -1, 0)
+    x, y, z = np.moveaxis((points.astype(np.float64) - view.pose.position_m) @ axes_of(view.pose).T, -1, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = (SIDE_PX / 2 + _INTRINSICS.focal_px / z * offset for offset in (x, y))
     is_inside = (z > 0) & (u >= 0) & (u < SIDE_PX) & (v >= 0) & (v < SIDE_PX)

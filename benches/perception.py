@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from benches.table import Row, compare
 from evonav import _core
 from evonav.evaluation.run.components import Backend
 from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.shorthand import read_word
+from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import compare
 from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -34,6 +35,7 @@ WORDS = ("gt", "noisy:good", "noisy:yolo-world-like", "noisy:poor", "predicted:m
 class Round:
     """Views from one place."""
 
+    house: str
     simulator: EmbeddedSimulator
     poses: Sequence[Pose]
     frames: Sequence[Frame]
@@ -44,6 +46,7 @@ class Round:
 def run() -> list[Row]:
     """Times the kernels, then whole perceptions."""
     rounds = _rounds()
+    houses = [one.house for one in rounds]
     draws = np.random.default_rng(0)
     margins = [draws.uniform(-2.0, 2.0, int(one.masks.max()) + 1) for one in rounds]
     depths = [one.frames[0].depth_m for one in rounds]
@@ -55,14 +58,14 @@ def run() -> list[Row]:
         "margins of a view's masks",
         lambda number: _core.distort_masks(rounds[number].masks, _unchanged(margins[number]), margins[number]),
         {"scipy.ndimage": lambda number: _scipy_margins(rounds[number].masks, margins[number])},
-        len(rounds),
+        houses,
     )
     rows += compare(
-        "noisy depth of a view", depth, {"numpy": lambda number: _numpy_depth(depths[number], draws)}, len(rounds)
+        "noisy depth of a view", depth, {"numpy": lambda number: _numpy_depth(depths[number], draws)}, houses
     )
     for word in WORDS:
         perceive, needs_rgb = _perceiver(word, rounds)
-        rows += compare(f"{word}, three views", perceive, {"rendering them": _renderer(rounds, needs_rgb)}, len(rounds))
+        rows += compare(f"{word}, three views", perceive, {"rendering them": _renderer(rounds, needs_rgb)}, houses)
     return rows
 
 
@@ -80,7 +83,7 @@ def _rounds() -> list[Round]:
             frames = [simulator.render(pose) for pose in poses]
             masks = GroundTruthPerception().detect(frames[0], simulator.objects).masks
             if masks.max() >= 0:
-                rounds.append(Round(simulator, poses, frames, masks))
+                rounds.append(Round(house.name or "", simulator, poses, frames, masks))
     return rounds
 
 

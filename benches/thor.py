@@ -16,8 +16,9 @@ from ai2thor.controller import Controller
 
 import evonav.thor
 from benches import canned_engine
-from benches.table import Row
 from evonav.house import bundled_houses
+from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import rows_of
 from evonav.thor.engine import Engine
 from evonav.thor.events.emitter import Emitter
 
@@ -58,10 +59,14 @@ def _steps(folder: Path, house: House, name: str) -> Row:
     with _started(evonav.thor.executable(), house, name) as ours, _started(canned, house, name) as floor:
         num_objects = len(ours.last_event.metadata["objects"])
         pairs = [(_step_ms(ours), _step_ms(floor)) for _ in range(_ROUNDS + 1)][1:]
-    ours_ms, floor_ms = (statistics.median(times) for times in zip(*pairs, strict=True))
-    ratio = statistics.median(floor / ours for ours, floor in pairs)
-    operation = f"step, {name}, {num_objects} objects ({1e3 / ours_ms:.0f} steps/s)"
-    return Row(operation, "the same bytes again", ours_ms, floor_ms, ratio)
+    steps_per_s = 1e3 / statistics.median(ours_ms for ours_ms, _ in pairs)
+    return _row(f"step, {name}, {num_objects} objects ({steps_per_s:.0f} steps/s)", pairs)
+
+
+def _row(operation: str, pairs: list[tuple[float, float]]) -> Row:
+    ours_ms, floor_ms = zip(*pairs, strict=True)
+    (row,) = rows_of(operation, ours_ms, {"the same bytes again": floor_ms}, ["bundled"] * len(pairs))
+    return row
 
 
 def _step_ms(controller: Controller) -> float:
@@ -79,8 +84,7 @@ def _step_ms(controller: Controller) -> float:
 def _start(folder: Path, house: House) -> Row:
     canned = _canned(folder, house, {})
     pairs = [(_start_ms(evonav.thor.executable(), house), _start_ms(canned, house)) for _ in range(_NUM_STARTS)]
-    ours_ms, floor_ms = (statistics.median(times) for times in zip(*pairs, strict=True))
-    return Row("start", "the same bytes again", ours_ms, floor_ms, floor_ms / ours_ms)
+    return _row("start", pairs)
 
 
 def _start_ms(executable: str, house: House) -> float:

@@ -180,11 +180,13 @@ def test_the_help_of_long_options_has_room_at_80_columns():
 def test_options_that_mean_the_same_are_declared_once():
     """One help and one default for an option, but where it says what this very command works on."""
     own = {"out", "seed", "houses", "agent", "task", "tasks", "exchanges", "perceptions", "measure", "latex", "split"}
-    own |= {"agent_timeout"}
+    own |= {"agent_timeout", "perception"}
     texts = {}
     for name in set(COMMANDS) - {"sweep", "paper"}:  # whose options change a file, and name the paper's tables
         *groups, last = name.split()
-        parent = GROUP.commands[groups[0]] if groups else GROUP
+        parent = GROUP
+        for group in groups:
+            parent = parent.commands[group]
         _, command, _ = parent.resolve_command(GROUP.make_context("evonav", ["agents"]), [last])
         for param in command.params:
             if param.param_type_name == "option" and not param.hidden and param.name not in own:

@@ -34,6 +34,7 @@ from evonav.world.simulator import Intrinsics
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PARSED_ONLY = {
+    "evonav bench": "minutes: tests/cli/test_bench_memory.py and tests/speed_benchmark run these commands, smaller",
     "evonav demo": "what `make demo` does; tests/e2e",
     "evonav doctor": "depends on the machine; tests of its own",
     "evonav houses fetch": "network",
@@ -125,6 +126,9 @@ def parse(arguments: list[str]) -> None:
     command: Any = typer.main.get_command(app)
     context, rest = typer.Context(command), arguments
     while hasattr(command, "commands"):
+        if command.invoke_without_command and rest[0].startswith("-"):
+            command.make_context(command.name, list(rest), parent=context)
+            return
         assert rest[0] in command.commands, f"no command {rest[0]}"
         _, command, rest = command.resolve_command(context, rest)  # which adds the options of its settings
         if not rest:

@@ -15,11 +15,13 @@ from evonav.report.plots.specs import (
     ConfusionPlot,
     ConfusionRow,
     CurvePlot,
+    Dot,
     Gap,
     GapPlot,
     GroupPlot,
     Line,
     Plot,
+    ScatterPlot,
     Series,
 )
 from evonav.report.plots.style import plot_css
@@ -192,3 +194,20 @@ def test_without_matplotlib_a_page_has_one_line_in_place_of_plots(
 def test_a_file_of_another_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidArgumentError, match=r"x\.gif.*expected a file \.svg, \.png, \.pdf"):
         write_plots(ALL, tmp_path / "x.gif")
+
+
+def test_dots_lie_by_two_numbers_and_those_beyond_the_axis_are_open(tmp_path: Path) -> None:
+    dots = (
+        Dot("never", 5.0, None, 1000.0, "1,000 bytes", (4.0, 6.0)),
+        Dot("bayes", 50.0, 2.0, 4000.0, "4,000 bytes", (40.0, 60.0), (1.0, 3.0)),
+        Dot("list", 500.0, 2.0),
+    )
+    plot = ScatterPlot("Latency and staleness", dots, "ms", "frames", "not reached")
+    (element,) = plot_elements([plot])
+    for text in ("never: 5.0, not reached, 1,000 bytes", "bayes: 50.0, 2.0, 4,000 bytes", "open: not reached", "100"):
+        assert text in element, text
+    assert "mathdefault" not in element
+    file = write_plots([plot], tmp_path / "plot.svg")
+    assert file.read_text().count("open: not reached") == 1
+    (closed,) = plot_elements([ScatterPlot("t", dots[1:], "ms", "frames", "not reached")])
+    assert "open" not in closed

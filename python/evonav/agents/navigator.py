@@ -13,13 +13,14 @@ from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.text.language import canonical
-from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
+from evonav.memory import Frontier, ObjectMap, ObjectMapConfig, forgetting
 from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
 from evonav.sensors.observation import MapFrame, Observation, View
 
+DAY_S = 86400.0
 KNOWN_RADIUS_M = 1.0
 """Radius around an entry within which `Appearance.known_share` counts cells."""
 
@@ -30,6 +31,8 @@ class NavigatorConfig:
 
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     objects: ObjectMapConfig = field(default_factory=ObjectMapConfig)
+    forgetting: str = "never"
+    """Rule by which object entries are forgotten (`evonav.memory.forgetting`); the paper's agents forget none."""
     observation_distance_m: float = 1.5
     """Distance from which to look at an object."""
     aim_again_m: float = 0.25
@@ -71,6 +74,7 @@ class Navigator:
         self._names_colours = names_colours
         self.explorer = Explorer(map_frame, config.explorer)
         self.objects = ObjectMap(config.objects)
+        self._forgetting = forgetting.make(config.forgetting)
         self.views = ViewStore(names_colours=names_colours, keeps_layouts=keeps_layouts)
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
@@ -86,6 +90,12 @@ class Navigator:
         self.stage = stage
         self.round = -1
         self.objects.begin_stage(stage)
+        self._forgetting.begin_visit(self.objects, self._time_s)
+
+    @property
+    def _time_s(self) -> float:
+        """Time for forgetting rules: agents have no clock, so a stage counts as a day."""
+        return (self.stage - 1) * DAY_S
 
     def observe(self, observation: Observation) -> bool:
         """Integrate a round's views, without background: entries first, then cells and frontiers.
@@ -100,6 +110,7 @@ class Navigator:
             self.views.follow(update.merged)
             self.round_views.append(self.views.add(view, update.entry_ids, stage=self.stage, round_=self.round))
             self._follow(update.removed)
+            self._follow(self._forgetting.after_update(self.objects, view, update, self._time_s))
         is_outdated = self.explorer.observe(observation)
         if is_outdated:
             self.target = None

@@ -59,6 +59,14 @@ class NavigatorAgent(ABC):
         """Ids of the entries that the last question offered."""
         self._diagnostics = RoundDiagnostics()
 
+    def forget_by(self, rule: str) -> None:
+        """Choose the rule that decides which object entries are forgotten, before a task begins.
+
+        Args:
+            rule: A key of `evonav.memory.forgetting.RULES`.
+        """
+        self._navigator_config = replace(self._navigator_config, forgetting=rule)
+
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
         self._task = task

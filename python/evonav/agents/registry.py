@@ -14,6 +14,9 @@ from evonav.errors import InvalidArgumentError
 ENTRY_POINT_GROUP = "evonav.agents"
 """A package adds agents by naming classes (or functions that make one) in this entry-point group."""
 
+RULE_MARK = "@"
+"""Sign between a built-in agent's name and the rule by which it forgets object entries."""
+
 BUILT_IN: dict[str, tuple[str, str]] = {
     "fu": (
         "evonav.agents.frontier_update.agent:FrontierUpdate",
@@ -80,11 +83,14 @@ def agent_factory(name: str) -> Callable[..., Agent]:
 
     Args:
         name: A built-in or registered name, an entry point of the group `evonav.agents`, `package.module:Class`, or
-            `path/to/file.py:Class`.
+            `path/to/file.py:Class`; a built-in agent with object entries may have a forgetting rule, as in `fu@bayes`.
 
     Raises:
-        InvalidArgumentError: There is no such agent, or importing it fails.
+        InvalidArgumentError: There is no such agent or rule, or importing it fails.
     """
+    base, at, rule = name.partition(RULE_MARK)
+    if at and base in BUILT_IN:
+        return _forgetful(base, rule)
     if name in BUILT_IN:
         return import_callable(BUILT_IN[name][0], "agent")
     if name in _REGISTERED:
@@ -100,6 +106,36 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     raise InvalidArgumentError(
         f"no agent `{name}`; there are {known}, or name a class as `package.module:Class` or `./file.py:Class`"
     )
+
+
+def with_rule(name: str, rule: str) -> str:
+    """Return the name of an agent that forgets by a rule, such as `fu@bayes`.
+
+    Raises:
+        InvalidArgumentError: There is no such rule, or the agent has no object entries of ours, or another rule.
+    """
+    if name.partition(RULE_MARK)[0] not in BUILT_IN or RULE_MARK in name:
+        raise InvalidArgumentError(f"agent `{name}`: a forgetting rule is for a built-in agent without one")
+    found = f"{name}{RULE_MARK}{rule}"
+    agent_factory(found)
+    return found
+
+
+def _forgetful(name: str, rule: str) -> Callable[..., Agent]:
+    """Return a function that makes a built-in agent with a forgetting rule."""
+    from evonav.memory.forgetting import check_name
+
+    check_name(rule)
+    factory = agent_factory(name)
+    if not hasattr(factory, "forget_by"):
+        raise InvalidArgumentError(f"agent `{name}` has no object entries that rule `{rule}` could forget")
+
+    def make(decision: DecisionModel | None = None) -> Agent:
+        agent = new_agent(factory, decision)
+        agent.forget_by(rule)  # type: ignore[attr-defined]  # checked above, on its class
+        return agent
+
+    return make
 
 
 def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = None) -> Agent:

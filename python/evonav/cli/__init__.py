@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.bench.app import bench_app
 from evonav.cli.doctor.doctor import doctor
 from evonav.cli.examples import add_examples
 from evonav.cli.group import HELP_NAMES, Command, Group, add_commands
@@ -38,12 +39,12 @@ PANELS = {
     "Run": (evaluate, sweep, check_agent, agents),
     "Results": (report, view, compare, breakdown, failures, export),
     "Data": (houses_app, tasks_app),
-    "Study": (paper, controlled_app, perception),
+    "Study": (paper, controlled_app, perception, bench_app),
     "Submit": (pack, verify, leaderboard),
     "Tools": (video, strip, rerun, mock_vlm),
 }
 """Commands and groups of commands under their headings in the help."""
-GROUP_NAMES = {houses_app: "houses", tasks_app: "tasks", controlled_app: "controlled"}
+GROUP_NAMES = {houses_app: "houses", tasks_app: "tasks", controlled_app: "controlled", bench_app: "bench"}
 
 
 class _Panels(Group):

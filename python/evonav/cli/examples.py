@@ -50,6 +50,16 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav perception --perception gt --perception noisy:poor --limit 10 --out out/perception",
         "evonav perception --tasks tasks --perception predicted:mini --views-per-room 24 --workers 4 --out out/mini",
     ),
+    "bench render": ("evonav bench render", "evonav bench render --limit 2 --out out/bench"),
+    "bench navigation": ("evonav bench navigation --against out/bench/navigation/speed.json",),
+    "bench gym": ("evonav bench gym --envs 1,16 --peer sync",),
+    "bench agents": ("evonav bench agents --agent fu --no-growth",),
+    "bench generation": ("evonav bench generation --limit 100",),
+    "bench memory export": ("evonav bench memory export out/streams --streams S1 --quick --layout replica",),
+    "bench memory score": (
+        "evonav bench memory score out/streams",
+        "evonav bench memory score out/streams/S1_bundled-0001_0 answers.jsonl --system mine",
+    ),
     "strip": ("evonav strip out/run --agent fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
     "tasks generate": (
@@ -107,6 +117,11 @@ PAGES = {
     "video": "report.md",
     "rerun": "report.md",
     "paper": "reproduce.md",
+    "bench memory export": "memory-benchmark.md",
+    "bench memory score": "memory-benchmark.md",
+    **dict.fromkeys(
+        ("bench render", "bench navigation", "bench gym", "bench agents", "bench generation"), "benchmarks.md"
+    ),
     "perception": "perception-quality.md",
     "view": "report.md",
     "check-agent": "agents.md",

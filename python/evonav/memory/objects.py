@@ -17,7 +17,16 @@ from evonav.sensors.observation import View
 if TYPE_CHECKING:  # agents start fast, and few draw
     from evonav.drawing.pictures import Picture
 
-__all__ = ["Comparison", "ObjectEntry", "ObjectMap", "ObjectMapConfig", "ObjectUpdate", "SightConfig"]
+__all__ = [
+    "Comparison",
+    "Erosion",
+    "ObjectEntry",
+    "ObjectMap",
+    "ObjectMapConfig",
+    "ObjectUpdate",
+    "SeeThroughConfig",
+    "SightConfig",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +77,33 @@ class SightConfig:
     """Largest number of samples of a line; longer lines are sampled more coarsely."""
     max_targets: int = 1000
     """Largest number of points of a target, which is thinned."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeeThroughConfig:
+    """Conditions under which `ObjectMap.remove_seen_through` removes a point; DynaMem's, but for `margin_px`."""
+
+    near_m: float = 0.01
+    """Smallest depth of a point."""
+    far_m: float = 2.5
+    """Largest depth of a point."""
+    band_m: float = 0.1
+    """A surface this much farther away than the point does not yet count as farther away."""
+    band_share: float = 0.0
+    """The same as a share of the point's depth; the larger of the two counts."""
+    margin_px: int = 1
+    """All pixels within this many rows and columns must show something farther away, too; ours: 0 wears edges off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Erosion:
+    """An entry that lost points."""
+
+    entry_id: int
+    num_removed: int
+    """Number of points that were removed."""
+    num_left: int
+    """Number of points that are left; an entry without any is removed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +255,42 @@ class ObjectMap:
         """
         counts = self._map.depth_evidence(entry_ids, view, config or EvidenceConfig())
         return [DepthEvidence(*row) for row in counts.tolist()]
+
+    def in_view(self, view: View, max_distance_m: float | None = None) -> list[int]:
+        """Return the ids of the entries whose boxes are in view, ascending; they may be hidden.
+
+        Args:
+            view: View with pose, intrinsics and the size of its depth image.
+            max_distance_m: Largest distance on the ground plane from the camera to the middle of a box; `None` for
+                that of detections, `ObjectMapConfig.max_distance_m`.
+
+        Raises:
+            InvalidArgumentError: The pose is not finite, or the distance is negative or NaN.
+        """
+        return self._map.in_view(view, self.config.max_distance_m if max_distance_m is None else max_distance_m)
+
+    def remove_seen_through(self, view: View, config: SeeThroughConfig | None = None) -> list[Erosion]:
+        """Remove the points of all entries that the depth image of a view sees through.
+
+        A point is seen through if the image shows something farther away at its pixel, by more than a band,
+        `max(band_m, band_share * depth)`, and around it. An entry without any points left is removed.
+
+        Args:
+            view: View with depth, pose and intrinsics.
+            config: The conditions.
+
+        Returns:
+            The entries that lost points, by ascending id.
+
+        Raises:
+            InvalidArgumentError: The depth image contains NaN, or a parameter is out of range; the map does not change
+                then.
+        """
+        return [Erosion(*row) for row in self._map.remove_seen_through(view, config or SeeThroughConfig())]
+
+    def num_bytes(self) -> int:
+        """Return the number of bytes that the map holds: entries, labels, features, points and their tables."""
+        return self._map.num_bytes()
 
     def visible_shares(
         self, target_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig | None = None

@@ -1,4 +1,4 @@
-"""What a benchmarked memory is given: a stream of posed RGB-D frames with detections. Nothing here is oracle data."""
+"""Define the input of a benchmarked memory: posed RGB-D frames with detections. Nothing here is oracle data."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from evonav.world.simulator import Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class StreamInfo:
-    """What a memory learns before the first frame of a stream."""
+    """The facts that a memory learns before the first frame of a stream."""
 
     intrinsics: Intrinsics
     labels: tuple[str, ...]

@@ -63,7 +63,7 @@ class Stream(Protocol):
 
     @property
     def info(self) -> StreamInfo:
-        """What a memory is told."""
+        """The public facts, which a memory is told."""
 
     @property
     def changes(self) -> Sequence[Change]:

@@ -157,6 +157,21 @@ class ClusterBootstrap:
         """Return an estimate of which the value in each resample, `(R,)`, is known; NaN where there is none."""
         return Estimate(value, percentile_interval(resampled, self.num_clusters), n, self.num_clusters, resampled)
 
+    def median(self, values: ArrayLike) -> Estimate:
+        """Estimate the median over all rows: the mean of the two values in the middle, as in every resample.
+
+        Args:
+            values: `(N,)`, a row as the bootstrap's; infinite ones are allowed.
+        """
+        rows = np.asarray(values, np.float64)
+        if not rows.size:
+            return Estimate(None, None, 0, self.num_clusters)
+        order = np.argsort(rows, kind="stable")
+        num_up_to = np.cumsum(self.draws[:, self.cluster_of[order]], axis=1)  # (R, N)
+        total = num_up_to[:, -1:]
+        places = [(num_up_to <= middle).sum(axis=1) for middle in ((total - 1) // 2, total // 2)]
+        return self.estimate(float(np.median(rows)), rows[order][np.stack(places)].mean(axis=0), rows.size)
+
     def weighted_median(
         self, values: NDArray[np.float64], weights: NDArray[np.float64], cluster_of: NDArray[np.int64]
     ) -> Estimate:

@@ -82,7 +82,7 @@ class SweepFile(RunSettings, SpendingSettings):
     out: str | None = None
     """Folder for runs and summary; `--out` overrides it."""
     agents: tuple[str, ...] = Field(min_length=1)
-    """Names as `evonav agents` lists them, `./file.py:Class` or `module:Class`."""
+    """Names as `evonav agents` lists them, `fu@bayes` (with a forgetting rule), `./file.py:Class` or `module:Class`."""
     tasks: dict[Name, TaskSet] = Field(min_length=1)
     """Short: a list of `FOLDER`, `FOLDER:LIMIT` or `FOLDER:SUBSET`, with `bundled` for a folder."""
     simulators: dict[Name, SimulatorSettings] = Field(default={"embedded": SimulatorSettings()}, min_length=1)

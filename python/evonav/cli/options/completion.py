@@ -18,6 +18,14 @@ def agents(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in names]
 
 
+def forgetting_rules(incomplete: str) -> list[str]:
+    """Names of forgetting rules; after a comma, further ones."""
+    from evonav.memory.forgetting import RULES
+
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in RULES if name.startswith(last) and name not in before.split(",")]
+
+
 def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
     """Names of the agents of the run that the command line names before; after a comma, further ones."""
     import json

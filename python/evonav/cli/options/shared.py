@@ -30,6 +30,16 @@ Agents = Annotated[
         autocompletion=completion.agents,
     ),
 ]
+Forgetting = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--forgetting",
+        metavar="RULE",
+        help="Rule by which the agents forget object entries, such as bayes; an agent is then called "
+        f"fu@bayes, as it may be given to --agent, too. {_SEVERAL} Default: none, as in the paper.",
+        autocompletion=completion.forgetting_rules,
+    ),
+]
 RunAgents = Annotated[
     list[str] | None,
     typer.Option(
@@ -144,6 +154,14 @@ AnyAsset = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
 OldJsonFile = Annotated[Path | None, typer.Option("--json-file", metavar="FILE", hidden=True)]
 """The option that the old `--json FILE` stands for (`evonav.cli.old_names`)."""
+Against = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="JSON file of an earlier run: figures that became worse by more than chance explains are listed, and the "
+        "exit code is 1.",
+    ),
+]
 RetryErrored = Annotated[
     bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
 ]
@@ -166,9 +184,19 @@ def house_options(assets: Path | None, start: str) -> "HouseOptions | None":
     return HouseOptions.of(assets, "auto" if start == "auto" else "file")
 
 
-def names_of(agents: "Sequence[str] | None") -> list[str]:
-    """Return the agents that the option `--agent` names; the paper's heuristics if it is not given."""
-    return listed(agents) or listed([HEURISTICS])
+def names_of(agents: "Sequence[str] | None", rules: "Sequence[str] | None" = None) -> list[str]:
+    """Return the agents that the option `--agent` names; the paper's heuristics if it is not given.
+
+    Args:
+        agents: Texts of the option `--agent`.
+        rules: Texts of the option `--forgetting`: each agent is returned once for each rule.
+    """
+    names = listed(agents) or listed([HEURISTICS])
+    if not rules:
+        return names
+    from evonav.agents.registry import with_rule
+
+    return [with_rule(name, rule) for name in names for rule in listed(rules)]
 
 
 def listed(texts: "Sequence[str] | None") -> list[str]:

@@ -14,6 +14,7 @@ from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     Agents,
     AssetFile,
+    Forgetting,
     Houses,
     Limit,
     Out,
@@ -51,6 +52,7 @@ def evaluate(
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
     agent: Agents = None,
+    forgetting: Forgetting = None,
     houses: Houses = None,
     assets: AssetFile = None,
     start: StartOfHouses = "file",
@@ -105,7 +107,7 @@ def evaluate(
     )
     config = run.config(seed, backend, decisions)
     config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))
-    names = names_of(agent)
+    names = names_of(agent, forgetting)
     allows_any = simulation.allow_unknown_assets
     texts = None if houses is None else read_houses(houses, assets, start)
     with run_tasks(out, texts, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:

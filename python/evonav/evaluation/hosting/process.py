@@ -42,10 +42,7 @@ _PART_BYTES = 1 << 18
 _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
 """Time between two checks that a process lives, on systems that cannot notify."""
-_START = (
-    "import sys; sys.path[:] = sys.argv[4:]; "
-    "from evonav.agents.hosting.serving import main; main(*map(int, sys.argv[1:4]))"
-)
+_START = "import sys; sys.path[:] = sys.argv[4:]; from {} import main; main(*map(int, sys.argv[1:4]))"
 
 
 class AgentFailedError(EvonavError):
@@ -83,6 +80,13 @@ class AgentHosting:
 class AgentProcess:
     """A process with an agent in it."""
 
+    noun = "agent"
+    """Word for its content in messages."""
+    serving = "evonav.agents.hosting.serving"
+    """The module whose `main` is its side."""
+    max_answer_bytes = MAX_ANSWER_BYTES
+    """Largest answer."""
+
     def __init__(self, name: str, hosting: AgentHosting) -> None:
         """Start the process and import the agent's module in it.
 
@@ -102,7 +106,7 @@ class AgentProcess:
             arguments = (far_end.fileno(), life, self._block.descriptor)
             with one_thread_each():
                 self._process = subprocess.Popen(  # noqa: S603 - ourselves
-                    [sys.executable, "-c", _START, *map(str, arguments), *sys.path],
+                    [sys.executable, "-c", _START.format(self.serving), *map(str, arguments), *sys.path],
                     pass_fds=arguments,
                     stdin=subprocess.DEVNULL,
                     stdout=sys.__stderr__ if output is None else output.descriptor,
@@ -190,8 +194,8 @@ class AgentProcess:
             data += part
             if size == LENGTH.size <= len(data):
                 size += LENGTH.unpack_from(data)[0]
-                if size > MAX_ANSWER_BYTES:
-                    raise InvalidArgumentError(f"{size} bytes: must be at most {MAX_ANSWER_BYTES}")
+                if size > self.max_answer_bytes:
+                    raise InvalidArgumentError(f"{size} bytes: must be at most {self.max_answer_bytes}")
         if len(data) > size:
             raise InvalidArgumentError("more than one answer")
         return bytes(data[LENGTH.size :])
@@ -213,9 +217,9 @@ class AgentProcess:
         try:
             code = self._process.wait(timeout=2.0)
         except subprocess.TimeoutExpired:
-            return "the agent's process hung up"
+            return f"the {self.noun}'s process hung up"
         how = f"killed by signal {-code}" if code < 0 else f"exit code {code}"
-        return f"the agent's process died ({how})"
+        return f"the {self.noun}'s process died ({how})"
 
     def close(self, *, is_at_once: bool = False) -> None:
         """End the process and all that it has started; safe to call twice.

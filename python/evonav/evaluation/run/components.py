@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
-from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
+from evonav.agents.registry import BUILT_IN, RULE_MARK, agent_descriptions, agent_factory, new_agent
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
@@ -156,12 +156,12 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
     if name in ORACLE_BASELINES:
         return
     try:
-        if is_in_process or name in BUILT_IN:
+        if is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
             agent_factory(name)
         else:
             check_importable(name)
     except InvalidArgumentError as error:
-        if ":" in name or name.endswith(".py"):
+        if ":" in name or name.endswith(".py") or RULE_MARK in name:
             raise
         near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINES), 1)
         known = ", ".join(sorted(ORACLE_BASELINES))

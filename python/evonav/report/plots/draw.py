@@ -1,10 +1,22 @@
 """Draw plots with matplotlib: one function a kind of plot, and the room that each kind needs."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from evonav.drawing.svg import clean
-from evonav.report.plots.specs import BarPlot, ConfusionPlot, CurvePlot, Gap, GapPlot, GroupPlot, Line, Plot, Series
+from evonav.report.plots.specs import (
+    BarPlot,
+    ConfusionPlot,
+    CurvePlot,
+    Gap,
+    GapPlot,
+    GroupPlot,
+    Line,
+    Plot,
+    ScatterPlot,
+    Series,
+)
 from evonav.report.plots.style import BAND, COLOURS, INK, PALE, PAPER, REFERENCE, SOFT
 from evonav.report.tables.numbers import number, with_interval
 from evonav.statistics import Interval
@@ -34,6 +46,8 @@ def size_in(plot: Plot) -> tuple[float, float]:
         names, heads = _longest([_short(row.category) for row in plot.rows]), _longest(map(_short, plot.columns))
         width = LETTER_IN * (names + 8) + CELL_IN * len(plot.columns) + 0.05 * heads
         return max(title, width), 0.7 + 0.055 * heads + ROW_IN * len(plot.rows)
+    if isinstance(plot, ScatterPlot):
+        return max(title, 7.2), 4.4
     if isinstance(plot, CurvePlot):
         return (3.7, 3.6 + 0.17 * len(plot.lines)) if plot.is_square else (max(title, 5.6), 3.5)
     slot = LETTER_IN * _longest(line for group in plot.groups for line in group.split("\n")) + 0.14
@@ -56,6 +70,8 @@ def draw(panel: "SubFigure", plot: Plot) -> None:
         _draw_confusions(axes, plot)
     elif isinstance(plot, CurvePlot):
         _draw_curves(axes, plot)
+    elif isinstance(plot, ScatterPlot):
+        _draw_dots(axes, plot)
     elif isinstance(plot, BarPlot):
         _draw_bars(axes, plot)
     else:
@@ -188,6 +204,49 @@ def _draw_line(axes: "Axes", line: Line, colour: str, shift: float, *, is_dashed
     if line.has_dots:
         for x, (place, value) in zip(xs, line.points, strict=True):
             _mark(axes, x, value, colour, f"{line.name}: {_short_number(value)} at {place:g}")
+
+
+def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
+    ends = [dot.y if dot.y_interval is None else dot.y_interval[1] for dot in plot.dots if dot.y is not None]
+    top = 1.15 * max([1.0, *(end for end in ends if end is not None and math.isfinite(end))])
+    largest = max([0.0, *(dot.size or 0.0 for dot in plot.dots)])
+    axes.set_xscale("log")
+    axes.margins(x=0.15)
+    for axis in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        axis(lambda value, _: f"{value:g}")
+    for k, dot in enumerate(sorted(plot.dots, key=lambda dot: -(dot.size or 0.0))):
+        colour, y = COLOURS[k % len(COLOURS)], top if dot.y is None else dot.y
+        area = 20 + (600 * (dot.size or 0.0) / largest if largest else 0.0)
+        if dot.x_interval is not None:
+            axes.plot(dot.x_interval, (y, y), color=colour, alpha=0.5)
+        if dot.y is not None and dot.y_interval is not None:
+            low, high = dot.y_interval
+            axes.plot((dot.x, dot.x), (low, min(high, top)), color=colour, alpha=0.5)
+        reached = plot.beyond if dot.y is None else _short_number(dot.y)
+        text = f"{dot.name}: {_short_number(dot.x)}, {reached}{', ' if dot.size_text else ''}{dot.size_text}"
+        look: dict[str, Any] = {"facecolors": "none" if dot.y is None else colour, "edgecolors": colour, "alpha": 0.75}
+        axes.scatter([dot.x], [y], s=area, clip_on=False, gid=TOOLTIP + clean(text), **look)
+    places = [(dot.x, top if dot.y is None else dot.y, dot.name) for dot in plot.dots]
+    _name_dots(axes, places, top, gap_pt=4 + 14 * (largest > 0))
+    axes.set_ylim(bottom=0, top=top)
+    axes.grid(axis="y")
+    axes.set_xlabel(clean(plot.x_label))
+    axes.set_ylabel(clean(plot.y_label))
+    if any(dot.y is None for dot in plot.dots):
+        look = {"xycoords": "axes fraction", "va": "bottom", "color": SOFT, "fontsize": SMALL}
+        axes.annotate(clean(f"open: {plot.beyond}"), (0.0, 1.06), **look)
+
+
+def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]], top: float, gap_pt: float) -> None:
+    """Write names right of dots, each below the one before where they would lie on each other."""
+    taken: list[tuple[float, float]] = []
+    for x, y, name in sorted(places, key=lambda place: -place[1]):
+        height = y
+        while any(abs(math.log10(x / other_x)) < 0.35 and abs(height - other) < 0.05 * top for other_x, other in taken):
+            height -= 0.05 * top
+        taken.append((x, height))
+        place: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": SMALL, "color": INK}
+        axes.annotate(clean(name), (x, height), xytext=(gap_pt, 0), **place)
 
 
 def _draw_confusions(axes: "Axes", plot: ConfusionPlot) -> None:

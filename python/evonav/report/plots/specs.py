@@ -142,4 +142,32 @@ class ConfusionPlot:
     rows: tuple[ConfusionRow, ...]
 
 
-Plot = GroupPlot | BarPlot | CurvePlot | GapPlot | ConfusionPlot
+@dataclass(frozen=True, slots=True)
+class Dot:
+    """One thing that has a place by two numbers, and a size."""
+
+    name: str
+    x: float
+    y: float | None
+    """`None` for a value beyond all others, which is drawn as an open dot at the upper edge."""
+    size: float | None = None
+    """The dot's area is in proportion to it; `None` for the smallest dot."""
+    size_text: str = ""
+    """The size in words, for the tooltip."""
+    x_interval: Interval | None = None
+    y_interval: Interval | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ScatterPlot:
+    """Dots by two numbers, with their names beside them; x is logarithmic."""
+
+    title: str
+    dots: tuple[Dot, ...]
+    x_label: str
+    y_label: str
+    beyond: str = ""
+    """Meaning of a dot at the upper edge."""
+
+
+Plot = ScatterPlot | GroupPlot | BarPlot | CurvePlot | GapPlot | ConfusionPlot

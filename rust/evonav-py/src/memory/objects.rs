@@ -4,7 +4,7 @@ use evonav_core::{
     Error,
     memory::objects::{
         self, DetectedView, Entry, ObjectMapConfig, depth_evidence::EvidenceConfig,
-        sight_lines::SightConfig,
+        seen_through::SeeThroughConfig, sight_lines::SightConfig,
     },
     sensors::unproject::MaskedDepth,
 };
@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays,
-    camera::{Intrinsics, PyPose},
+    camera::{DepthImage, Intrinsics, PyPose},
     error,
 };
 
@@ -150,6 +150,37 @@ impl ObjectMap {
         let rows =
             found.map(|e| [e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view]);
         arrays::rows_of(py, rows.collect())
+    }
+
+    fn in_view(
+        &self,
+        py: Python<'_>,
+        view: DepthImage<'_>,
+        max_distance_m: f64,
+    ) -> PyResult<Vec<u64>> {
+        let (camera, _) = view.borrow()?;
+        py.detach(|| self.0.in_view(&camera, max_distance_m)).map_err(error::to_py)
+    }
+
+    fn remove_seen_through(
+        &mut self,
+        py: Python<'_>,
+        view: DepthImage<'_>,
+        config: &Bound<'_, PyAny>,
+    ) -> PyResult<Vec<(u64, usize, usize)>> {
+        let config = arrays::from_attributes!(
+            config,
+            SeeThroughConfig { near_m, far_m, band_m, band_share, margin_px }
+        );
+        let (camera, depth_m) = view.borrow()?;
+        let map = &mut self.0;
+        let eroded = py.detach(|| map.remove_seen_through(&camera, depth_m, &config));
+        let rows = eroded.map_err(error::to_py)?.into_iter();
+        Ok(rows.map(|e| (e.id, e.num_removed, e.num_left)).collect())
+    }
+
+    fn num_bytes(&self) -> usize {
+        self.0.num_bytes()
     }
 
     fn begin_stage(&mut self, stage: u32) {

@@ -56,6 +56,15 @@ impl Cloud {
         &self.bounds_m
     }
 
+    /// Return the number of bytes of the points and of the tables that find them.
+    pub(crate) fn num_bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.points.capacity() * size_of::<Point>()
+            + self.next.capacity() * size_of::<u32>()
+            + self.voxels.num_heap_bytes()
+            + self.cells.num_heap_bytes()
+    }
+
     /// Add the points that fall into voxels without a point.
     pub fn merge(&mut self, points: &[Point]) {
         let inverse_radius = 1.0 / f64::from(self.radius_m);

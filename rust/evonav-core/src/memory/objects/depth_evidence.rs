@@ -118,7 +118,8 @@ pub fn depth_evidence<'a>(
     Ok(clouds.into_iter().map(compare).collect())
 }
 
-fn check_image(camera: &Camera, depth_m: &[f32]) -> Result<(), Error> {
+/// Check a depth image.
+pub(super) fn check_image(camera: &Camera, depth_m: &[f32]) -> Result<(), Error> {
     camera.check()?;
     let num_px = camera.width_px * camera.height_px;
     Error::require("depth_m", depth_m.len(), "one value a pixel of the camera", |n| n == num_px)?;
@@ -129,7 +130,7 @@ fn check_image(camera: &Camera, depth_m: &[f32]) -> Result<(), Error> {
 }
 
 /// [`Camera::project`] with the parts that are the same for all points computed once.
-struct Projection<'a> {
+pub(super) struct Projection<'a> {
     camera: &'a Camera,
     axes: [[f64; 3]; 3],
     centre_px: [f64; 2],
@@ -137,7 +138,7 @@ struct Projection<'a> {
 }
 
 impl<'a> Projection<'a> {
-    fn new(camera: &'a Camera) -> Self {
+    pub(super) fn new(camera: &'a Camera) -> Self {
         Self {
             camera,
             axes: camera.camera_from_world(),
@@ -148,7 +149,7 @@ impl<'a> Projection<'a> {
 
     /// Return the index of the pixel that a point falls on, and its planar depth; `None` outside of
     /// the image.
-    fn pixel_of(&self, point: Point) -> Option<(usize, f64)> {
+    pub(super) fn pixel_of(&self, point: Point) -> Option<(usize, f64)> {
         let offset_m = sub(point.map(f64::from), self.camera.position_m);
         let [x, y, z] = rotate(&self.axes, offset_m);
         if z <= 0.0 {

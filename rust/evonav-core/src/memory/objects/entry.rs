@@ -117,6 +117,22 @@ impl Entry {
         self.has_grown |= self.cloud.points().len() != num_points;
     }
 
+    /// Remove the points that are to go; return their number.
+    pub(crate) fn remove_points(
+        &mut self,
+        is_gone: impl Fn(Point) -> bool,
+        config: &ObjectMapConfig,
+    ) -> usize {
+        let num_points = self.cloud.points().len();
+        let left: Vec<Point> =
+            self.cloud.points().iter().copied().filter(|&point| !is_gone(point)).collect();
+        if left.len() < num_points {
+            self.cloud = Cloud::new(&left, config.voxel_m, config.overlap_radius_m as f32);
+            (self.is_changed, self.has_grown) = (true, true);
+        }
+        num_points - left.len()
+    }
+
     /// Merge another entry into this one; the id stays.
     pub(crate) fn absorb(&mut self, other: Self) {
         self.count(other.label_counts, other.feature, other.num_detections);

@@ -7,7 +7,10 @@ pub mod dbscan;
 pub mod depth_evidence;
 mod entry;
 mod object_map;
+pub mod seen_through;
 pub mod sight_lines;
+mod size;
+mod visibility;
 pub mod voxels;
 
 pub use config::ObjectMapConfig;

@@ -60,8 +60,8 @@ pub struct Comparison {
 /// The entries of an agent.
 #[derive(Debug, Clone)]
 pub struct ObjectMap {
-    config: ObjectMapConfig,
-    entries: Vec<Entry>,
+    pub(super) config: ObjectMapConfig,
+    pub(super) entries: Vec<Entry>,
     next_id: u64,
     stage: u32,
     num_views: u64,

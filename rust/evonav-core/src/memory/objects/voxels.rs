@@ -31,6 +31,10 @@ impl VoxelTable {
         Self { slots: vec![(FREE_SLOT, 0); (num * 2).next_power_of_two().max(16)], len: 0 }
     }
 
+    fn num_heap_bytes(&self) -> usize {
+        self.slots.capacity() * size_of::<(u64, u32)>()
+    }
+
     pub(crate) fn get(&self, voxel: Voxel) -> Option<u32> {
         let key = key_of(voxel);
         let (found, value) = self.slots[self.slot(key)];
@@ -90,6 +94,11 @@ impl<T> Blocks<T> {
         Self { index, values, last: ([i32::MAX; 3], 0) }
     }
 
+    /// Return the number of bytes of the values and of the table that finds them.
+    pub(crate) fn num_heap_bytes(&self) -> usize {
+        self.index.num_heap_bytes() + self.values.capacity() * size_of::<T>()
+    }
+
     /// Return the value of a voxel's block.
     pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
         self.index.get(clamped(voxel).map(|i| i >> 2)).map(|index| &self.values[index as usize])
@@ -124,6 +133,11 @@ pub(crate) struct VoxelSet(Blocks<u64>);
 impl VoxelSet {
     pub(crate) fn with_capacity(num_blocks: usize) -> Self {
         Self(Blocks::with_capacity(num_blocks))
+    }
+
+    /// Return the number of bytes of the set's table.
+    pub(crate) fn num_heap_bytes(&self) -> usize {
+        self.0.num_heap_bytes()
     }
 
     /// Insert a voxel; return whether it is new.

@@ -1,23 +1,23 @@
-"""What agents themselves cost: time of a decision round with a full memory, and memory of a long task."""
+"""The cost of agents themselves: time of a decision round with a full memory, and memory of a long task."""
 
 import gc
 import json
 import math
-import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo, Stop
+from evonav.agents.hosting.serving import peak_memory_mb
 from evonav.agents.registry import BUILT_IN
 from evonav.decision.question import Question, Reply
 from evonav.decision.text.matcher import TextMatch
+from evonav.errors import SimulationError
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
@@ -26,6 +26,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
+from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import Sampling, rows_of
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_file
 from evonav.tasks.public import Goal, TaskInfo
@@ -33,12 +35,12 @@ from evonav.world.simulator import Simulator
 
 A = TypeVar("A")
 
+NAME, TITLE = "agents", "Agents"
 TASK = "bundled-0101-298696-s0"
 """Eight rooms, 155 objects, five stages."""
 NUM_ENTRIES = 100
 MAX_ROUND_MS = 50.0
 MAX_GROWTH_MB = 500.0
-
 NOTES = f"""One decision round of each agent in `{TASK}` (8 rooms, 155 objects), on ground-truth views of 300x300:
 mapping, memory, candidates, questions, and the text matcher's answers; rendering and all else outside of the agent is
 not counted. When stage 1 begins the agent is led through the whole house; then it plays all stages by its own choices,
@@ -64,17 +66,17 @@ class Led:
         self.sensors = self.agent.sensors
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Of the house."""
+        """Begin the task."""
         self.agent.begin_task(task)
 
     def begin_stage(self, goal: Goal) -> None:
-        """The first one with the tour."""
+        """Begin a stage, the first one with the tour."""
         self.agent.begin_stage(goal)
         if goal.stage == 1:
             self.tour(self.agent)
 
     def act(self, observation: Observation) -> AgentAction:
-        """The agent's round, timed."""
+        """Return the agent's action, timed."""
         gc.disable()
         start_s = time.process_time()
         action = self.agent.act(observation)
@@ -96,28 +98,58 @@ class TextMatchWithImages:
         self._rules = TextMatch()
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """The rule's answer."""
+        """Return the rule's answer."""
         question.prompt()
         return self._rules.answer(question, attempt)
 
 
-def run() -> str:
-    """Measures every built-in agent."""
-    lines = ["| agent | p50 | p95 | rounds | entries | peak memory grows by |", "| --- | --- | --- | --- | --- | --- |"]
-    for name in [name for name in PAPER_ORDER if name in BUILT_IN]:
-        led = timed(name)
-        full = [ms for ms, num in zip(led.round_ms, led.num_entries, strict=True) if num >= NUM_ENTRIES]
-        counted = full or led.round_ms
-        p50, p95 = statistics.median(counted), float(np.quantile(counted, 0.95))
-        remembered = [num for num in led.num_entries if num >= NUM_ENTRIES] or led.num_entries
-        entries = f"{min(remembered)}-{max(remembered)}"
-        growth = growth_mb(name)
-        lines.append(f"| {name} | {p50:.1f} ms | {p95:.1f} ms | {len(counted)} | {entries} | {growth:.0f} MB |")
-    return "\n".join(lines)
+def agent_names() -> list[str]:
+    """Return the built-in agents of the paper."""
+    return [name for name in PAPER_ORDER if name in BUILT_IN]
+
+
+def measure(sampling: Sampling, *, agents: Sequence[str] | None = None, has_growth: bool = True) -> Iterator[Row]:
+    """Yield the time of a decision round of each agent.
+
+    Args:
+        sampling: Its `repeats` is the number of times that the task is played.
+        agents: Names as `evonav agents` lists them; default: those of the paper.
+        has_growth: Also measure the growth of memory, in a process of its own, where the system reports it.
+
+    Raises:
+        SimulationError: A stage fails.
+    """
+    names = agent_names() if agents is None else agents
+    for number, name in enumerate(names):
+        sampling.on_progress(number, len(names), name)
+        round_ms: list[float] = []
+        num_entries: list[int] = []
+        for _ in range(sampling.repeats):
+            led = timed(name)
+            round_ms += led.round_ms
+            num_entries += led.num_entries
+        is_full = [num >= NUM_ENTRIES for num in num_entries]
+        counted = [at for at, full in enumerate(is_full) if full or not any(is_full)]
+        counted_ms = [round_ms[at] for at in counted]
+        entries = [num_entries[at] for at in counted]
+        facts = {
+            "p95 ms": float(np.quantile(counted_ms, 0.95)),
+            "entries, least": float(min(entries)),
+            "entries, most": float(max(entries)),
+        }
+        growth = growth_mb(name) if has_growth and peak_memory_mb() is not None else None
+        if growth is not None:
+            facts["memory grows by MB"] = growth
+        yield from rows_of(f"a round of {name}", counted_ms, {}, [TASK] * len(counted_ms), facts)
+    sampling.on_progress(len(names), len(names), "")
 
 
 def timed(name: str) -> Led:
-    """An agent after its rounds."""
+    """Return an agent after its rounds.
+
+    Raises:
+        SimulationError: A stage fails.
+    """
     backend = Backend()
     simulator, perception = backend.simulator.create(), backend.perception.create()
     case = _case(backend)
@@ -128,11 +160,17 @@ def timed(name: str) -> Led:
 
 
 def growth_mb(name: str) -> float:
-    """Peak memory of a long task in a fresh process, less what the process needs before it."""
-    told = subprocess.run(
-        [sys.executable, "-m", "benches.agents", name], check=True, capture_output=True, text=True
-    ).stdout
-    return float(json.loads(told)["growth_mb"])
+    """Return the peak memory of a long task in a fresh process, less what the process needs before it.
+
+    Raises:
+        SimulationError: The process fails.
+    """
+    command = [sys.executable, "-m", __name__, name]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - this Python
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise SimulationError(f"{name}: the process that measures its memory failed: {last}")
+    return float(json.loads(done.stdout)["growth_mb"])
 
 
 def _measure_growth(name: str) -> None:
@@ -143,16 +181,10 @@ def _measure_growth(name: str) -> None:
     simulator.reset(case.stages[0].house_json, case.start)
     sensors = Sensors(simulator, perception, agent.sensors, _scene(case, simulator))
     sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
-    before_mb = _peak_mb()
+    before_mb = peak_memory_mb() or 0.0
     led = Led(agent, lambda _: None, never_stops=agent.sensors.motion == "waypoints")
     _play(case, name, led, simulator, perception)
-    sys.stdout.write(json.dumps({"growth_mb": _peak_mb() - before_mb, "rounds": len(led.round_ms)}))
-
-
-def _peak_mb() -> float:
-    """Of this process image: `getrusage` would count the parent's."""
-    status = Path("/proc/self/status").read_text(encoding="utf-8")
-    return int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
+    sys.stdout.write(json.dumps({"growth_mb": (peak_memory_mb() or 0.0) - before_mb}))
 
 
 def _case(backend: Backend) -> EpisodeSpec:
@@ -163,7 +195,7 @@ def _case(backend: Backend) -> EpisodeSpec:
 def _play(case: EpisodeSpec, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:
     for outcome in Episode(case, name, led, simulator, perception, ProtocolConfig(), 0).run():
         if outcome.record.error is not None:
-            raise AssertionError(outcome.record.error)
+            raise SimulationError(f"{name}: {outcome.record.error}")
 
 
 def _scene(case: EpisodeSpec, simulator: Simulator) -> StageScene:
@@ -171,7 +203,7 @@ def _scene(case: EpisodeSpec, simulator: Simulator) -> StageScene:
 
 
 def _tour(agent: Agent, case: EpisodeSpec, simulator: Simulator, perception: Perception) -> None:
-    """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
+    """Lead an agent through every room: it looks ahead and back from places about 1.5 m apart."""
     start = simulator.pose
     sensors = Sensors(simulator, perception, agent.sensors, _scene(case, simulator))
     is_first = True

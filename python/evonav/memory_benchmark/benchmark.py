@@ -1,0 +1,209 @@
+"""Run memories through streams on many workers; called again on the same folder, run what is missing.
+
+One job is one memory in one stream. Its record does not depend on other jobs; times do, where the machine is shared.
+"""
+
+import hashlib
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from evonav._core import __version__
+from evonav.component import Component
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.memory_benchmark.frames import MemoryFrame
+from evonav.memory_benchmark.protocol import Memory
+from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, StreamResult
+from evonav.memory_benchmark.run import Settings, measure
+from evonav.memory_benchmark.streams import RenderedStream, StreamSpec, make_stream
+from evonav.memory_benchmark.truth import FrameTruth
+from evonav.parallel.folders import check_same_run, write_atomically, writing
+from evonav.parallel.pool import Job, answers, open_pool
+from evonav.parallel.worker import Workforce
+from evonav.report.machine import machine_name
+
+WORK = "evonav.memory_benchmark.benchmark:make_worker"
+SILENCE_S = 600.0
+"""Time without a frame after which a job is given up; the time limit of a call of a memory ends earlier."""
+HEADER_NAME, RECORD_DIR = "memory.json", "records"
+
+
+@dataclass(frozen=True, slots=True)
+class NamedMemory:
+    """A memory with the name under which it is measured."""
+
+    name: str
+    component: Component[Memory]
+
+    @property
+    def digest(self) -> str | None:
+        """SHA-256 of the file that it is written in; `None` for a module."""
+        path = Path(self.component.path.rpartition(":")[0])
+        with suppress(OSError):
+            if path.suffix == ".py":
+                return hashlib.sha256(path.read_bytes()).hexdigest()
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Result of a command."""
+
+    result: BenchmarkResult
+    """All memories of the folder in the streams that were asked for."""
+    failures: tuple[tuple[str, str, str], ...]
+    """Memory, stream and last line of what went wrong with a job; the same command tries them again.
+
+    The failure of a memory is no failure of its job: it is part of the result.
+    """
+
+
+def benchmark(
+    memories: Sequence[NamedMemory],
+    streams: Sequence[StreamSpec],
+    out: Path,
+    *,
+    settings: Settings | None = None,
+    num_workers: int = 1,
+    on_progress: Callable[[int, int, str], None] = lambda *_: None,
+) -> Measured:
+    """Run every memory through every stream, and keep a record of each in a folder.
+
+    Args:
+        memories: Memories; those of earlier commands stay in the folder.
+        streams: Streams.
+        out: Holds `memory.json` and `records/`.
+        settings: Must be the folder's own if it holds records.
+        num_workers: Number of processes; 0 runs everything in this one.
+        on_progress: Called with the number of records there are, of those asked for, and the name of the latest.
+
+    Raises:
+        InvalidArgumentError: There is no memory or stream, or one is named twice.
+        StoreError: The folder holds other settings, or cannot be written.
+        EngineError: Workers cannot be had.
+    """
+    settings = settings or Settings()
+    names = [memory.name for memory in memories]
+    if not memories or not streams:
+        raise InvalidArgumentError(f"no {'stream' if memories else 'memory'} to measure")
+    for kind, all_names in (("memory", names), ("stream", [stream.name for stream in streams])):
+        if len(set(all_names)) != len(all_names):
+            raise InvalidArgumentError(f"a {kind} is named twice: {', '.join(all_names)}")
+    with writing(out):
+        known = _begun(memories, out, settings)
+        jobs = [
+            (memory, stream)
+            for stream in streams
+            for memory in memories
+            if not record_path(out, memory.name, stream.name).exists()
+        ]
+        num_all = len(memories) * len(streams)
+        num_done, failures = num_all - len(jobs), []
+        on_progress(num_done, num_all, "")
+        if jobs:
+            work_force = Workforce(min(num_workers, len(jobs)))
+            with open_pool(WORK, json.dumps(asdict(settings)), work_force, timeout_s=SILENCE_S) as pool:
+                texts = (
+                    Job(key, json.dumps({"memory": asdict(memory.component), "stream": asdict(stream)}))
+                    for key, (memory, stream) in enumerate(jobs)
+                )
+                for answer in answers(pool, texts):
+                    memory, stream = jobs[answer.key]
+                    if answer.failure is None:
+                        write_atomically(record_path(out, memory.name, stream.name), answer.text + "\n")
+                    else:
+                        last = (answer.detail.strip().splitlines() or [answer.failure])[-1]
+                        failures.append((memory.name, stream.name, last))
+                    num_done += 1
+                    on_progress(num_done, num_all, f"{memory.name} {stream.name}")
+        return Measured(read_folder(out, known, streams), tuple(sorted(failures)))
+
+
+def record_path(folder: Path, memory: str, stream: str) -> Path:
+    """Return the path of the record of a memory in a stream."""
+    return folder / RECORD_DIR / _slug(memory) / f"{stream.replace('/', '_')}.json"
+
+
+def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[StreamSpec]) -> BenchmarkResult:
+    """Read the records of memories in streams; those that are missing are left out.
+
+    Raises:
+        StoreError: A record cannot be read.
+    """
+    results = []
+    for memory in memories:
+        paths = [record_path(folder, memory, stream.name) for stream in streams]
+        records = tuple(_read_record(path) for path in paths if path.exists())
+        if records:
+            results.append(MemoryResult(memory=memory, streams=records))
+    return BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=tuple(results))
+
+
+def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
+    """Return the function from a job to its record, as `evonav.parallel.pool` calls it."""
+    run_settings = Settings(**json.loads(settings))
+
+    def work(text: str) -> str:
+        given = json.loads(text)
+        stream = _Watched(make_stream(StreamSpec(**given["stream"])), alive)
+        return measure(Component(**given["memory"]), stream, run_settings).model_dump_json()
+
+    return work
+
+
+class _Watched:
+    """A stream that says with every frame that the job goes on."""
+
+    def __init__(self, stream: RenderedStream, alive: Callable[[], None]) -> None:
+        self._stream, self._alive = stream, alive
+        self.name, self.kind, self.house = stream.name, stream.kind, stream.house
+        self.info, self.changes = stream.info, stream.changes
+
+    def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
+        for frame in self._stream.frames():
+            self._alive()
+            yield frame
+
+
+def _begun(memories: Sequence[NamedMemory], out: Path, settings: Settings) -> list[str]:
+    """Claim the folder, delete the records of memories that have changed, and return the names of all memories."""
+    identity = {"evonav": __version__, "settings": asdict(settings)}
+    there = _read_header(out / HEADER_NAME)
+    known: dict[str, Any] = {} if there is None else dict(there["memories"])
+    if there is not None:
+        check_same_run(there["identity"], identity, out)
+    for memory in memories:
+        its = {"path": memory.component.path, "options": dict(memory.component.options), "sha256": memory.digest}
+        if known.get(memory.name, its) != its:
+            for path in (out / RECORD_DIR / _slug(memory.name)).glob("*.json"):
+                path.unlink(missing_ok=True)
+        known[memory.name] = its
+    write_atomically(out / HEADER_NAME, json.dumps({"identity": identity, "memories": known}, indent=2) + "\n")
+    return list(known)
+
+
+def _read_header(path: Path) -> Mapping[str, Any] | None:
+    if not path.exists():
+        return None
+    try:
+        header = json.loads(path.read_bytes())
+        return {"identity": dict(header["identity"]), "memories": dict(header["memories"])}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise StoreError(f"{path}: no header of `evonav bench memory` ({error})") from error
+
+
+def _read_record(path: Path) -> StreamResult:
+    try:
+        return StreamResult.model_validate_json(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: cannot be read; delete it to measure it again ({error})") from error
+
+
+def _slug(name: str) -> str:
+    """Return a name as a folder's: letters, digits and dashes, and a part of its digest if that is not all."""
+    slug = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-")[:60]
+    return slug if slug == name else f"{slug}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"

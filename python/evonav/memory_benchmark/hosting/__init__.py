@@ -1,0 +1,1 @@
+"""Run a benchmarked memory in this process or in one of its own."""

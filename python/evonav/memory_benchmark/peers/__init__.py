@@ -1,0 +1,1 @@
+"""Memories of other libraries, run beside ours (extra `bench`)."""

@@ -1,0 +1,157 @@
+"""Define the records of the memory benchmark, and read and write them."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.memory_benchmark.answers import FailureKind, Hosting
+from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
+from evonav.memory_benchmark.metrics.size import Size
+from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
+from evonav.memory_benchmark.metrics.staleness import Spell
+from evonav.memory_benchmark.metrics.update import UpdateCounts
+
+SCHEMA_VERSION: Literal[1] = 1
+"""Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
+
+
+class _Record(BaseModel):
+    """A frozen record that rejects unknown fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+
+
+class Failure(_Record):
+    """The end of a memory in a stream."""
+
+    kind: FailureKind
+    message: str
+    """One sentence."""
+    frame: int | None
+    """Index of the last frame that it was given; `None` before the first."""
+
+
+class Speed(_Record):
+    """Times of one stream, after the warm-up."""
+
+    observe_cpu: Percentiles | None
+    """`None` where only wall times are known."""
+    observe_wall: Percentiles
+    locate_cpu: Percentiles | None
+    locate_wall: Percentiles | None
+    visit_wall_max_ms: float | None
+    real_time_factor: float
+    slope_per_100_entries_ms: float | None
+    slope_per_1000_frames_ms: float | None
+    samples: tuple[Sample, ...]
+    """Time over frames and entries, thinned, for plots."""
+
+
+class Belief(_Record):
+    """Sums over entries with a `p_present`, see `metrics.belief.BeliefSums`."""
+
+    n: int
+    squared_error: float
+    log_loss: float
+    bins: tuple[tuple[float, float, float], ...]
+
+
+class StreamResult(_Record):
+    """The result of one memory in one stream. A part is `None` if the memory failed or has nothing to show in it."""
+
+    stream: str
+    kind: str
+    house: str
+    hosting: Hosting
+    num_frames: int
+    """Frames that it was given."""
+    num_visits: int
+    num_changes: int
+    failure: Failure | None = None
+    notes: tuple[str, ...] = ()
+    """Sentences about what looks wrong, and proves nothing."""
+    speed: Speed | None = None
+    size: Size | None = None
+    update: UpdateCounts | None = None
+    spells: tuple[Spell, ...] = ()
+    belief: Belief | None = None
+    queries: dict[QueryState, QueryCounts] | None = None
+    digest: str | None = None
+    """SHA-256 of all entries in their order: equal for equal bits."""
+    is_deterministic: bool | None = None
+    """Whether a second run gave the same bits; `None` if there was none."""
+
+
+class MemoryResult(_Record):
+    """The results of one memory in all streams."""
+
+    memory: str
+    streams: tuple[StreamResult, ...]
+
+    @property
+    def failures(self) -> tuple[StreamResult, ...]:
+        """The streams in which it failed."""
+        return tuple(stream for stream in self.streams if stream.failure is not None)
+
+    def of_kind(self, kind: str | None) -> tuple[StreamResult, ...]:
+        """Return the streams of a kind in which it did not fail; of all kinds for `None`."""
+        return tuple(one for one in self.streams if one.failure is None and kind in (None, one.kind))
+
+
+class BenchmarkResult(_Record):
+    """All memories of one run of the benchmark."""
+
+    schema_version: Literal[1] = SCHEMA_VERSION
+    evonav_version: str
+    machine: str
+    """The processor and the number of its cores: times of different machines do not compare."""
+    memories: tuple[MemoryResult, ...]
+
+    def memory(self, name: str) -> MemoryResult:
+        """Return a memory by its name.
+
+        Raises:
+            InvalidArgumentError: There is none of that name.
+        """
+        for result in self.memories:
+            if result.memory == name:
+                return result
+        known = ", ".join(result.memory for result in self.memories)
+        raise InvalidArgumentError(f"memory = {name!r}: the result has {known}")
+
+
+def write_result(result: BenchmarkResult, path: Path) -> None:
+    """Write a result as JSON.
+
+    Raises:
+        StoreError: The file cannot be written.
+    """
+    try:
+        path.write_text(result.model_dump_json() + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def read_result(path: Path) -> BenchmarkResult:
+    """Read a result.
+
+    Raises:
+        StoreError: The file cannot be read, or is no result; the message has the first field that is wrong.
+    """
+    try:
+        return BenchmarkResult.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValidationError as error:
+        problem = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(map(str, problem["loc"]))
+        value = repr(problem["input"])[:120]
+        raise StoreError(f"{path}: {place} = {value}: {problem['msg']}") from None
+
+
+def kinds_of(results: Iterable[MemoryResult]) -> list[str]:
+    """Return the kinds of all streams, sorted."""
+    return sorted({stream.kind for result in results for stream in result.streams})

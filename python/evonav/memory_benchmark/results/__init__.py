@@ -1,0 +1,1 @@
+"""Summarise and show the records of the memory benchmark."""

@@ -1,0 +1,297 @@
+"""Run a memory through a stream: time it, judge it, and let a failure cost it this stream only."""
+
+import random
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from evonav.component import Component
+from evonav.errors import InvalidArgumentError
+from evonav.memory_benchmark.answers import Entries, Hosting, MemoryFailedError
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.hosting.local import Cost, LocalMemory
+from evonav.memory_benchmark.hosting.process import RemoteMemory
+from evonav.memory_benchmark.judge import Judge
+from evonav.memory_benchmark.metrics import size, speed
+from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
+from evonav.memory_benchmark.protocol import Memory, Place
+from evonav.memory_benchmark.records import Belief, Failure, Speed, StreamResult
+from evonav.memory_benchmark.truth import Stream
+
+NUM_WARM_UP = 20
+"""Frames at the start of a stream whose times do not count."""
+NUM_QUERIES = 10
+"""Labels that are asked for at the end of a visit."""
+
+MemorySource = str | Component[Memory] | Callable[[], Memory]
+"""`./file.py:Class` or `package.module:Class`, the same with options, or a function that makes a memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Settings of runs; they decide where a memory runs and how often it is asked."""
+
+    own_process: bool | None = None
+    """Run the memory in its own process; default: if it is named, since a function cannot be sent to a process."""
+    timeout_s: float = 60.0
+    """Time limit of a call in its own process. In this process no call can be ended."""
+    memory_mb: int | None = None
+    """Largest address space of its own process; default: no limit."""
+    every: int = 1
+    """Ask for the entries after every so many frames, and after the last one of each visit."""
+    seed: int = 0
+    """Seed of the labels that are asked for."""
+    runs_twice: bool = False
+    """Run the stream a second time and compare the bits of all answers."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            InvalidArgumentError: `every` or `timeout_s` is not positive.
+        """
+        if self.every < 1:
+            raise InvalidArgumentError(f"every = {self.every}: must be at least 1")
+        if not self.timeout_s > 0.0:
+            raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be positive")
+
+
+class HostedMemory(Protocol):
+    """A memory as the runner sees it; every call may raise `MemoryFailedError`."""
+
+    hosting: Hosting
+    can_locate: bool
+    rss_bytes: int | None
+    """Resident memory of its own process after the last call; `None` without one."""
+    peak_rss_bytes: int | None
+    """Peak of it, known after `num_bytes`."""
+
+    def reset(self, info: StreamInfo) -> object:
+        """Begin a stream."""
+
+    def visit(self, time_s: float) -> Cost | None:
+        """Begin a visit."""
+
+    def observe(self, frame: MemoryFrame) -> Cost | None:
+        """Hand over a frame; return what it cost, if that is known."""
+
+    def entries(self) -> Entries:
+        """Return the entries."""
+
+    def num_bytes(self, num_entries: int) -> int | None:
+        """Return the size that the memory tells; `None` if it tells none."""
+
+    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+        """Ask where something is."""
+
+    def close(self) -> None:
+        """Let go of the memory."""
+
+
+def measure(memory: MemorySource, stream: Stream, settings: Settings | None = None) -> StreamResult:
+    """Run a memory through a stream and judge it.
+
+    Times are of `observe` and `locate` alone. CPU time is the whole process's while a call runs, so that threads count,
+    too; what a thread does after `observe` has returned shows in the wall time of later calls only.
+
+    Args:
+        memory: The memory; a fresh one is made.
+        stream: The stream.
+        settings: Place and limits of the run, and how often the memory is asked.
+
+    Returns:
+        The result; one with a `failure` and without figures if the memory raised, hung, died or answered wrongly.
+
+    Raises:
+        InvalidArgumentError: A function was to run in its own process.
+    """
+    settings = settings or Settings()
+    result = judge_memory(lambda: host(memory, settings), stream, settings)
+    if not settings.runs_twice or result.failure is not None:
+        return result
+    again = judge_memory(lambda: host(memory, settings), stream, settings)
+    return result.model_copy(update={"is_deterministic": again.digest == result.digest})
+
+
+def judge_memory(new_memory: Callable[[], HostedMemory], stream: Stream, settings: Settings) -> StreamResult:
+    """Run a hosted memory through a stream and judge it.
+
+    Args:
+        new_memory: Makes the memory; it is closed at the end.
+        stream: The stream.
+        settings: They say how often it is asked.
+    """
+    return _Run(stream, settings).result(new_memory)
+
+
+def host(memory: MemorySource, settings: Settings) -> LocalMemory | RemoteMemory:
+    """Make a memory, in this process or in its own.
+
+    Raises:
+        MemoryFailedError: It cannot be made.
+        InvalidArgumentError: A function was to run in its own process.
+    """
+    component: Component[Memory] | None = Component(memory) if isinstance(memory, str) else None
+    if isinstance(memory, Component):
+        component = memory
+    if component is None:
+        if settings.own_process:
+            raise InvalidArgumentError("own_process: a function cannot be sent to a process; name it by `module:name`")
+        assert callable(memory)
+        return LocalMemory(memory)
+    if settings.own_process is False:
+        return LocalMemory(component.create)
+    return RemoteMemory(component, timeout_s=settings.timeout_s, memory_mb=settings.memory_mb)
+
+
+@dataclass(slots=True)
+class _Times:
+    """Measurements of a stream, in the order of its frames."""
+
+    observe: list[Cost] = field(default_factory=list)
+    locate: list[Cost] = field(default_factory=list)
+    visit: list[Cost | None] = field(default_factory=list)
+    frames: list[int] = field(default_factory=list)
+    num_entries: list[int] = field(default_factory=list)
+    rss_mb: list[float] = field(default_factory=list)
+
+
+class _Run:
+    """One run of one memory through one stream."""
+
+    def __init__(self, stream: Stream, settings: Settings) -> None:
+        self._stream, self._settings = stream, settings
+        self._judge = Judge(stream.info, stream.changes)
+        self._times = _Times()
+        self._frame: MemoryFrame | None = None
+        self._num_frames = self._num_visits = 0
+        self._is_answer_due = False
+        self._num_entries = 0
+        self._hosting: Hosting = "here"
+
+    def result(self, new_memory: Callable[[], HostedMemory]) -> StreamResult:
+        try:
+            with closing(new_memory()) as memory:
+                self._hosting = memory.hosting
+                self._through(memory)
+                return self._judged(memory)
+        except MemoryFailedError as error:
+            frame = None if self._frame is None else self._frame.index
+            return self._record(failure=Failure(kind=error.kind, message=str(error), frame=frame))
+
+    def _through(self, memory: HostedMemory) -> None:
+        memory.reset(self._stream.info)
+        for frame, truth in self._stream.frames():
+            if self._frame is None or frame.visit != self._frame.visit:
+                self._end_visit(memory)
+                self._times.visit.append(memory.visit(frame.time_s))
+                self._num_visits += 1
+            self._frame = frame
+            cost = memory.observe(frame)
+            self._judge.look(frame, truth)
+            self._num_frames += 1
+            self._is_answer_due = True
+            if self._num_frames % self._settings.every == 0:
+                self._ask(memory)
+            if self._num_frames > NUM_WARM_UP and cost is not None:
+                self._times.observe.append(cost)
+                self._times.frames.append(self._num_frames)
+                self._times.num_entries.append(self._num_entries)
+                if memory.rss_bytes is not None:
+                    self._times.rss_mb.append(memory.rss_bytes / size.MB)
+        self._end_visit(memory)
+
+    def _ask(self, memory: HostedMemory) -> None:
+        entries = memory.entries()
+        self._num_entries = len(entries)
+        self._judge.believe(entries)
+        self._is_answer_due = False
+
+    def _end_visit(self, memory: HostedMemory) -> None:
+        if self._frame is None:
+            return
+        if self._is_answer_due:
+            self._ask(memory)
+        if memory.can_locate:
+            labels = self._judge.labels_to_ask()
+            draw = random.Random(f"{self._settings.seed}/{self._stream.name}/{self._num_visits}")  # noqa: S311
+            for label in draw.sample(labels, min(NUM_QUERIES, len(labels))):
+                places, cost = memory.locate(label, NUM_PLACES)
+                self._times.locate.append(cost)
+                self._judge.take_places(label, places)
+        self._judge.end_visit()
+
+    def _judged(self, memory: HostedMemory) -> StreamResult:
+        num_bytes = memory.num_bytes(self._num_entries)
+        update, spells = self._judge.end()
+        sums, queries = self._judge.belief, self._judge.queries.of_state
+        its_size = self._size(num_bytes, memory)
+        note = size.byte_note(num_bytes, its_size.rss_growth_mb)
+        bins = [(float(n), float(p), float(right)) for n, p, right in sums.bins.tolist()]
+        belief = Belief(n=sums.n, squared_error=sums.squared_error, log_loss=sums.log_loss, bins=tuple(bins))
+        return self._record(
+            notes=() if note is None else (note,),
+            speed=self._speed(),
+            size=its_size,
+            update=update,
+            spells=tuple(spells),
+            belief=belief if sums.n else None,
+            queries=queries if memory.can_locate else None,
+            digest=self._judge.digest,
+        )
+
+    def _speed(self) -> Speed | None:
+        times = self._times
+        wall = speed.percentiles([cost.wall_s for cost in times.observe])
+        if wall is None:
+            return None
+        cpu_s = _known(cost.cpu_s for cost in times.observe)
+        seconds = cpu_s or [cost.wall_s for cost in times.observe]
+        times_ms = np.array(seconds) * 1e3
+        samples = speed.thinned(times.frames, times.num_entries, times_ms)
+        return Speed(
+            observe_cpu=speed.percentiles(cpu_s),
+            observe_wall=wall,
+            locate_cpu=speed.percentiles(_known(cost.cpu_s for cost in times.locate)),
+            locate_wall=speed.percentiles([cost.wall_s for cost in times.locate]),
+            visit_wall_max_ms=max((cost.wall_s * 1e3 for cost in times.visit if cost is not None), default=None),
+            real_time_factor=speed.real_time_factor(wall.mean_ms / 1e3, self._stream.info.rate_hz),
+            slope_per_100_entries_ms=speed.slope_per_100_entries(samples),
+            slope_per_1000_frames_ms=speed.slope_per_1000_frames(samples),
+            samples=tuple(speed.thinned(times.frames, times.num_entries, times_ms, speed.NUM_STORED)),
+        )
+
+    def _size(self, num_bytes: int | None, memory: HostedMemory) -> size.Size:
+        rss_mb, growth = self._times.rss_mb, None
+        if rss_mb:
+            minutes = np.array(self._times.frames) / (60.0 * self._stream.info.rate_hz)
+            growth = size.growth_per_minute(minutes, np.array(rss_mb))
+        peak = memory.peak_rss_bytes
+        return size.Size(
+            num_entries=self._num_entries,
+            num_bytes=num_bytes,
+            bytes_per_entry=num_bytes / self._num_entries if num_bytes is not None and self._num_entries else None,
+            rss_growth_mb_per_minute=growth,
+            rss_growth_mb=rss_mb[-1] - rss_mb[0] if rss_mb else None,
+            peak_rss_mb=None if peak is None else peak / size.MB,
+        )
+
+    def _record(self, **parts: object) -> StreamResult:
+        stream = self._stream
+        fixed = {
+            "stream": stream.name,
+            "kind": stream.kind,
+            "house": stream.house,
+            "hosting": self._hosting,
+            "num_frames": self._num_frames,
+            "num_visits": self._num_visits,
+            "num_changes": len(stream.changes),
+        }
+        return StreamResult.model_validate({**fixed, **parts})
+
+
+def _known(values: Iterable[float | None]) -> list[float]:
+    return [value for value in values if value is not None]

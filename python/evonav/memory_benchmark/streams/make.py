@@ -1,0 +1,56 @@
+"""Make streams: from a description to the plan that its frames are rendered from."""
+
+import json
+from dataclasses import asdict, replace
+
+from evonav._core import House
+from evonav.memory_benchmark.streams.glances import glances
+from evonav.memory_benchmark.streams.growth import growth, growth_houses
+from evonav.memory_benchmark.streams.live import live
+from evonav.memory_benchmark.streams.plan import Plan, cached_plan
+from evonav.memory_benchmark.streams.rendered import RenderedStream
+from evonav.memory_benchmark.streams.spec import StreamSpec, read_house
+from evonav.memory_benchmark.streams.visits import visits
+from evonav.tasks.records import sha256_of
+
+
+def make_stream(spec: StreamSpec, *, rgb: bool = False) -> RenderedStream:
+    """Return a stream; its plan comes from the cache folder, or is made and stored there.
+
+    Args:
+        spec: All that decides the stream.
+        rgb: Whether frames have colours, which cost more than the rest.
+
+    Raises:
+        HouseError: The house cannot be read, or gives no stream of this kind.
+    """
+    return RenderedStream(spec, plan_of(spec), rgb=rgb)
+
+
+def plan_of(spec: StreamSpec) -> Plan:
+    """Return a stream's plan, from the cache folder if it is there.
+
+    Raises:
+        HouseError: The house cannot be read, or gives no stream of this kind.
+    """
+    house = read_house(spec.house)
+    # Errors of perception change neither houses nor walks.
+    decides = asdict(replace(spec, kind="S2" if spec.kind == "S8" else spec.kind, perception=""))
+    houses = growth_houses(spec, house) if spec.kind == "S7" else [house]
+    digests = sha256_of(json.dumps([one.to_json() for one in houses]).encode())
+    return cached_plan({"spec": decides, "houses": digests}, lambda: make_plan(spec, house))
+
+
+def make_plan(spec: StreamSpec, house: House) -> Plan:
+    """Make the plan of a stream that begins in a house, without the cache.
+
+    Raises:
+        HouseError: The house gives no stream of this kind.
+    """
+    if spec.kind == "S6":
+        return glances(spec, house)
+    if spec.kind == "S7":
+        return growth(spec, growth_houses(spec, house))
+    if spec.kind == "S9":
+        return live(spec, house)
+    return visits(spec, house)

@@ -1,0 +1,105 @@
+"""`evonav bench memory`: measure, compare with an earlier result, export streams and score answers to them."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.cli.bench.memory import chosen_streams
+from evonav.memory_benchmark.references import ObjectMapMemory
+from evonav.memory_benchmark.streams.export import read_exported
+
+SMALL = ["--streams", "S6", "--quick", "--size", "64x48"]
+
+
+def bench(*words):
+    return CliRunner().invoke(app, ["bench", "memory", *map(str, words)], env={"COLUMNS": "250"})
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("memory")
+    run = bench(*SMALL, "--memory", "never,see-through", "--workers", "0", "--in-process", "--out", folder)
+    assert run.exit_code == 0, run.output
+    assert "see-through" in run.stdout
+    assert "false forgets %" in run.stdout
+    return folder
+
+
+def test_a_run_writes_its_files_and_goes_on(out):
+    assert {"report.html", "result.json", "summary.md", "memory.json"} <= {path.name for path in out.iterdir()}
+    run = bench(*SMALL, "--memory", "never", "--workers", "0", "--in-process", "--out", out)
+    assert run.exit_code == 0, run.output
+    assert "see-through" in run.stdout, "memories of earlier commands stay"
+
+
+def test_what_became_worse_is_listed(out, tmp_path):
+    words = [*SMALL, "--memory", "never", "--workers", "0", "--in-process", "--out", out]
+    same = bench(*words, "--against", out / "result.json")
+    assert same.exit_code == 0, same.output
+    assert "0 of" in same.stdout
+    old = json.loads((out / "result.json").read_text())
+    for memory in old["memories"]:
+        for stream in memory["streams"]:
+            stream["size"]["bytes_per_entry"] /= 2
+    (tmp_path / "old.json").write_text(json.dumps(old))
+    worse = bench(*words, "--against", tmp_path / "old.json")
+    assert worse.exit_code == 1
+    assert "worse: never: bytes_per_entry: " in worse.stdout
+
+
+@pytest.mark.parametrize("layout", ["tum", "replica"])
+def test_answers_to_exported_streams_score_as_the_memory_in_process_does(layout, out, tmp_path):
+    streams = tmp_path / "streams"
+    run = bench("export", streams, "--layout", layout, *SMALL, "--no-colours", "--oracle", tmp_path / "truth")
+    assert run.exit_code == 0, run.output
+    (folder,) = streams.iterdir()
+    assert not (folder / "oracle.jsonl.xz").exists()
+    exported, memory, visit = read_exported(folder), ObjectMapMemory("never"), 0
+    memory.reset(exported.info)
+    lines = []
+    for frame, _ in exported.frames():
+        if frame.visit != visit:
+            visit = frame.visit
+            memory.visit(frame.time_s)
+        memory.observe(frame)
+        lines.append({"frame": frame.index, "seconds": 0.01, "entries": [asdict(one) for one in memory.entries()]})
+    (folder / "entries.jsonl").write_text("\n".join(map(json.dumps, lines)))
+    scored = tmp_path / "scored"
+    run = bench("score", streams, "--oracle", tmp_path / "truth", "--system", "mine", "--out", scored)
+    assert run.exit_code == 0, run.output
+    (mine,) = json.loads((scored / "result.json").read_text())["memories"]
+    assert mine["memory"] == "mine"
+    assert mine["streams"][0]["hosting"] == "offline"
+    here = json.loads((out / "result.json").read_text())["memories"][0]["streams"][0]
+    theirs = mine["streams"][0]["update"]
+    if layout == "tum":  # Replica's depth images are coarser
+        for name in ("removals", "seen", "standing"):
+            assert theirs[name] == pytest.approx(here["update"][name], rel=0.1, abs=2), name
+    assert mine["streams"][0]["num_frames"] == here["num_frames"]
+    alone = bench("score", folder, folder / "entries.jsonl", "--oracle", tmp_path / "truth", "--out", tmp_path / "one")
+    assert alone.exit_code == 0, alone.output
+
+
+def test_options_choose_streams():
+    def chosen(kinds=None, seeds=None, size="300x300", perception=None, *, is_quick=False):
+        return chosen_streams(kinds, "bundled", seeds, size, perception, is_quick=is_quick)
+
+    assert len({spec.name for spec in chosen(["S0,S3"])}) == 30
+    assert [spec.kind for spec in chosen(["s1"], is_quick=True)] == ["S1"]
+    seeds = {spec.seed for spec in chosen(["S1"], ["4,7"], is_quick=True)}
+    assert seeds == {4, 7}
+    (wide,) = chosen(["S2"], size="640x480", perception="noisy:poor", is_quick=True)
+    assert (wide.width_px, wide.height_px, wide.perception) == (640, 480, "noisy:poor")
+    assert len({spec.perception for spec in chosen(["S8"], perception="gt", is_quick=True)}) == 3
+
+
+def test_mistakes_are_told(tmp_path):
+    assert "--streams S12: expected some of S0, S1" in " ".join(bench("--streams", "S12").stderr.split())
+    assert "--size 64: expected width and height" in " ".join(bench("--size", "64").stderr.split())
+    assert bench("export", tmp_path, "--layout", "ros").exit_code == 2
+    assert "holds no stream" in str(bench("score", tmp_path).exception)
+    assert "no memory 'nevr'" in str(bench("--memory", "nevr").exception)

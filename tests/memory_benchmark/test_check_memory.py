@@ -1,0 +1,95 @@
+"""What `check_memory` says of memories that keep the contract, or break it in one way."""
+
+from pathlib import Path
+from typing import Any
+
+import bad_memories
+import pytest
+from bad_memories import Good
+
+from evonav.memory.objects import ObjectMap
+from evonav.memory_benchmark.check import check_memory
+from evonav.memory_benchmark.protocol import MemoryEntry
+
+FILE = Path(bad_memories.__file__)
+
+
+class ObjectMapMemory(Good):
+    """evonav's own object memory, which forgets nothing."""
+
+    def reset(self, info: Any) -> None:
+        self._map = ObjectMap()
+
+    def observe(self, frame: Any) -> None:
+        self._map.update(frame.view)
+
+    def entries(self) -> list[MemoryEntry]:
+        return [MemoryEntry(one.id, one.label, one.centre_m, one.size_m) for one in self._map.entries]
+
+    locate = None
+    num_bytes = None
+
+
+class Writes(ObjectMapMemory):
+    def observe(self, frame: Any) -> None:
+        super().observe(frame)
+        frame.view.depth_m[:] = 1.0
+
+
+def verdicts(report: Any) -> dict[str, str]:
+    return {check.name: check.verdict for check in report.checks}
+
+
+def test_object_map_keeps_the_contract() -> None:
+    report = check_memory(ObjectMapMemory)
+    assert report.is_ok, report
+    assert verdicts(report) == {
+        "importable": "pass",
+        "calls": "pass",
+        "entries": "pass",
+        "remembers": "pass",
+        "updates": "warn",
+        "locate": "skip",
+        "num_bytes": "skip",
+        "determinism": "pass",
+        "reset": "pass",
+        "frames": "pass",
+        "time": "pass",
+    }
+    assert repr(report).startswith("ObjectMapMemory: keeps the contract\npass  importable   it has reset")
+
+
+def test_example_keeps_the_contract() -> None:
+    report = check_memory(f"{FILE.parents[2] / 'examples' / 'own_memory.py'}:OwnMemory")
+    assert report.is_ok, report
+    assert verdicts(report)["remembers"] == "pass"
+
+
+def test_named_memory_that_keeps_an_entry_over_a_reset() -> None:
+    report = check_memory(f"{FILE}:Good")
+    assert not report.is_ok
+    found = verdicts(report)
+    assert (found["remembers"], found["reset"], found["locate"], found["num_bytes"]) == ("warn", "fail", "warn", "pass")
+    assert "1 entry left after `reset`" in repr(report)
+
+
+def test_memory_that_writes_into_its_frames() -> None:
+    report = check_memory(Writes)
+    assert verdicts(report)["frames"] == "warn"
+
+
+@pytest.mark.parametrize(
+    ("name", "point", "finding"),
+    [
+        ("Dies", "calls", "the memory's process died (exit code 7) (frame 3 of the check)"),
+        ("Hangs", "calls", "no answer to `observe` within 1 s (frame 3 of the check)"),
+        ("NanBoxes", "answers", "entries()[1].centre_m = (1.0, nan, 0.0): must be finite (frame 0 of the check)"),
+        ("Raising", "importable", "cannot be made: OSError: no weights"),
+    ],
+)
+def test_breach_is_one_sentence(name: str, point: str, finding: str) -> None:
+    report = check_memory(f"{FILE}:{name}", timeout_s=1.0)
+    (check,) = report.checks
+    assert (check.name, check.verdict) == (point, "fail")
+    assert finding in check.finding
+    assert repr(report).splitlines()[0].endswith(f"{name}: breaks the contract")

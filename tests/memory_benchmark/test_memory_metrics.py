@@ -1,0 +1,174 @@
+"""The functions of the metrics on cases with known answers, and against plain twins."""
+
+import math
+
+import numpy as np
+import pytest
+from hand_made import SIZE_M, body
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evonav.evaluation.episode.staleness import matched_object
+from evonav.memory_benchmark.metrics.belief import BeliefSums, calibration_error
+from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts, Snapshot, change_counts
+from evonav.memory_benchmark.metrics.matching import NONE, Boxes
+from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
+from evonav.memory_benchmark.metrics.size import byte_note, growth_per_minute
+from evonav.memory_benchmark.metrics.speed import (
+    Sample,
+    percentiles,
+    real_time_factor,
+    slope_per_100_entries,
+    slope_per_1000_frames,
+    theil_sen,
+    thinned,
+)
+from evonav.memory_benchmark.metrics.staleness import kaplan_meier
+from evonav.memory_benchmark.protocol import Place
+from evonav.world.simulator import SceneObject
+
+COORDINATE = st.integers(0, 12).map(lambda step: step * 0.1 + 0.013)
+POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE)
+LABEL = st.sampled_from(["Mug", "Plate", "Doorway"])
+BODY = st.builds(lambda label, centre_m: (label, centre_m), LABEL, POINT)
+
+
+@given(st.lists(BODY, max_size=8), st.lists(BODY, max_size=8))
+def test_match_is_that_of_the_evaluation(bodies: list, entries: list) -> None:
+    objects = [SceneObject(str(i), label, "object", centre_m, SIZE_M) for i, (label, centre_m) in enumerate(bodies)]
+    boxes = Boxes(objects)
+    by_label = {label: [one for one in objects if one.category == label] for label in ("Mug", "Plate")}
+    found, is_covered = boxes.match([label for label, _ in entries], np.array([c for _, c in entries]).reshape(-1, 3))
+    for body_index, one in enumerate(boxes.bodies):
+        near = [matched_object(label, centre_m, {one.category: [one]}) for label, centre_m in entries]
+        assert is_covered[body_index] == any(match is one for match in near)
+    for (label, centre_m), match in zip(entries, found.tolist(), strict=True):
+        expected = matched_object(label, centre_m, by_label)
+        actual = None if match == NONE else boxes.bodies[match]
+        if actual is not expected:  # two at the same distance, of which rounding chooses
+            assert actual is not None
+            assert expected is not None
+            assert math.dist(actual.centre_m, centre_m) == pytest.approx(math.dist(expected.centre_m, centre_m))
+
+
+def test_kaplan_meier_with_censoring() -> None:
+    # The example of every textbook: 6 patients, ends at 1, 3, 3, 6 and two that were lost at 2 and 6.
+    durations = np.array([1.0, 2.0, 3.0, 3.0, 6.0, 6.0])
+    curve = kaplan_meier(durations, np.array([True, False, True, True, True, False]))
+    assert curve.durations.tolist() == [1.0, 3.0, 6.0]
+    assert curve.shares.tolist() == pytest.approx([5 / 6, 5 / 6 * 2 / 4, 5 / 6 * 2 / 4 * 1 / 2])
+    assert float(curve.half_life) == 3.0
+
+
+def test_half_life_is_infinite_where_half_of_it_stays() -> None:
+    curve = kaplan_meier(np.array([1.0, 5.0, 5.0]), np.array([True, False, False]))
+    assert math.isinf(float(curve.half_life))
+    assert math.isinf(float(kaplan_meier(np.array([5.0]), np.array([False])).half_life))
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.booleans()), min_size=1, max_size=20))
+def test_kaplan_meier_against_a_loop(spells: list[tuple[int, bool]]) -> None:
+    durations = np.array([float(duration) for duration, _ in spells])
+    curve = kaplan_meier(durations, np.array([over for _, over in spells]))
+    share, expected = 1.0, []
+    for time in sorted({duration for duration, over in spells if over}):
+        at_risk = sum(duration >= time for duration, _ in spells)
+        share *= 1.0 - sum(duration == time and over for duration, over in spells) / at_risk
+        expected.append(share)
+    assert curve.shares.tolist() == pytest.approx(expected)
+
+
+def test_percentiles_in_milliseconds() -> None:
+    found = percentiles(np.arange(101) / 1000.0)
+    assert found is not None
+    assert (found.n, found.mean_ms, found.p50_ms, found.p95_ms, found.p99_ms, found.max_ms) == pytest.approx(
+        (101, 50.0, 50.0, 95.0, 99.0, 100.0)
+    )
+    assert percentiles([]) is None
+
+
+def test_slopes_survive_outliers() -> None:
+    # 1 ms and 0.5 ms more for every 100 entries; a tenth of the frames take ten times as long.
+    samples = [Sample(i, 2.0 * i, (10.0 if i % 10 == 0 else 1.0) * (1.0 + 0.01 * i)) for i in range(200)]
+    assert slope_per_100_entries(samples) == pytest.approx(0.5, rel=0.1)
+    assert slope_per_100_entries([Sample(i, 10.0, 1.0) for i in range(200)]) is None
+
+
+def test_slope_over_frames_is_taken_at_constant_size() -> None:
+    leak = [Sample(i, 50.0, 1.0 + 0.002 * i) for i in range(200)]
+    assert slope_per_1000_frames(leak) == pytest.approx(2.0)
+    growth = [Sample(i, float(i), 1.0 + 0.01 * i) for i in range(200)]  # it costs more since it holds more
+    assert slope_per_1000_frames(growth) is None
+
+
+def test_theil_sen_is_the_median_of_pairs() -> None:
+    assert theil_sen(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 10.0])) == 5.0  # of 1, 5 and 9
+    assert theil_sen(np.array([1.0, 1.0]), np.array([0.0, 1.0])) is None
+
+
+def test_thinned_takes_medians() -> None:
+    samples = thinned(np.arange(1000), np.full(1000, 7), np.where(np.arange(1000) % 5 == 0, 100.0, 1.0), 100)
+    assert len(samples) == 100
+    assert samples[0] == Sample(4.5, 7.0, 1.0)
+
+
+def test_real_time_factor() -> None:
+    assert real_time_factor(0.05, 2.0) == pytest.approx(10.0)
+
+
+def test_leak_of_a_megabyte_a_minute() -> None:
+    minutes = np.arange(1200) / 120.0
+    noise = np.random.default_rng(0).normal(0.0, 0.05, 1200)
+    assert growth_per_minute(minutes, 100.0 + minutes + noise) == pytest.approx(1.0, abs=0.02)
+    assert growth_per_minute(minutes[:1], minutes[:1]) is None
+
+
+def test_note_of_bytes_needs_a_large_growth() -> None:
+    assert byte_note(1_000_000, 50.0) is None
+    assert byte_note(50_000_000, 200.0) is None
+    assert byte_note(1_000_000, 200.0) == "num_bytes() says 1.0 MB, and its process grew by 200.0 MB"
+    assert byte_note(None, 200.0) is None
+
+
+def test_belief_scores() -> None:
+    sums = BeliefSums()
+    sums.take(np.array([0.8, 0.8, 0.3, np.nan]), np.array([True, False, False, True]))
+    assert sums.n == 3
+    assert sums.squared_error == pytest.approx(0.04 + 0.64 + 0.09)
+    assert sums.log_loss == pytest.approx(-math.log(0.8) - math.log(0.2) - math.log(0.7))
+    # Two of 0.8 with one right: off by 0.6; one of 0.3 with none right: off by 0.3.
+    assert float(calibration_error(sums.bins)) == pytest.approx((0.6 + 0.3) / 3)
+    sums.take(np.array([0.0, 1.0]), np.array([True, False]))
+    assert math.isfinite(sums.log_loss)
+    assert math.isnan(float(calibration_error(np.zeros((10, 3)))))
+
+
+def test_rank_of_the_true_place() -> None:
+    mug = body("mug", 1.0)
+    far, near = Place((5.0, 1.0, 0.0), 0.9), Place((2.0, 1.0, 0.0), 0.1)  # 0.9 m from the box
+    assert true_rank([mug], [far, near]) == 2
+    assert true_rank([mug], [far]) is None
+    queries = Queries()
+    queries.take([mug], [far, near], "before")
+    queries.take([mug], [near], "before")
+    queries.take([mug], [], "after")
+    before = queries.of_state["before"]
+    assert (before.n, before.hits_at_1, before.hits_at_5, before.reciprocal_ranks) == (2, 1, 2, 1.5)
+    assert queries.of_state["after"].n == 1
+
+
+def test_change_counts_over_three_visits() -> None:
+    old, new = ("mug", 0), ("mug", 1)
+    first = Snapshot(frozenset({old}), frozenset({old}), frozenset({old}), frozenset())
+    stale = Snapshot(frozenset({old}), frozenset({new}), frozenset({old, new}), frozenset({old}))
+    right = Snapshot(frozenset({new}), frozenset({new}), frozenset({old, new}), frozenset({old}))
+    assert change_counts([first, right]) == (ChangeCounts(hits=1), ChangeCounts(hits=1))
+    assert change_counts([first, stale]) == (ChangeCounts(misses=1), ChangeCounts(misses=1))
+    # The third visit tells the change from the first on, and from the second on a false appearance.
+    gone, come = change_counts([first, stale, right])
+    assert gone == ChangeCounts(hits=1, misses=1)
+    assert come == ChangeCounts(hits=1, false_alarms=1, misses=1)
+    unseen = Snapshot(frozenset({old}), frozenset({new}), frozenset({old}), frozenset())
+    assert change_counts([first, unseen]) == (ChangeCounts(), ChangeCounts())
+    taken = Snapshot(frozenset(), frozenset({new}), frozenset({old}), frozenset(), taken=frozenset({old}))
+    assert change_counts([first, taken]) == (ChangeCounts(), ChangeCounts())
