@@ -12,7 +12,7 @@ from hand_made import HandMade, Shot, body, entry
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import MemoryFailedError, read_entries, read_num_bytes, read_places
 from evonav.memory_benchmark.protocol import Place
-from evonav.memory_benchmark.run import Settings, measure
+from evonav.memory_benchmark.run import Settings, measure, measure_all
 
 FILE = Path(bad_memories.__file__)
 MUG = (body("mug", 1.0),)
@@ -36,7 +36,7 @@ STREAM = HandMade([Shot(MUG, visible={"mug": 50})] * 60)
     ],
 )
 def test_failure_in_its_own_process(name: str, kind: str, message: str, frame: int | None) -> None:
-    result = measure(f"{FILE}:{name}", STREAM, Settings(timeout_s=1.0))
+    result = measure(f"{FILE}:{name}", STREAM, Settings(timeout_s=1.0, every=1))
     assert result.failure is not None
     assert (result.failure.kind, result.failure.frame) == (kind, frame)
     assert message in result.failure.message
@@ -51,6 +51,33 @@ def test_failure_is_the_same_in_this_process(name: str) -> None:
     there = measure(f"{FILE}:{name}", STREAM)
     assert here.failure is not None
     assert here.failure == there.failure
+
+
+def test_memories_side_by_side_do_not_disturb_each_other() -> None:
+    names = ["Good", "Raises", "Hangs", "Good"]
+    results = measure_all([f"{FILE}:{name}" for name in names], STREAM, Settings(timeout_s=1.0))
+    assert [result.failure and result.failure.kind for result in results] == [None, "raised", "hung", None]
+    alone = measure(Good, STREAM)
+    for good in (results[0], results[3]):
+        assert (good.digest, good.update, good.num_frames) == (alone.digest, alone.update, alone.num_frames)
+    assert results[1].num_frames < alone.num_frames
+
+
+def test_a_stream_is_rendered_once_and_not_to_its_end_if_all_failed() -> None:
+    read: list[int] = []
+
+    class Counted(HandMade):
+        def frames(self):
+            for frame, truth in super().frames():
+                read.append(frame.index)
+                yield frame, truth
+
+    stream = Counted(STREAM.shots)
+    measure_all([Good, Good], stream)
+    assert read == list(range(len(STREAM.shots)))
+    read.clear()
+    measure_all([bad_memories.Raises, bad_memories.Raises], stream)
+    assert read == [0, 1, 2, 3, 4]
 
 
 def test_good_memory_gives_the_same_wherever_it_runs() -> None:

@@ -9,7 +9,8 @@ import pytest
 import evonav
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.references import REFERENCES, NumpyList, ObjectMapMemory
+from evonav.memory_benchmark.memories import MEMORIES
+from evonav.memory_benchmark.references import NumpyList, ObjectMapMemory
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -31,10 +32,10 @@ def a_frame(index: int, *labelled: tuple[str, int], time_s: float | None = None)
     return MemoryFrame(index, 0.5 * index if time_s is None else time_s, 1, view)
 
 
-@pytest.mark.parametrize("name", REFERENCES)
+@pytest.mark.parametrize("name", MEMORIES)
 def test_a_reference_remembers_a_house_and_says_where_things_are(name: str) -> None:
     simulator = evonav.Simulator(evonav.load_houses()[2])
-    memory = REFERENCES[name]()
+    memory = MEMORIES[name].create()
     views = []
     for _ in range(12):
         views.append(simulator.look(rgb=False))
@@ -67,13 +68,13 @@ def test_a_reference_remembers_a_house_and_says_where_things_are(name: str) -> N
 
 def test_the_same_frames_make_the_same_entries() -> None:
     def entries(name: str) -> object:
-        memory = REFERENCES[name]()
+        memory = MEMORIES[name].create()
         memory.reset(INFO)
         for index in range(6):
             memory.observe(a_frame(index, ("Cup", 10), ("Bowl", 30 + index)))
         return memory.entries()
 
-    for name in REFERENCES:
+    for name in MEMORIES:
         assert entries(name) == entries(name)
 
 
@@ -145,7 +146,7 @@ def test_the_list_leaves_out_detections_without_a_depth() -> None:
 
 def test_the_size_grows_with_the_entries() -> None:
     for name in ("never", "numpy-list"):
-        memory = REFERENCES[name]()
+        memory = MEMORIES[name].create()
         memory.reset(INFO)
         sizes = []
         for index in range(3):

@@ -1,12 +1,13 @@
 """Run memories through streams on many workers; called again on the same folder, run what is missing.
 
-One job is one memory in one stream. Its record does not depend on other jobs; times do, where the machine is shared.
+One job is one stream with all memories that have no record of it: they receive each frame in turn, so that it is
+rendered once. Records do not depend on other jobs or memories; times do, where the machine is shared.
 """
 
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,12 +16,10 @@ from typing import Any
 from evonav._core import __version__
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.frames import MemoryFrame
 from evonav.memory_benchmark.protocol import Memory
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, StreamResult
-from evonav.memory_benchmark.run import Settings, measure
-from evonav.memory_benchmark.streams import RenderedStream, StreamSpec, make_stream
-from evonav.memory_benchmark.truth import FrameTruth
+from evonav.memory_benchmark.run import MemorySource, Settings, measure_all
+from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
@@ -38,6 +37,13 @@ class NamedMemory:
 
     name: str
     component: Component[Memory]
+    runs_here: bool = False
+    """Run it in the worker, not in a process of its own, unless the settings say where memories run."""
+
+    @property
+    def source(self) -> MemorySource:
+        """Return what the runner makes it from."""
+        return self.component.create if self.runs_here else self.component
 
     @property
     def digest(self) -> str | None:
@@ -79,7 +85,8 @@ def benchmark(
         out: Holds `memory.json` and `records/`.
         settings: Must be the folder's own if it holds records.
         num_workers: Number of processes; 0 runs everything in this one.
-        on_progress: Called with the number of records there are, of those asked for, and the name of the latest.
+        on_progress: Called with the number of records there are, of those asked for, and the name of the latest
+            stream.
 
     Raises:
         InvalidArgumentError: There is no memory or stream, or one is named twice.
@@ -95,31 +102,32 @@ def benchmark(
             raise InvalidArgumentError(f"a {kind} is named twice: {', '.join(all_names)}")
     with writing(out):
         known = _begun(memories, out, settings)
-        jobs = [
-            (memory, stream)
+        missing = {
+            stream: [memory for memory in memories if not record_path(out, memory.name, stream.name).exists()]
             for stream in streams
-            for memory in memories
-            if not record_path(out, memory.name, stream.name).exists()
-        ]
+        }
+        jobs = [(stream, left) for stream, left in missing.items() if left]
         num_all = len(memories) * len(streams)
-        num_done, failures = num_all - len(jobs), []
+        num_done = num_all - sum(len(left) for _, left in jobs)
+        failures: list[tuple[str, str, str]] = []
         on_progress(num_done, num_all, "")
         if jobs:
             work_force = Workforce(min(num_workers, len(jobs)))
             with open_pool(WORK, json.dumps(asdict(settings)), work_force, timeout_s=SILENCE_S) as pool:
                 texts = (
-                    Job(key, json.dumps({"memory": asdict(memory.component), "stream": asdict(stream)}))
-                    for key, (memory, stream) in enumerate(jobs)
+                    Job(key, json.dumps({"stream": asdict(stream), "memories": list(map(asdict, left))}))
+                    for key, (stream, left) in enumerate(jobs)
                 )
                 for answer in answers(pool, texts):
-                    memory, stream = jobs[answer.key]
+                    stream, left = jobs[answer.key]
                     if answer.failure is None:
-                        write_atomically(record_path(out, memory.name, stream.name), answer.text + "\n")
+                        for memory, record in zip(left, json.loads(answer.text), strict=True):
+                            write_atomically(record_path(out, memory.name, stream.name), record + "\n")
                     else:
                         last = (answer.detail.strip().splitlines() or [answer.failure])[-1]
-                        failures.append((memory.name, stream.name, last))
-                    num_done += 1
-                    on_progress(num_done, num_all, f"{memory.name} {stream.name}")
+                        failures.extend((memory.name, stream.name, last) for memory in left)
+                    num_done += len(left)
+                    on_progress(num_done, num_all, stream.name)
         return Measured(read_folder(out, known, streams), tuple(sorted(failures)))
 
 
@@ -144,29 +152,17 @@ def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[StreamS
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
-    """Return the function from a job to its record, as `evonav.parallel.pool` calls it."""
+    """Return the function from a job to its records, as `evonav.parallel.pool` calls it."""
     run_settings = Settings(**json.loads(settings))
 
     def work(text: str) -> str:
         given = json.loads(text)
-        stream = _Watched(make_stream(StreamSpec(**given["stream"])), alive)
-        return measure(Component(**given["memory"]), stream, run_settings).model_dump_json()
+        memories = [NamedMemory(**{**one, "component": Component(**one["component"])}) for one in given["memories"]]
+        sources = [memory.component if run_settings.own_process else memory.source for memory in memories]
+        results = measure_all(sources, make_stream(StreamSpec(**given["stream"])), run_settings, alive=alive)
+        return json.dumps([result.model_dump_json() for result in results])
 
     return work
-
-
-class _Watched:
-    """A stream that says with every frame that the job goes on."""
-
-    def __init__(self, stream: RenderedStream, alive: Callable[[], None]) -> None:
-        self._stream, self._alive = stream, alive
-        self.name, self.kind, self.house = stream.name, stream.kind, stream.house
-        self.info, self.changes = stream.info, stream.changes
-
-    def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
-        for frame in self._stream.frames():
-            self._alive()
-            yield frame
 
 
 def _begun(memories: Sequence[NamedMemory], out: Path, settings: Settings) -> list[str]:

@@ -11,9 +11,13 @@ from evonav.memory_benchmark.protocol import Memory
 _REFERENCES = "evonav.memory_benchmark.references"
 MEMORIES: dict[str, Component[Memory]] = {
     **{rule: Component(f"{_REFERENCES}:ObjectMapMemory", {"rule": rule}) for rule in RULES},
+    "clean-up": Component(f"{_REFERENCES}:ObjectMapMemory", {"rule": "never", "min_detections": 2}),
     "numpy-list": Component(f"{_REFERENCES}:NumpyList"),
 }
-"""The reference memories: an object map with each forgetting rule, and a list in NumPy."""
+"""The reference memories: an object map with each forgetting rule, one with a clean-up, and a list in NumPy.
+
+`clean-up` never forgets but by the clean-up of agents' maps, which drops entries with one detection.
+"""
 PEERS: dict[str, Component[Memory]] = {
     "open3d-faiss": Component("evonav.memory_benchmark.peers.open3d_faiss:Open3DFaissMemory"),
 }
@@ -24,7 +28,8 @@ def named_memories(names: Sequence[str]) -> list[NamedMemory]:
     """Return memories by their names.
 
     Args:
-        names: References, peers, `./file.py:Class` or `package.module:Class`; none for all references.
+        names: References, which run in the workers; peers, `./file.py:Class` or `package.module:Class`, which run in
+            processes of their own; none for all references.
 
     Raises:
         InvalidArgumentError: A name is none of these.
@@ -36,5 +41,5 @@ def named_memories(names: Sequence[str]) -> list[NamedMemory]:
             raise InvalidArgumentError(
                 f"no memory {name!r}: expected one of {', '.join(known)}, or ./file.py:Class or package.module:Class"
             )
-        found.append(NamedMemory(name, known.get(name) or Component(name)))
+        found.append(NamedMemory(name, known.get(name) or Component(name), runs_here=name in MEMORIES))
     return found

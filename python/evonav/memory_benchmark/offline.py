@@ -13,7 +13,7 @@ from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
 from evonav.memory_benchmark.protocol import MemoryEntry, Place
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import Settings, judge_memory
+from evonav.memory_benchmark.run import Settings, judge_memories
 from evonav.memory_benchmark.truth import Stream
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -49,7 +49,7 @@ def score(stream: Stream, entries_file: Path) -> StreamResult:
     Raises:
         StoreError: The file cannot be read, or a line is wrong; the message has file, line, field and value.
     """
-    return judge_memory(lambda: _Answers(entries_file), stream, Settings())
+    return judge_memories([lambda: _Answers(entries_file)], stream, Settings())[0]
 
 
 class _Answers:

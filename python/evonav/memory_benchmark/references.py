@@ -3,17 +3,16 @@
 They are given frames alone, as every memory is; none knows the truth.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.memory import forgetting
-from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectUpdate
+from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import Memory, MemoryEntry, Place, Point3
+from evonav.memory_benchmark.protocol import MemoryEntry, Place, Point3
 from evonav.world.camera import unproject
 
 SEEN_BYTES = 150
@@ -21,23 +20,26 @@ SEEN_BYTES = 150
 
 
 class ObjectMapMemory:
-    """An `ObjectMap` with a forgetting rule."""
+    """An `ObjectMap` with a forgetting rule, which alone decides what is forgotten."""
 
-    def __init__(self, rule: str, **options: object) -> None:
+    def __init__(self, rule: str, *, min_detections: int = 1, **options: object) -> None:
         """Choose the rule.
 
         Args:
             rule: A key of `forgetting.RULES`.
+            min_detections: Entries with fewer detections are dropped at the map's clean-up if the camera is far; 2 as
+                in agents' maps, 1 for none.
             options: The rule's options.
 
         Raises:
             InvalidArgumentError: There is no such rule, or it has no such option.
         """
+        self._config = ObjectMapConfig(min_detections=min_detections)
         self._make_rule = partial(forgetting.make, rule, **options)
         self._start()
 
     def _start(self) -> None:
-        self.map = ObjectMap()
+        self.map = ObjectMap(self._config)
         self.rule = self._make_rule()
         self._seen_s: dict[int, tuple[float, float]] = {}
         """Times of the first and the last frame that supports each entry."""
@@ -185,9 +187,3 @@ class NumpyList:
 def _point(values: NDArray[np.float64]) -> Point3:
     x, y, z = values.tolist()
     return x, y, z
-
-
-REFERENCES: Mapping[str, Callable[[], Memory]] = MappingProxyType(
-    {**{name: partial(ObjectMapMemory, name) for name in forgetting.RULES}, "numpy-list": NumpyList}
-)
-"""Makers of the reference memories by name: one for each forgetting rule, and `numpy-list`."""

@@ -1,9 +1,10 @@
-"""Run a memory through a stream: time it, judge it, and let a failure cost it this stream only."""
+"""Run memories through a stream: time them, judge them, and let a failure cost a memory this stream only."""
 
 import random
-from collections.abc import Callable, Iterable
-from contextlib import closing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -19,10 +20,12 @@ from evonav.memory_benchmark.metrics import size, speed
 from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
 from evonav.memory_benchmark.protocol import Memory, Place
 from evonav.memory_benchmark.records import Belief, Failure, Speed, StreamResult
-from evonav.memory_benchmark.truth import Stream
+from evonav.memory_benchmark.truth import FrameTruth, Stream
 
 NUM_WARM_UP = 20
 """Frames at the start of a stream whose times do not count."""
+EVERY_STATIC = 10
+"""Number of frames from one question for the entries to the next in a stream without changes."""
 NUM_QUERIES = 10
 """Labels that are asked for at the end of a visit."""
 
@@ -40,8 +43,11 @@ class Settings:
     """Time limit of a call in its own process. In this process no call can be ended."""
     memory_mb: int | None = None
     """Largest address space of its own process; default: no limit."""
-    every: int = 1
-    """Ask for the entries after every so many frames, and after the last one of each visit."""
+    every: int | None = None
+    """Ask for the entries after every so many frames, and after the last one of each visit.
+
+    Default: after every frame, and after every tenth in a stream in which nothing changes.
+    """
     seed: int = 0
     """Seed of the labels that are asked for."""
     runs_twice: bool = False
@@ -53,7 +59,7 @@ class Settings:
         Raises:
             InvalidArgumentError: `every` or `timeout_s` is not positive.
         """
-        if self.every < 1:
+        if self.every is not None and self.every < 1:
             raise InvalidArgumentError(f"every = {self.every}: must be at least 1")
         if not self.timeout_s > 0.0:
             raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be positive")
@@ -92,39 +98,70 @@ class HostedMemory(Protocol):
 
 
 def measure(memory: MemorySource, stream: Stream, settings: Settings | None = None) -> StreamResult:
-    """Run a memory through a stream and judge it.
+    """Run a memory through a stream and judge it; see `measure_all`."""
+    return measure_all([memory], stream, settings)[0]
 
-    Times are of `observe` and `locate` alone. CPU time is the whole process's while a call runs, so that threads count,
-    too; what a thread does after `observe` has returned shows in the wall time of later calls only.
+
+def measure_all(
+    memories: Sequence[MemorySource],
+    stream: Stream,
+    settings: Settings | None = None,
+    *,
+    alive: Callable[[], None] = lambda: None,
+) -> list[StreamResult]:
+    """Run memories through a stream side by side, so that each frame is rendered once, and judge them.
+
+    Times are of `observe` and `locate` alone, and only one memory is at work at a time. CPU time is the whole process's
+    while a call runs, so that threads count, too; what a thread does after `observe` has returned shows in the wall
+    time of later calls only.
 
     Args:
-        memory: The memory; a fresh one is made.
+        memories: The memories; fresh ones are made.
         stream: The stream.
-        settings: Place and limits of the run, and how often the memory is asked.
+        settings: Place and limits of the run, and how often a memory is asked.
+        alive: Called after every frame of every memory.
 
     Returns:
-        The result; one with a `failure` and without figures if the memory raised, hung, died or answered wrongly.
+        A result for each memory; one with a `failure` and without figures if it raised, hung, died or answered wrongly.
 
     Raises:
         InvalidArgumentError: A function was to run in its own process.
     """
-    settings = settings or Settings()
-    result = judge_memory(lambda: host(memory, settings), stream, settings)
-    if not settings.runs_twice or result.failure is not None:
-        return result
-    again = judge_memory(lambda: host(memory, settings), stream, settings)
-    return result.model_copy(update={"is_deterministic": again.digest == result.digest})
+    chosen = settings or Settings()
+    hosted = [partial(host, memory, chosen) for memory in memories]
+    results = judge_memories(hosted, stream, chosen, alive)
+    if not chosen.runs_twice:
+        return results
+    again = judge_memories(hosted, stream, chosen, alive)
+    return [
+        one if one.failure is not None else one.model_copy(update={"is_deterministic": one.digest == other.digest})
+        for one, other in zip(results, again, strict=True)
+    ]
 
 
-def judge_memory(new_memory: Callable[[], HostedMemory], stream: Stream, settings: Settings) -> StreamResult:
-    """Run a hosted memory through a stream and judge it.
+def judge_memories(
+    new_memories: Sequence[Callable[[], HostedMemory]],
+    stream: Stream,
+    settings: Settings,
+    alive: Callable[[], None] = lambda: None,
+) -> list[StreamResult]:
+    """Run hosted memories through a stream side by side and judge them.
 
     Args:
-        new_memory: Makes the memory; it is closed at the end.
+        new_memories: Each makes a memory, which is closed at the end.
         stream: The stream.
-        settings: They say how often it is asked.
+        settings: They say how often a memory is asked.
+        alive: Called after every frame of every memory.
     """
-    return _Run(stream, settings).result(new_memory)
+    with ExitStack() as stack:
+        runs = [stack.enter_context(closing(_Run(stream, settings, new_memory))) for new_memory in new_memories]
+        for frame, truth in stream.frames():
+            if all(run.has_failed for run in runs):
+                break
+            for run in runs:
+                run.take(frame, truth)
+                alive()
+        return [run.result() for run in runs]
 
 
 def host(memory: MemorySource, settings: Settings) -> LocalMemory | RemoteMemory:
@@ -160,31 +197,33 @@ class _Times:
 
 
 class _Run:
-    """One run of one memory through one stream."""
+    """One run of one memory through one stream. After its first failure, it does nothing more."""
 
-    def __init__(self, stream: Stream, settings: Settings) -> None:
+    def __init__(self, stream: Stream, settings: Settings, new_memory: Callable[[], HostedMemory]) -> None:
         self._stream, self._settings = stream, settings
+        self._every = settings.every or (1 if stream.changes else EVERY_STATIC)
         self._judge = Judge(stream.info, stream.changes)
         self._times = _Times()
         self._frame: MemoryFrame | None = None
         self._num_frames = self._num_visits = 0
         self._is_answer_due = False
         self._num_entries = 0
-        self._hosting: Hosting = "here"
+        self._memory: HostedMemory | None = None
+        self._failure: Failure | None = None
+        with self._failing():
+            self._memory = new_memory()
+            self._memory.reset(stream.info)
 
-    def result(self, new_memory: Callable[[], HostedMemory]) -> StreamResult:
-        try:
-            with closing(new_memory()) as memory:
-                self._hosting = memory.hosting
-                self._through(memory)
-                return self._judged(memory)
-        except MemoryFailedError as error:
-            frame = None if self._frame is None else self._frame.index
-            return self._record(failure=Failure(kind=error.kind, message=str(error), frame=frame))
+    @property
+    def has_failed(self) -> bool:
+        return self._failure is not None
 
-    def _through(self, memory: HostedMemory) -> None:
-        memory.reset(self._stream.info)
-        for frame, truth in self._stream.frames():
+    def take(self, frame: MemoryFrame, truth: FrameTruth) -> None:
+        """Hand over the next frame."""
+        memory = self._memory
+        if memory is None or self.has_failed:
+            return
+        with self._failing():
             if self._frame is None or frame.visit != self._frame.visit:
                 self._end_visit(memory)
                 self._times.visit.append(memory.visit(frame.time_s))
@@ -194,7 +233,7 @@ class _Run:
             self._judge.look(frame, truth)
             self._num_frames += 1
             self._is_answer_due = True
-            if self._num_frames % self._settings.every == 0:
+            if self._num_frames % self._every == 0:
                 self._ask(memory)
             if self._num_frames > NUM_WARM_UP and cost is not None:
                 self._times.observe.append(cost)
@@ -202,7 +241,29 @@ class _Run:
                 self._times.num_entries.append(self._num_entries)
                 if memory.rss_bytes is not None:
                     self._times.rss_mb.append(memory.rss_bytes / size.MB)
-        self._end_visit(memory)
+
+    def result(self) -> StreamResult:
+        """End the stream."""
+        memory = self._memory
+        if memory is not None and not self.has_failed:
+            with self._failing():
+                self._end_visit(memory)
+                return self._judged(memory)
+        return self._record(failure=self._failure)
+
+    def close(self) -> None:
+        """Let go of the memory."""
+        if self._memory is not None:
+            self._memory.close()
+
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """Keep the failure of a call."""
+        try:
+            yield
+        except MemoryFailedError as error:
+            frame = None if self._frame is None else self._frame.index
+            self._failure = Failure(kind=error.kind, message=str(error), frame=frame)
 
     def _ask(self, memory: HostedMemory) -> None:
         entries = memory.entries()
@@ -285,7 +346,7 @@ class _Run:
             "stream": stream.name,
             "kind": stream.kind,
             "house": stream.house,
-            "hosting": self._hosting,
+            "hosting": "here" if self._memory is None else self._memory.hosting,
             "num_frames": self._num_frames,
             "num_visits": self._num_visits,
             "num_changes": len(stream.changes),

@@ -75,15 +75,25 @@ def memory(
     perception: Perception = None,
     quick: Quick = False,
     every: Annotated[
-        int,
-        typer.Option(min=1, metavar="N", help="Ask for the entries after every N frames and at the ends of visits."),
-    ] = 1,
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Ask for the entries after every N frames and at the ends of visits. Default: 1, and 10 in streams "
+            "without changes.",
+        ),
+    ] = None,
     timeout: Annotated[
         float, typer.Option(min=0.1, metavar="S", help="Seconds to wait for a call of a memory before it has failed.")
     ] = 60.0,
     in_process: Annotated[
-        bool, typer.Option("--in-process", help="Run memories in the workers themselves, for debuggers.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--in-process/--own-process",
+            help="Run memories in the workers, for debuggers, or each in a process of its own. Default: references in "
+            "the workers, others in their own.",
+        ),
+    ] = None,
     twice: Annotated[
         bool, typer.Option("--twice", help="Run every stream twice, and say whether the answers are the same bits.")
     ] = False,
@@ -111,7 +121,8 @@ def memory(
     earlier = None if against is None else read_result(against)
     chosen = named_memories(listed(memories))
     specs = chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
-    settings = Settings(own_process=False if in_process else None, timeout_s=timeout, every=every, runs_twice=twice)
+    own_process = None if in_process is None else not in_process
+    settings = Settings(own_process=own_process, timeout_s=timeout, every=every, runs_twice=twice)
     with interruptible(out), progress_bar("streams") as on_progress:
         measured = benchmark(
             chosen,
