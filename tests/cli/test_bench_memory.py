@@ -1,6 +1,7 @@
 """`evonav bench memory`: measure, compare with an earlier result, export streams and score answers to them."""
 
 import json
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from evonav.cli.bench.memory import chosen_streams
 from evonav.memory_benchmark.references import ObjectMapMemory
 from evonav.memory_benchmark.streams.export import read_exported
 
+BAD = Path(__file__).parents[1] / "memory_benchmark" / "bad_memories.py"
 SMALL = ["--streams", "S6", "--quick", "--size", "64x48"]
 
 
@@ -103,3 +105,91 @@ def test_mistakes_are_told(tmp_path):
     assert bench("export", tmp_path, "--layout", "ros").exit_code == 2
     assert "holds no stream" in str(bench("score", tmp_path).exception)
     assert "no memory 'nevr'" in str(bench("--memory", "nevr").exception)
+
+
+def test_bad_memories_get_a_verdict_each_and_the_others_go_on(tmp_path):
+    verdicts = {
+        "Raises": "observe() raises KeyError: 'no such voxel'",
+        "Hangs": "no answer to `observe` within 1 s",
+        "Dies": "the memory's process died (exit code 7)",
+        "NanBoxes": "entries()[1].centre_m = (1.0, nan, 0.0): must be finite",
+        "Million": "entries(): 1000000 entries, must be at most 100000",
+        "LiesAboutBytes": "num_bytes() = 1: 1 entry alone takes at least 6 bytes",
+        "WritesIntoFrames": "observe() raises ValueError: assignment destination is read-only",
+    }
+    names = [f"{BAD}:{name}" for name in (*verdicts, "Good")]
+    words = [word for name in [*names, "never"] for word in ("--memory", name)]
+    run = bench(*SMALL, *words, "--timeout", 1, "--workers", 0, "--out", tmp_path)
+    assert run.exit_code == 0, run.output
+    memories = {
+        one["memory"]: one["streams"][0] for one in json.loads((tmp_path / "result.json").read_text())["memories"]
+    }
+    for name, verdict in verdicts.items():
+        record = memories[f"{BAD}:{name}"]
+        assert verdict in record["failure"]["message"]
+        assert record["update"] is None
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("no such voxel") == 1
+    for name in (f"{BAD}:Good", "never"):
+        assert memories[name]["failure"] is None
+        assert memories[name]["update"]["seen"] > 0
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    streams = tmp_path_factory.mktemp("recordings") / "streams"
+    run = bench("export", streams, *SMALL, "--no-colours", "--oracle", streams.with_name("truth"))
+    assert run.exit_code == 0, run.output
+    (folder,) = streams.iterdir()
+    return folder
+
+
+def test_recordings_give_speed_and_size_only(recording, tmp_path):
+    bare = tmp_path / "bare"
+    shutil.copytree(recording, bare)
+    (bare / "frames.jsonl").unlink()
+    words = [
+        "--recording",
+        recording,
+        "--recording",
+        bare,
+        "--memory",
+        "never",
+        "--workers",
+        0,
+        "--out",
+        tmp_path / "o",
+    ]
+    run = bench(*words)
+    assert run.exit_code == 0, run.output
+    assert f"{bare}: " in run.stdout
+    assert "no detections, no truth: only speed and size" in run.stdout
+    (memory,) = json.loads((tmp_path / "o" / "result.json").read_text())["memories"]
+    seeing, blind = memory["streams"]
+    assert {one["kind"] for one in memory["streams"]} == {"recording"}
+    for one in (seeing, blind):
+        assert one["failure"] is None
+        assert (one["update"], one["belief"], one["queries"], one["spells"]) == (None, None, None, [])
+        assert one["speed"]["observe_wall"]["n"] == one["num_frames"] - 20
+    assert seeing["size"]["num_entries"] > 10 > blind["size"]["num_entries"] == 0
+    assert seeing["speed"]["locate_wall"] is not None
+    assert seeing["notes"] == []
+    assert "no frame has a detection" in blind["notes"][0]
+    table = (tmp_path / "o" / "summary.md").read_text()
+    assert "p95 ms" in table
+    assert "false forgets" not in table.split("p95:")[0]
+    assert bench(*words).exit_code == 0, "the records are found again"
+
+
+def test_bad_recordings_are_one_error(recording, tmp_path):
+    words = ["--memory", "never,numpy-list", "--workers", 0, "--out", tmp_path / "o"]
+    assert "cam_params.json: cannot be read" in str(bench("--recording", tmp_path, *words).exception)
+    assert "--up x: expected z, y, -y" in " ".join(bench("--recording", recording, "--up", "x", *words).stderr.split())
+    damaged = tmp_path / "damaged"
+    shutil.copytree(recording, damaged)
+    (damaged / "depth" / "000007.png").write_text("no image")
+    run = bench("--recording", damaged, *words)
+    assert run.exit_code == 3
+    assert run.stderr.count("000007.png: cannot be read as an image") == 1
+    (damaged / "depth" / "000007.png").unlink()
+    assert "000007.png: is missing" in str(bench("--recording", damaged, *words).exception)

@@ -82,7 +82,7 @@ class NanBoxes(Answers):
 
 class Million(Good):
     def entries(self) -> Sequence[MemoryEntry]:
-        return [GOOD] * 1_000_001
+        return [GOOD] * 1_000_000
 
 
 class LiesAboutBytes(Good):

@@ -55,6 +55,7 @@ class HandMade:
     kind: str = "S0"
     house: str = "hand-made"
     info: StreamInfo = INFO
+    has_truth: bool = True
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
         time_s, last = 0.0, self.shots[0]

@@ -12,7 +12,7 @@ from hand_made import HandMade, Shot, body, entry
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import MemoryFailedError, read_entries, read_num_bytes, read_places
 from evonav.memory_benchmark.protocol import Place
-from evonav.memory_benchmark.run import Settings, measure, measure_all
+from evonav.memory_benchmark.run import NO_DETECTIONS, Settings, measure, measure_all
 
 FILE = Path(bad_memories.__file__)
 MUG = (body("mug", 1.0),)
@@ -27,7 +27,7 @@ STREAM = HandMade([Shot(MUG, visible={"mug": 50})] * 60)
         ("Hangs", "hung", "no answer to `observe` within 1 s", 3),
         ("Dies", "died", "the memory's process died (exit code 7)", 3),
         ("NanBoxes", "answer", "entries()[1].centre_m = (1.0, nan, 0.0): must be finite", 0),
-        ("Million", "answer", "entries(): 1000001 entries, must be at most 1000000", 0),
+        ("Million", "answer", "entries(): 1000000 entries, must be at most 100000", 0),
         ("LiesAboutBytes", "answer", "num_bytes() = 1: 1 entry alone takes at least 6 bytes", 59),
         ("NegativeBytes", "answer", "num_bytes() = -5: must not be negative", 59),
         ("AnswersNone", "answer", "entries() = None: must be a sequence of MemoryEntry", 0),
@@ -186,3 +186,15 @@ def test_places_and_sizes_are_checked() -> None:
             read_num_bytes(size, 0)
     assert read_num_bytes(np.int64(6), 1) == 6
     assert entry(1, 1.0) == GOOD
+
+
+def test_a_memory_without_truth_is_timed_and_not_judged() -> None:
+    result = measure(Good, HandMade([Shot(MUG, detected=("mug",))] * 60, has_truth=False))
+    assert result.failure is None, result.failure
+    assert (result.update, result.spells, result.belief, result.queries) == (None, (), None, None)
+    assert result.speed is not None
+    assert result.speed.observe_wall.n == 40
+    assert result.size is not None
+    assert result.size.bytes_per_entry == 1000.0
+    assert result.digest == measure(Good, STREAM, Settings(every=10)).digest
+    assert result.notes == (NO_DETECTIONS,)

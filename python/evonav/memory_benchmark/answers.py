@@ -16,7 +16,7 @@ from evonav.counted import counted
 from evonav.errors import EvonavError
 from evonav.memory_benchmark.protocol import MemoryEntry, Place
 
-MAX_ENTRIES = 1_000_000
+MAX_ENTRIES = 100_000
 """Largest number of entries of an answer."""
 MIN_ENTRY_BYTES = 6
 """Bytes that no memory can do without for an entry: three different coordinates in the smallest common float format."""

@@ -20,6 +20,7 @@ from evonav.memory_benchmark.protocol import Memory
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, StreamResult
 from evonav.memory_benchmark.run import MemorySource, Settings, measure_all
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
+from evonav.memory_benchmark.streams.export.recording import RecordingSpec
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
@@ -29,6 +30,8 @@ WORK = "evonav.memory_benchmark.benchmark:make_worker"
 SILENCE_S = 600.0
 """Time without a frame after which a job is given up; the time limit of a call of a memory ends earlier."""
 HEADER_NAME, RECORD_DIR = "memory.json", "records"
+
+AnySpec = StreamSpec | RecordingSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,7 @@ class Measured:
 
 def benchmark(
     memories: Sequence[NamedMemory],
-    streams: Sequence[StreamSpec],
+    streams: Sequence[AnySpec],
     out: Path,
     *,
     settings: Settings | None = None,
@@ -81,7 +84,7 @@ def benchmark(
 
     Args:
         memories: Memories; those of earlier commands stay in the folder.
-        streams: Streams.
+        streams: Streams, and recordings.
         out: Holds `memory.json` and `records/`.
         settings: Must be the folder's own if it holds records.
         num_workers: Number of processes; 0 runs everything in this one.
@@ -136,7 +139,7 @@ def record_path(folder: Path, memory: str, stream: str) -> Path:
     return folder / RECORD_DIR / _slug(memory) / f"{stream.replace('/', '_')}.json"
 
 
-def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[StreamSpec]) -> BenchmarkResult:
+def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnySpec]) -> BenchmarkResult:
     """Read the records of memories in streams; those that are missing are left out.
 
     Raises:
@@ -159,7 +162,9 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
         given = json.loads(text)
         memories = [NamedMemory(**{**one, "component": Component(**one["component"])}) for one in given["memories"]]
         sources = [memory.component if run_settings.own_process else memory.source for memory in memories]
-        results = measure_all(sources, make_stream(StreamSpec(**given["stream"])), run_settings, alive=alive)
+        spec = given["stream"]
+        stream = RecordingSpec(**spec).read() if "folder" in spec else make_stream(StreamSpec(**spec))
+        results = measure_all(sources, stream, run_settings, alive=alive)
         return json.dumps([result.model_dump_json() for result in results])
 
     return work

@@ -184,7 +184,7 @@ def _arrays(frame: MemoryFrame) -> list[np.ndarray]:
 class _TinyStream:
     """A mug in front of a wall for four frames, and the wall alone for four more."""
 
-    name, kind, house = "check/mug/0", "check", "mug"
+    name, kind, house, has_truth = "check/mug/0", "check", "mug", True
 
     def __init__(self) -> None:
         fov_rad = 2.0 * float(np.arctan(_SIDE_PX / 2.0 / _FOCAL_PX))

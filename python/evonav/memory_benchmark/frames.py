@@ -29,3 +29,12 @@ class MemoryFrame:
     """1-based number of the visit: things move between visits, and in some streams during them."""
     view: View
     """Pose, depth, colours and detections."""
+
+
+def read_only(frame: MemoryFrame) -> MemoryFrame:
+    """Make the arrays of a frame read-only, since all memories of a run are given the same ones; return the frame."""
+    found = frame.view.detections
+    for array in (frame.view.depth_m, frame.view.rgb, found.masks, found.confidences, found.features):
+        if array is not None:
+            array.flags.writeable = False
+    return frame

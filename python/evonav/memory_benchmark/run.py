@@ -29,6 +29,8 @@ EVERY_STATIC = 10
 NUM_QUERIES = 10
 """Labels that are asked for at the end of a visit."""
 
+NO_DETECTIONS = "no frame has a detection: a memory that is made from detections has nothing to do"
+
 MemorySource = str | Component[Memory] | Callable[[], Memory]
 """`./file.py:Class` or `package.module:Class`, the same with options, or a function that makes a memory."""
 
@@ -203,6 +205,7 @@ class _Run:
         self._stream, self._settings = stream, settings
         self._every = settings.every or (1 if stream.changes else EVERY_STATIC)
         self._judge = Judge(stream.info, stream.changes)
+        self._detected: set[str] = set()
         self._times = _Times()
         self._frame: MemoryFrame | None = None
         self._num_frames = self._num_visits = 0
@@ -231,6 +234,7 @@ class _Run:
             self._frame = frame
             cost = memory.observe(frame)
             self._judge.look(frame, truth)
+            self._detected.update(frame.view.detections.labels)
             self._num_frames += 1
             self._is_answer_due = True
             if self._num_frames % self._every == 0:
@@ -277,7 +281,7 @@ class _Run:
         if self._is_answer_due:
             self._ask(memory)
         if memory.can_locate:
-            labels = self._judge.labels_to_ask()
+            labels = self._judge.labels_to_ask() if self._stream.has_truth else sorted(self._detected)
             draw = random.Random(f"{self._settings.seed}/{self._stream.name}/{self._num_visits}")  # noqa: S311
             for label in draw.sample(labels, min(NUM_QUERIES, len(labels))):
                 places, cost = memory.locate(label, NUM_PLACES)
@@ -290,18 +294,24 @@ class _Run:
         update, spells = self._judge.end()
         sums, queries = self._judge.belief, self._judge.queries.of_state
         its_size = self._size(num_bytes, memory)
-        note = size.byte_note(num_bytes, its_size.rss_growth_mb)
+        notes = [size.byte_note(num_bytes, its_size.rss_growth_mb)]
+        notes += [] if self._stream.has_truth or self._detected else [NO_DETECTIONS]
+        fixed = {
+            "notes": tuple(note for note in notes if note is not None),
+            "speed": self._speed(),
+            "size": its_size,
+            "digest": self._judge.digest,
+        }
+        if not self._stream.has_truth:
+            return self._record(**fixed)
         bins = [(float(n), float(p), float(right)) for n, p, right in sums.bins.tolist()]
         belief = Belief(n=sums.n, squared_error=sums.squared_error, log_loss=sums.log_loss, bins=tuple(bins))
         return self._record(
-            notes=() if note is None else (note,),
-            speed=self._speed(),
-            size=its_size,
+            **fixed,
             update=update,
             spells=tuple(spells),
             belief=belief if sums.n else None,
             queries=queries if memory.can_locate else None,
-            digest=self._judge.digest,
         )
 
     def _speed(self) -> Speed | None:

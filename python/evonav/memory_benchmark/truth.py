@@ -69,5 +69,9 @@ class Stream(Protocol):
     def changes(self) -> Sequence[Change]:
         """All changes, in the order of time."""
 
+    @property
+    def has_truth(self) -> bool:
+        """False if nothing is known of what stands where: then only speed and size are measured."""
+
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
         """Render the stream, one frame at a time."""

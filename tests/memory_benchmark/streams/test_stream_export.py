@@ -161,6 +161,16 @@ def test_a_recording_is_the_stream_without_its_truth(folders):
         assert not truth.objects
 
 
+@pytest.mark.parametrize("read", ["rendered", "exported", "recorded"])
+def test_no_memory_can_write_into_a_frame(read, stream, folders):
+    of = {"rendered": lambda: stream, "exported": lambda: read_exported(folders / "tum")}
+    frame, _ = next(of.get(read, lambda: read_recording(folders / "tum"))().frames())
+    found = frame.view.detections
+    for array in (frame.view.depth_m, frame.view.rgb, found.masks, found.confidences, found.features):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+
+
 def rewritten(source, folder, *, roll_rad=0.0, up="z", shift_px=0.0):
     """Write a recording of the same places with a rolled camera, in another world, with an off-centre camera."""
     shutil.copytree(source, folder)
@@ -187,7 +197,8 @@ def test_a_recording_without_detections_has_depth_and_poses(folders, tmp_path):
     assert frame.view.rgb is None
     assert frame.view.detections.labels == ()
     assert truth.detected_ids == ()
-    assert (recorded.info.labels, recorded.name, recorded.has_truth) == ((), "bare", False)
+    assert (recorded.info.labels, recorded.house, recorded.has_truth) == ((), "bare", False)
+    assert recorded.name.startswith("recording/bare/")
 
 
 @pytest.mark.parametrize("up", ["z", "y", "-y"])

@@ -15,6 +15,7 @@ from evonav.counted import counted
 if TYPE_CHECKING:  # the command must start fast
     from evonav.memory_benchmark.records import BenchmarkResult
     from evonav.memory_benchmark.streams import StreamSpec
+    from evonav.memory_benchmark.streams.export.recording import RecordingSpec
 
 EXIT_WORSE = 1
 SEVERAL = "Repeat the option for more, or separate them by commas."
@@ -74,6 +75,18 @@ def memory(
     size: Size = "300x300",
     perception: Perception = None,
     quick: Quick = False,
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--recording",
+            metavar="FOLDER",
+            help="Recording of your own in TUM's layout, instead of streams. It has no truth, so only speed and size "
+            "are measured. Repeat the option for more.",
+        ),
+    ] = None,
+    up: Annotated[
+        str, typer.Option(metavar="z|y|-y", help="Axis of the recordings' right-handed world that points up.")
+    ] = "z",
     every: Annotated[
         int | None,
         typer.Option(
@@ -120,7 +133,9 @@ def memory(
 
     earlier = None if against is None else read_result(against)
     chosen = named_memories(listed(memories))
-    specs = chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
+    specs: list[StreamSpec | RecordingSpec] = [*read_recordings(recordings or (), up)]
+    if streams or not recordings:
+        specs += chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     own_process = None if in_process is None else not in_process
     settings = Settings(own_process=own_process, timeout_s=timeout, every=every, runs_twice=twice)
     with interruptible(out), progress_bar("streams") as on_progress:
@@ -132,8 +147,11 @@ def memory(
             num_workers=num_cores() if workers is None else workers,
             on_progress=on_progress,
         )
+    failed: dict[tuple[str, str], list[str]] = {}
     for name, stream, why in measured.failures:
-        typer.echo(f"failed: {name} {stream}: {why}", err=True)
+        failed.setdefault((stream, why), []).append(name)
+    for (stream, why), names in failed.items():
+        typer.echo(f"failed: {', '.join(names)} {stream}: {why}", err=True)
     _show(measured.result, out, len(measured.failures))
     if measured.failures:
         typer.echo("incomplete: run the same command again to resume", err=True)
@@ -250,6 +268,28 @@ def chosen_streams(
     return specs
 
 
+def read_recordings(folders: "Sequence[Path]", up: str) -> "list[RecordingSpec]":
+    """Read recordings except for their images, and say what each has.
+
+    Raises:
+        StoreError: A file is missing or malformed.
+    """
+    from evonav.memory_benchmark.streams.export import read_recording
+    from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
+
+    axis = next((known for known in EVONAV_FROM_WORLD if known == up), None)
+    if axis is None:
+        raise typer.BadParameter(f"--up {up}: expected {', '.join(EVONAV_FROM_WORLD)}")
+    found = []
+    for folder in folders:
+        recording = read_recording(folder, up=axis)
+        labels = recording.info.labels
+        has = f"detections of {counted(len(labels), 'label')}" if labels else "no detections"
+        typer.echo(f"{folder}: {counted(recording.num_frames, 'frame')}, {has}, no truth: only speed and size")
+        found.append(recording.spec)
+    return found
+
+
 def folder_of(stream: str) -> str:
     """Return the name of a stream's folder."""
     return stream.replace("/", "_")
@@ -257,13 +297,13 @@ def folder_of(stream: str) -> str:
 
 def _show(result: "BenchmarkResult", out: Path, num_missing: int) -> None:
     from evonav.memory_benchmark.results.page import write_memory_report
-    from evonav.memory_benchmark.results.tables import memory_tables
+    from evonav.memory_benchmark.results.tables import FAILURES, REMARKS, memory_tables
 
     if not result.memories:
         return
     page = write_memory_report(result, out, num_missing=num_missing)
     tables = memory_tables(result)
-    show_tables([tables[0], *(table for table in tables if table.title == "Failures")])
+    show_tables([tables[0], *(table for table in tables if table.title in (FAILURES, REMARKS))])
     typer.echo(f"page: {page}; figures: {out / 'result.json'}, {out / 'summary.md'}")
 
 

@@ -16,7 +16,7 @@ from evonav.world.simulator import SceneObject
 NONE = -1
 """Match of a stale entry."""
 _BLOCK = 20_000
-"""Entries that are matched at a time: a memory may answer a million."""
+"""Entries that are matched at a time: a memory may answer a hundred thousand."""
 
 
 class Boxes:

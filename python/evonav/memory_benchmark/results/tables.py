@@ -11,6 +11,8 @@ from evonav.report.tables.table import Table
 from evonav.statistics import Estimate, Interval
 
 NOT_REACHED = "not reached"
+FAILURES, REMARKS = "Failures", "Notes"
+"""Titles of tables that are there only if they have rows."""
 P95 = "observe_cpu_p95_ms"
 HALF_LIFE = "half_life_evidence_frames"
 RATIO = "p95_over_baseline"
@@ -78,7 +80,7 @@ def scores(result: BenchmarkResult, kind: str | None = None) -> dict[str, dict[s
 
 
 def memory_tables(result: BenchmarkResult) -> list[Table]:
-    """Build all tables: the main one, further figures, one for each kind of stream, and failures."""
+    """Build all tables: the main one, further figures, one for each kind of stream, failures, and notes."""
     found = scores(result)
     tables = [_table("Memories", result, found, COLUMNS, None, NOTES), _table("More", result, found, MORE, None)]
     kinds = kinds_of(result.memories)
@@ -92,7 +94,12 @@ def memory_tables(result: BenchmarkResult) -> list[Table]:
         for one in memory.failures
         if one.failure is not None
     )
-    return [*tables, Table("Failures", ("memory", "stream", "what", "frames", "message"), rows)] if rows else tables
+    if rows:
+        tables.append(Table(FAILURES, ("memory", "stream", "what", "frames", "message"), rows))
+    noted = tuple(
+        (memory.memory, one.stream, note) for memory in result.memories for one in memory.streams for note in one.notes
+    )
+    return [*tables, Table(REMARKS, ("memory", "stream", "note"), noted)] if noted else tables
 
 
 def _table(

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from evonav._core import House
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.evidence import (
     changes_between,
     detected_ids,
@@ -150,7 +150,8 @@ class RenderedStream:
                 empty_px(frame, bodies.vacated),
                 detected_ids(percept.detections, frame, bodies.all),
             )
-            yield MemoryFrame(index, float(self.plan.times_s[index]), int(self.plan.visits[index]), view), truth
+            shot = MemoryFrame(index, float(self.plan.times_s[index]), int(self.plan.visits[index]), view)
+            yield read_only(shot), truth
 
     def evidence(self, range_m: float) -> Iterator[tuple[Frame, dict[str, int], dict[int, int]]]:
         """Render the stream without perception; yield each frame with its `visible_px` and `empty_px`.

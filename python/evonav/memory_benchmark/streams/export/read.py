@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.layouts import (
     FRAMES_FILE,
@@ -118,7 +118,7 @@ class ExportedStream:
             truth = next(truths, None)
             if truth is None:
                 raise StoreError(f"{self._oracle}: no truth of frame {line.index}")
-            yield MemoryFrame(line.index, line.time_s, line.visit, view), truth
+            yield read_only(MemoryFrame(line.index, line.time_s, line.visit, view)), truth
 
     def _truths(self) -> Iterator[FrameTruth]:
         if self._oracle is None:

@@ -1,10 +1,12 @@
 """Read a recorded RGB-D sequence of one's own, in TUM RGB-D's layout. It has no truth: speed and size are measured."""
 
+import hashlib
 import json
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import PositiveFloat, ValidationError
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.conversion import UpAxis, pose_of, rotation_of
 from evonav.memory_benchmark.streams.export.layouts import FRAMES_FILE, LAYOUTS, FrameLine
@@ -25,7 +27,7 @@ from evonav.tasks.records import Record
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
-CAMERA_FILE = "cam_params.json"
+CAMERA_FILE, DEPTH_FILE, POSES_FILE, RGB_FILE = "cam_params.json", "depth.txt", "groundtruth.txt", "rgb.txt"
 SAME_TIME_S = 0.02
 """Largest difference in time between an image and what belongs to it (TUM's `associate.py`)."""
 VISIT_GAP_S = 60.0
@@ -63,8 +65,8 @@ def read_recording(folder: Path, *, up: UpAxis = "z") -> "Recording":
     """Return a recorded sequence as a stream; its images are read while it is read.
 
     `depth.txt` (time and file), `groundtruth.txt` (time, position, quaternion x y z w) and `cam_params.json` must be
-    there. `rgb.txt` and `frames.jsonl`, with masks and labels of detections, may be. Depth images without a pose within
-    0.02 s are left out.
+    there, and every image that they name. `rgb.txt` and `frames.jsonl`, with masks and labels of detections, may be.
+    Depth images without a pose within 0.02 s are left out.
 
     Cameras are made level, with the principal point in the middle: pixels are taken over from the nearest ones.
 
@@ -78,6 +80,19 @@ def read_recording(folder: Path, *, up: UpAxis = "z") -> "Recording":
     return Recording(folder, up)
 
 
+@dataclass(frozen=True, slots=True)
+class RecordingSpec:
+    """All that a worker needs to read a recording."""
+
+    name: str
+    folder: str
+    up: UpAxis
+
+    def read(self) -> "Recording":
+        """Read the recording; see `read_recording`."""
+        return Recording(Path(self.folder), self.up)
+
+
 class Recording:
     """A `Stream` of a recording."""
 
@@ -87,19 +102,28 @@ class Recording:
 
     def __init__(self, folder: Path, up: UpAxis = "z") -> None:
         """Read all but the images; see `read_recording`."""
-        self.folder = folder
+        self.folder, self.up = folder, up
         self._camera = _camera_of(folder / CAMERA_FILE)
         self._shots = _shots_of(folder, up)
 
-    @property
+    @cached_property
     def name(self) -> str:
-        """The folder's name."""
-        return self.folder.resolve().name
+        """The folder's name, and a part of the digest of all of its files but the images."""
+        digest = hashlib.sha256(self.up.encode())
+        for name in (CAMERA_FILE, POSES_FILE, DEPTH_FILE, RGB_FILE, FRAMES_FILE):
+            path = self.folder / name
+            digest.update(path.read_bytes() if path.exists() else b"")
+        return f"{self.kind}/{self.house}/{digest.hexdigest()[:8]}"
 
     @property
     def house(self) -> str:
-        """The folder's name, too: a recording is a house of its own."""
-        return self.name
+        """The folder's name: a recording is a house of its own."""
+        return self.folder.resolve().name
+
+    @property
+    def spec(self) -> RecordingSpec:
+        """The description from which the recording is read again."""
+        return RecordingSpec(self.name, str(self.folder.resolve()), self.up)
 
     @property
     def num_frames(self) -> int:
@@ -137,7 +161,8 @@ class Recording:
                 NO_OCCUPANCY,
                 None if rgb is None else _taken(rgb, sources, 0),
             )
-            yield MemoryFrame(index, shot.time_s, shot.visit, view), no_truth(len(found.labels))
+            frame = MemoryFrame(index, shot.time_s, shot.visit, view)
+            yield read_only(frame), no_truth(len(found.labels))
 
 
 def _sources(camera: _CameraFile, intrinsics: Intrinsics, roll_rad: float) -> NDArray[np.int64]:
@@ -169,25 +194,28 @@ def _camera_of(path: Path) -> _CameraFile:
 
 
 def _shots_of(folder: Path, up: UpAxis) -> list[_Shot]:
-    poses = _rows(folder / "groundtruth.txt", 7)
+    poses = _rows(folder / POSES_FILE, 7)
     pose_times_s = [time_s for time_s, _ in poses]
-    colours = _rows(folder / "rgb.txt", 1) if (folder / "rgb.txt").exists() else []
+    colours = _rows(folder / RGB_FILE, 1) if (folder / RGB_FILE).exists() else []
     colour_times_s = [time_s for time_s, _ in colours]
     lines = {line.depth: line for line in read_frame_lines(folder)} if (folder / FRAMES_FILE).exists() else {}
     shots: list[_Shot] = []
     start_s = None
-    for time_s, (depth,) in _rows(folder / "depth.txt", 1):
+    for time_s, (depth,) in _rows(folder / DEPTH_FILE, 1):
         at = _nearest(pose_times_s, time_s)
         if at is None:
             continue
         start_s = time_s if start_s is None else start_s
-        pose, roll_rad = pose_of(_matrix(folder / "groundtruth.txt", poses[at][1]), up)
+        pose, roll_rad = pose_of(_matrix(folder / POSES_FILE, poses[at][1]), up)
         colour = _nearest(colour_times_s, time_s)
         line = lines.get(depth)
         visit = 1
         if shots:
             visit = shots[-1].visit + int(time_s - start_s - shots[-1].time_s > VISIT_GAP_S)
         rgb = None if colour is None else colours[colour][1][0]
+        for name in (depth, rgb, None if line is None else line.masks, None if line is None else line.features):
+            if name is not None and not (folder / name).is_file():
+                raise StoreError(f"{folder / name}: is missing; the recording names it at {time_s} s")
         shots.append(_Shot(time_s - start_s, visit, pose, roll_rad, depth, rgb, line))
     if not shots:
         raise StoreError(f"{folder}: no depth image has a pose within {SAME_TIME_S} s")
