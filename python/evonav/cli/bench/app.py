@@ -113,6 +113,19 @@ def navigation(
 
 
 @bench_app.command(cls=Command)
+def mapping(
+    limit: Limit = None, repeats: Repeats = 1, peer: Peers = None, out: BenchOut = None, against: Against = None
+) -> None:
+    """Measure the time of a map's update.
+
+    Peers: octomap, open3d.
+    """
+    from evonav.speed_benchmark import mapping as section
+
+    _run(section, limit, repeats, peer, out, against)
+
+
+@bench_app.command(cls=Command)
 def gym(
     num_envs: Annotated[
         list[str] | None,
