@@ -1,4 +1,4 @@
-"""Updates of a map, frame by frame on a walk: agents' occupancy beside volumes of OctoMap and Open3D."""
+"""Updates of a map, frame by frame on a walk: agents' occupancy beside volumes of OctoMap."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ from evonav.world.simulator import Intrinsics, OccupancyGrid
 NAME, TITLE = "mapping", "Mapping"
 NOTES = """Bundled houses, 36 views in each: at three reachable places, a turn in steps of 30 degrees; 300x300, range
 3 m. Every map begins empty in each house. Maps differ in what they are: evonav's agents know cells on the ground,
-cast on the oracle occupancy as in the paper; OctoMap and Open3D's TSDF make a volume of the depth image, with voxels as
+cast on the oracle occupancy as in the paper; OctoMap makes a volume of the depth image, with voxels as
 wide as evonav's cells. So the ratio says what one sort of map costs beside the other, not which code is faster. Points
-and images are prepared beforehand and not timed.
+are prepared beforehand and not timed.
 """
 NUM_HOUSES = 4
 PLACES_PER_HOUSE, VIEWS_PER_PLACE = 3, 12
 RANGE_M = 3.0
-PEERS = ("octomap", "open3d")
+PEERS = ("octomap",)
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,7 @@ def measure(sampling: Sampling) -> Iterator[Row]:
         seen = visible_occupancy(view.grid, view.pose, view.intrinsics, RANGE_M)
         return maps[view.house].integrate(seen, (view.pose.x_m, view.pose.z_m))
 
-    makers: dict[str, type[Octree] | type[Volume]] = {"octomap": Octree, "open3d": Volume}
-    peers = {makers[name].TITLE: makers[name](views) for name in chosen}
+    peers = {Octree.TITLE: Octree(views)} if chosen else {}
 
     def prepare(number: int) -> None:
         view = views[number]
@@ -101,60 +100,6 @@ class Octree:
     def __call__(self, _number: int) -> object:
         """Insert the points."""
         return self._tree.insertPointCloud(self._points_m, self._origin_m, RANGE_M)
-
-
-class Volume:
-    """Open3D's scalable TSDF volume, without colours."""
-
-    TITLE = "Open3D ScalableTSDFVolume"
-
-    def __init__(self, views: list[MapView]) -> None:
-        """Begin without a volume.
-
-        Raises:
-            StoreError: Open3D is not installed.
-        """
-        self._library = optional_module("open3d", "the peer open3d needs its library", INSTALL)
-        self._views = views
-
-    def prepare(self, number: int) -> None:
-        """Turn the view into Open3D's types, and begin a volume in a new house."""
-        open3d, view = self._library, self._views[number]
-        if view.is_first:
-            integration = open3d.pipelines.integration
-            self._volume = integration.ScalableTSDFVolume(
-                voxel_length=view.grid.cell_m,
-                sdf_trunc=3.0 * view.grid.cell_m,
-                color_type=integration.TSDFVolumeColorType.NoColor,
-            )
-        height_px, width_px = view.depth_m.shape
-        depth_m = np.where(np.isfinite(view.depth_m), view.depth_m, 0.0).astype(np.float32)
-        self._image = open3d.geometry.RGBDImage.create_from_color_and_depth(
-            open3d.geometry.Image(np.zeros((height_px, width_px, 3), np.uint8)),
-            open3d.geometry.Image(depth_m),
-            depth_scale=1.0,
-            depth_trunc=RANGE_M,
-            convert_rgb_to_intensity=False,
-        )
-        focal_px = view.intrinsics.focal_px
-        centre_px = (width_px - 1) / 2.0, (height_px - 1) / 2.0
-        self._camera = open3d.camera.PinholeCameraIntrinsic(width_px, height_px, focal_px, focal_px, *centre_px)
-        self._extrinsic = _camera_from_world(view.pose)
-
-    def __call__(self, _number: int) -> object:
-        """Fuse the depth image."""
-        return self._volume.integrate(self._image, self._camera, self._extrinsic)
-
-
-def _camera_from_world(pose: Pose) -> NDArray[np.float64]:
-    """Return the `(4, 4)` matrix from the right-handed world with z up, where y and z change places."""
-    sin_y, cos_y = np.sin(pose.yaw_rad), np.cos(pose.yaw_rad)
-    sin_p, cos_p = np.sin(pose.horizon_rad), np.cos(pose.horizon_rad)
-    axes = [[cos_y, 0, -sin_y], [-sin_y * sin_p, -cos_p, -cos_y * sin_p], [sin_y * cos_p, -sin_p, cos_y * cos_p]]
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.array(axes)[:, [0, 2, 1]]
-    matrix[:3, 3] = -matrix[:3, :3] @ np.array(pose.position_m)[[0, 2, 1]]
-    return matrix
 
 
 def _views(num_houses: int) -> list[MapView]:

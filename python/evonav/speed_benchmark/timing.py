@@ -18,7 +18,7 @@ NUM_RESAMPLES = 2000
 INSTALL = "'evonav[bench]'"
 MODULES = {"embreex": "embreex", "moderngl": "moderngl", "pyastar2d": "pyastar2d", "scikit-image": "skimage"}
 """Module of each peer that only some installations have, by the peer's name; other peers are always there."""
-MODULES |= {"octomap": "octomap", "open3d": "open3d"}
+MODULES["octomap"] = "octomap"
 MODULES["scipy"] = "scipy.sparse.csgraph"
 
 OnProgress = Callable[[int, int, str], None]

@@ -118,7 +118,7 @@ def mapping(
 ) -> None:
     """Measure the time of a map's update.
 
-    Peers: octomap, open3d.
+    Peers: octomap.
     """
     from evonav.speed_benchmark import mapping as section
 
