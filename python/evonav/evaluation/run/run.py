@@ -1,6 +1,7 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
+import secrets
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.episode.spec import opaque_task_id
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -26,7 +28,11 @@ from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import FORMER, former_digest
 from evonav.tasks.listing import TaskFile
 
+NAMES_KEY = "key_of_names"
+"""Place in a run's header of the secret key by which agents' names of tasks are made; nothing shows it."""
+
 __all__ = [
+    "NAMES_KEY",
     "NUM_RETRIES",
     "Progress",
     "RunConfig",
@@ -168,6 +174,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         _claim(store, request)
         if retry_errored:
             _forget_errored(store, request)
+        secret = store.meta(NAMES_KEY)
         states = store.states()
         floor_plans = store.floor_plan_keys()
     config = request.config
@@ -176,7 +183,9 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
-    for task in request.tasks:
+    names = {task.task_id: opaque_task_id(secret, task.task_id) for task in request.tasks}
+    # An agent's process may count its episodes: in the order of the tasks' ids, the number would tell the task.
+    for task in sorted(request.tasks, key=lambda task: names[task.task_id]):
         stages = range(1, task.num_stages + 1)
         agents = [name for name in request.agents if any((name, task.task_id, stage) not in states for stage in stages)]
         are_missing = any((task.task_id, stage) not in floor_plans for stage in stages)
@@ -184,6 +193,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
             EpisodeJob(
                 agent,
                 task.task_id,
+                names[task.task_id],
                 str(task.path.absolute()),
                 agent_seed(config.seed, agent, task.task_id),
                 perception_seed(config.seed, task.task_id),
@@ -324,5 +334,6 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
+            NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }
     )

@@ -12,7 +12,7 @@ process or a failure of the harness; `evonav.evaluation.run.scheduler` retries a
 import json
 from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -58,6 +58,8 @@ class EpisodeJob:
 
     agent: str
     task_id: str
+    opaque_id: str
+    """The task's name for the agent."""
     path: str
     """Folder of the task."""
     seed: int
@@ -202,7 +204,7 @@ class EpisodeWork:
         job, context = EpisodeJob(**json.loads(head)), self._context(config_text)
         num_left = _Retries(context.config.num_retries)
         try:
-            spec = context.config.backend.tasks.create(Path(job.path))
+            spec = replace(context.config.backend.tasks.create(Path(job.path)), opaque_id=job.opaque_id)
             is_whole = False
             while not is_whole:
                 is_whole = True
