@@ -24,7 +24,7 @@ from typing import Any, Literal, Protocol
 from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import wire
-from evonav.agents.hosting.error_text import clean, describe, traceback_of
+from evonav.agents.hosting.error_text import describe, message_of, traceback_of
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
@@ -165,7 +165,7 @@ class _Server:
         try:
             parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
-            return {"failure": _failed("decision", clean(str(error)), error)}
+            return {"failure": _failed("decision", message_of(error), error)}
         except Exception as error:
             return {"failure": _failed("agent", describe(error), error)}
         return parts
@@ -209,7 +209,7 @@ class _Server:
             try:
                 parts["diagnostics"] = wire.DIAGNOSTICS.write(explaining_agent.diagnostics())
             except DecisionError as error:
-                parts["diagnostics_failure"] = _failed("decision", clean(str(error)), error)
+                parts["diagnostics_failure"] = _failed("decision", message_of(error), error)
             except Exception as error:
                 parts["diagnostics_failure"] = _failed("agent", describe(error), error)
         return parts

@@ -15,6 +15,7 @@ from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosti
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
@@ -326,6 +327,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
                 "(docs/tasks.md says how to make them)"
             )
         check_same_run(stored, wanted, request.run_dir)
+        set_aside_invalid(store)
     store.set_header(
         {
             "config": wanted,
@@ -334,6 +336,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
+            CHECKED_KEY: True,
             NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }
     )

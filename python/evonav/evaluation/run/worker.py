@@ -31,6 +31,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
+from evonav.parallel.local import EndedError
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
@@ -121,7 +122,9 @@ class WorkerContext:
             if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINES:
                 return self._debugged_agent(job)
             return make_agent(job.agent, self.config.backend.decision.create(job.seed))
-        except Exception as error:
+        except (KeyboardInterrupt, EndedError):
+            raise
+        except BaseException as error:
             return _FailedAgent(error)
 
     def _debugged_agent(self, job: EpisodeJob) -> HostedAgent:
@@ -147,7 +150,7 @@ class WorkerContext:
 class _FailedAgent(LocalAgent):
     """An agent that could not be made: every stage of it is errored with the same error."""
 
-    def __init__(self, error: Exception) -> None:
+    def __init__(self, error: BaseException) -> None:
         self._error = error
 
     @property
