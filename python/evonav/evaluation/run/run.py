@@ -6,11 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from evonav._core import __version__
+from evonav.agents.hosting.sandbox import why_not
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.spec import opaque_task_id
+from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -148,6 +151,7 @@ def evaluate_all(
         if not (request.run_dir / FILE_NAME).exists():  # a run that cannot begin leaves no folder behind
             request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
+        requests = _with_scratch(requests, stack)
         runs: list[RunJobs] = []
         for index, request in enumerate(requests):
             stack.enter_context(writing(request.run_dir))
@@ -205,7 +209,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     if jobs:
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)
-            note_session(store, num_workers)
+            note_session(store, num_workers, isolation_facts(hosting.isolation))
     return RunJobs(request.run_dir, worker_config, limit_s, request.agents, request.tasks, jobs, states)
 
 
@@ -221,11 +225,23 @@ def _forget_errored(store: RunStore, request: RunRequest) -> None:
             store.forget_episode(agent, task_id, stage)
 
 
+def _with_scratch(requests: Sequence[RunRequest], stack: ExitStack) -> Sequence[RunRequest]:
+    """Give sandboxes a folder that is deleted at the end, also if a worker could not clean up."""
+    if not any(request.config.hosting.is_sandboxed for request in requests):
+        return requests
+    scratch = stack.enter_context(TemporaryDirectory(prefix="evonav-agents-", ignore_cleanup_errors=True))
+    configs = [replace(one.config, hosting=replace(one.config.hosting, scratch=scratch)) for one in requests]
+    return [replace(one, config=config) for one, config in zip(requests, configs, strict=True)]
+
+
 def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
     hosting = request.config.hosting
     return replace(
         hosting,
         is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
+        hidden=tuple(
+            sorted({str(request.run_dir.absolute()), *(str(t.path.absolute().parent) for t in request.tasks)})
+        ),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
 
@@ -244,7 +260,7 @@ def perception_seed(seed: int, task_id: str) -> int:
 def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
     if len({request.run_dir.absolute() for request in requests}) != len(requests):
         raise InvalidArgumentError("two runs have the same folder")
-    checked: set[tuple[str, bool]] = set()
+    checked: set[tuple[str, str]] = set()
     for request in requests:
         if not request.agents:
             raise InvalidArgumentError("no agent to evaluate")
@@ -252,7 +268,9 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
             raise InvalidArgumentError(f"an agent is named twice: {', '.join(request.agents)}")
         if not request.tasks:
             raise InvalidArgumentError("no task to evaluate on")
-        is_in_process = _hosting(request, num_workers).is_in_process
+        hosting = _hosting(request, num_workers)
+        if hosting.is_sandboxed:
+            _check_sandbox(hosting, request.config.backend)
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
@@ -262,9 +280,24 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
                     "or use num_workers=0"
                 )
         for agent in request.agents:
-            if (agent, is_in_process) not in checked:
-                check_agent_name(agent, is_in_process=is_in_process)
-                checked.add((agent, is_in_process))
+            if (agent, hosting.isolation) not in checked:
+                check_agent_name(agent, hosting)
+                checked.add((agent, hosting.isolation))
+
+
+def _check_sandbox(hosting: AgentHosting, backend: Backend) -> None:
+    """Check that agents can be shut in.
+
+    Raises:
+        InvalidArgumentError: They cannot, and why.
+    """
+    reason = why_not()
+    if hosting.is_in_process:
+        reason = reason or "agents run in the evaluator's own process: use one worker or more"
+    if backend.decision.host_options or "path" in backend.decision.options:
+        reason = reason or "the decision model needs files or a network, which a sandbox shuts: use `process`"
+    if reason:
+        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:

@@ -233,8 +233,9 @@ class EpisodeWork:
 
     def close(self) -> None:
         """Close all contexts."""
-        while self._contexts:
-            self._contexts.popitem()[1].close()
+        for context in self._contexts.values():
+            context.close()
+        self._contexts.clear()
 
 
 def _text(event: EncodedStage | StageFailure | None) -> str:
