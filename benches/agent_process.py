@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from evonav.agents.agent import AgentAction, SensorConfig, Stop
+from evonav.agents.hosting.sandbox import why_not
 from evonav.component import Component
 from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
@@ -30,7 +31,9 @@ from evonav.world.simulator import Intrinsics
 NOTES = """A round: the observation to an agent that does nothing, and its answer. The peer sends the observation by
 `multiprocessing.Pipe`, pickled. CPU is the sum of both processes; wall time is the least of all rounds, since both want
 a core at once. An evaluation: `fu` on bundled tasks, CPU of the worker and the agent by the records' timings, medians
-of pairs of runs in turn; stages a second are wall time, with the start of all processes, at 1 and 2 workers.
+of pairs of runs in turn; stages a second are wall time, with the start of all processes, at 1 and 2 workers. A
+sandbox: the same with `--isolation sandbox` and one worker, against `--isolation process`; a start is of one process,
+with the import of the agent.
 """
 SIDE_PX = 300
 NUM_ROUNDS = 200
@@ -55,10 +58,10 @@ class Idle:
 
 
 def run() -> str:
-    """Both tables."""
+    """All tables."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, range(os.cpu_count() or 1))  # two processes at a time
-    return "\n".join([*_rounds(), "", *_evaluations()])
+    return "\n".join([*_rounds(), "", *_evaluations(), "", *_sandboxes()])
 
 
 # A round
@@ -165,8 +168,9 @@ def _evaluations() -> Iterator[str]:
     yield "| --- | --- | --- | --- | --- | --- | --- | --- |"
     own, shared = [], []
     for _ in range(NUM_PAIRS):
-        own.append((_evaluated(1, is_in_process=False), _evaluated(2, is_in_process=False)))
-        shared.append((_evaluated(1, is_in_process=True), _evaluated(2, is_in_process=True)))
+        own.append((_evaluated(1, AgentHosting()), _evaluated(2, AgentHosting())))
+        within = AgentHosting(is_in_process=True)
+        shared.append((_evaluated(1, within), _evaluated(2, within)))
     cpu_ms = 1e3 * statistics.median(one[0] for one, _ in own)
     shared_ms = 1e3 * statistics.median(one[0] for one, _ in shared)
     ratio = statistics.median(a[0][0] / b[0][0] for a, b in zip(own, shared, strict=True))
@@ -175,9 +179,9 @@ def _evaluations() -> Iterator[str]:
     yield f"| {NUM_TASKS} tasks | {cpu_ms:.0f} ms | {shared_ms:.0f} ms | {ratio:.3f} | {said} |"
 
 
-def _evaluated(num_workers: int, *, is_in_process: bool) -> tuple[float, float]:
+def _evaluated(num_workers: int, hosting: AgentHosting) -> tuple[float, float]:
     """CPU seconds a stage, and stages a second."""
-    config = RunConfig(hosting=AgentHosting(is_in_process=is_in_process))
+    config = RunConfig(hosting=hosting)
     with bundled_tasks() as directory, TemporaryDirectory() as folder:
         began_s = time.perf_counter()
         evaluate(["fu"], task_files(directory, NUM_TASKS), Path(folder), config=config, num_workers=num_workers)
@@ -185,3 +189,29 @@ def _evaluated(num_workers: int, *, is_in_process: bool) -> tuple[float, float]:
         with RunStore(Path(folder)) as store:
             cpu_s = [cpu_s for _, cpu_s in store.timings().values()]
     return statistics.mean(cpu_s), len(cpu_s) / wall_s
+
+
+# A sandbox
+
+
+def _sandboxes() -> Iterator[str]:
+    yield "| `fu`, bundled | CPU a stage: sandbox | process | ratio | start: sandbox | process |"
+    yield "| --- | --- | --- | --- | --- | --- |"
+    if reason := why_not():
+        yield f"| none here | {reason} |"
+        return
+    hostings = (AgentHosting(is_sandboxed=True), AgentHosting())
+    pairs = [[_evaluated(1, hosting)[0] for hosting in hostings] for _ in range(2 * NUM_PAIRS + 1)]
+    starts = [[_start_s(hosting) for hosting in hostings] for _ in range(2 * NUM_PAIRS + 1)]
+    ratio = statistics.median(shut / free for shut, free in pairs)
+    shut_ms, free_ms = (1e3 * statistics.median(column) for column in zip(*pairs, strict=True))
+    start_s = " | ".join(f"{statistics.median(column):.2f} s" for column in zip(*starts, strict=True))
+    yield f"| {NUM_TASKS} tasks | {shut_ms:.0f} ms | {free_ms:.0f} ms | {ratio:.3f} | {start_s} |"
+
+
+def _start_s(hosting: AgentHosting) -> float:
+    """Wall seconds until a process waits for requests."""
+    began_s = time.perf_counter()
+    with closing(AgentProcesses(hosting)) as processes:
+        processes.process("fu")
+        return time.perf_counter() - began_s

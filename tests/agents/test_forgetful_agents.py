@@ -9,6 +9,7 @@ from evonav.agents.registry import BUILT_IN, agent_factory, new_agent, with_rule
 from evonav.cli import app
 from evonav.cli.options.shared import names_of
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import check_agent_name
 
 FORGETFUL = ("fu", "stage-reset", "ftu", "ftu-relook", "3d-mem", "3d-mem+", "msgnav", "msgnav+")
@@ -28,7 +29,7 @@ def test_agents_with_object_entries_of_ours_take_a_rule() -> None:
 def test_a_rule_that_does_not_exist_is_named_with_the_nearest() -> None:
     for is_in_process in (True, False):
         with pytest.raises(InvalidArgumentError, match=r"no forgetting rule 'baies': did you mean `bayes`[?]$"):
-            check_agent_name("fu@baies", is_in_process=is_in_process)
+            check_agent_name("fu@baies", AgentHosting(is_in_process=is_in_process))
 
 
 def test_every_agent_is_combined_with_every_rule() -> None:

@@ -23,7 +23,7 @@ from evonav.replay.replay import RunReplay
 from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import KEY, check_request, serving
 
-COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--in-process")
+COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--isolation", "none")
 
 
 def run(*arguments: object) -> tuple[int, str]:

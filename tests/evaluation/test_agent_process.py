@@ -352,13 +352,13 @@ def test_processes_are_reused_and_agents_are_not():
 
 
 def test_agents_are_looked_for_in_a_process_of_their_own():
-    check_importable("unruly_agents:Echo")
+    check_importable("unruly_agents:Echo", AgentHosting())
     assert "prying_agent" not in sys.modules
-    check_importable("prying_agent:Prying")
+    check_importable("prying_agent:Prying", AgentHosting())
     assert "prying_agent" not in sys.modules
     for name in ("nobody", "unruly_agents:Nobody", "no_such_module:Agent", f"{os.devnull}.py:Agent"):
         with pytest.raises(InvalidArgumentError, match=r"no agent|cannot be imported"):
-            check_importable(name)
+            check_importable(name, AgentHosting())
 
 
 def test_an_agent_is_loaded_from_its_file(tasks, tmp_path):

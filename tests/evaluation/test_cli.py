@@ -82,7 +82,7 @@ def test_an_incomplete_run_says_so(tmp_path):
 
 def test_equal_failures_are_listed_once(tmp_path):
     agent = "toy_agents:AlwaysRaising"
-    result = run("evaluate", "--agent", agent, "--limit", 1, "--workers", 0, "--in-process", "--out", tmp_path)
+    result = run("evaluate", "--agent", agent, "--limit", 1, "--workers", 0, "--isolation", "none", "--out", tmp_path)
     assert "4 stages errored: the agent failed" in result.stdout
     listed = run("failures", tmp_path, "--agent", agent).stdout
     assert listed.count("RuntimeError: no idea") == 2  # in the heading, and below the only traceback

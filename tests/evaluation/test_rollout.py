@@ -11,7 +11,6 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import make_agent
-from evonav.evaluation.run.run import perception_seed
 from evonav.perception.ground_truth import GroundTruthPerception
 
 
@@ -98,22 +97,3 @@ def test_the_reference_path_is_computed_before_the_agent_knows_the_goal():
     events = []
     run_episode("toy-moved", Listening(events), ProtocolConfig(max_rounds=1), Planning(events))
     assert events == ["path", "goal", "act", "path"] * 3
-
-
-def test_the_task_has_another_name_for_agents_which_all_agents_of_a_run_share():
-    def name_of(task_id, seed, run_seed):
-        agent = Listening([])
-        spec, protocol = episode_spec(task_id), ProtocolConfig(max_rounds=1)
-        parts = (ToySimulator(), GroundTruthPerception(), protocol, seed)
-        next(Episode(spec, "agent", agent, *parts, perception_seed=perception_seed(run_seed, task_id)).run())
-        return agent.task_id
-
-    names = [
-        name_of("toy-moved", 1, 0),
-        name_of("toy-moved", 2, 0),
-        name_of("toy-moved", 1, 5),
-        name_of("toy-static", 1, 0),
-    ]
-    assert names[0] == names[1]
-    assert len(set(names)) == 3
-    assert not any("toy" in name for name in names)

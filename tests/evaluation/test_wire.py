@@ -13,15 +13,25 @@ from evonav.agents.hosting import wire
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
 
-COORDINATES = st.floats(allow_nan=False, allow_infinity=False)
+COORDINATES = st.floats(-wire.MAX_M, wire.MAX_M)
+SIZES = st.floats(0.0, wire.MAX_M)
 POINTS = st.tuples(COORDINATES, COORDINATES)
 TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=20)
 ENTRIES = st.builds(
     EntryBelief,
-    st.integers(),
+    st.integers(-(2**63), 2**63 - 1),
     TEXTS,
     st.tuples(COORDINATES, COORDINATES, COORDINATES),
-    st.tuples(COORDINATES, COORDINATES, COORDINATES),
+    st.tuples(SIZES, SIZES, SIZES),
+    st.integers(0, wire.MAX_COUNT),
+)
+ANY_NUMBERS = st.floats() | st.integers()
+ANY_ENTRIES = st.builds(
+    EntryBelief,
+    st.integers(),
+    st.text(max_size=20) | st.just("x" * 1001),
+    st.tuples(ANY_NUMBERS, ANY_NUMBERS, ANY_NUMBERS),
+    st.tuples(ANY_NUMBERS, ANY_NUMBERS, ANY_NUMBERS),
     st.integers(),
 )
 ACTIONS = st.one_of(
@@ -41,6 +51,22 @@ def test_beliefs_are_read_as_written(entries, details) -> None:
     assert wire.ENTRIES.read(wire.ENTRIES.write(entries)) == entries
     told = RoundDiagnostics("object 1", next(iter(entries), None), 3, 4, {"conflicts": 2}, details)
     assert wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(told)) == told
+
+
+@given(ANY_ENTRIES, st.integers(), st.integers())
+def test_beliefs_are_refused_or_within_their_limits(entry, num_entries, count) -> None:
+    told = RoundDiagnostics("", entry, num_entries, 0, {"conflicts": count})
+    try:
+        (read,) = wire.ENTRIES.read(wire.ENTRIES.write([entry]))
+        found = wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(told))
+    except InvalidArgumentError:
+        return
+    assert found.chosen_entry == read
+    assert all(abs(value) <= wire.MAX_M for value in read.centre_m)
+    assert all(0.0 <= value <= wire.MAX_M for value in read.size_m)
+    assert abs(read.entry_id) <= 2**63
+    assert 0 <= found.num_entries <= wire.MAX_COUNT
+    assert abs(found.counters["conflicts"]) <= wire.MAX_COUNT
 
 
 def test_numbers_of_numpy_and_halves_of_pairs_are_written() -> None:

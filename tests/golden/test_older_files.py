@@ -21,7 +21,7 @@ from evonav.tasks import write_task
 from evonav.tasks.bundled import FORMER, FORMER_IMAGES
 
 DATA = Path(__file__).with_name("data")
-OPTIONS = ("--limit", 1, "--noise", "wrong=0.2", "--perception", "noisy:good", "--in-process")
+OPTIONS = ("--limit", 1, "--noise", "wrong=0.2", "--perception", "noisy:good", "--isolation", "none")
 
 
 def _evonav(*arguments: object, error: str = "") -> str:

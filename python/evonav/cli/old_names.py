@@ -13,12 +13,14 @@ OLD_COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """The words that stand for a command that was renamed or moved."""
 _AGENTS = {"--agents": "--agent"}
+_IN_PROCESS = {"--in-process": "--isolation=none"}
 OLD_OPTIONS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "evonav check-agent": {"--timeout": "--agent-timeout"},
-        "controlled evaluate": _AGENTS,
-        "evonav demo": _AGENTS,
-        "evonav evaluate": _AGENTS,
+        "controlled evaluate": {**_AGENTS, **_IN_PROCESS},
+        "evonav demo": {**_AGENTS, **_IN_PROCESS},
+        "evonav evaluate": {**_AGENTS, **_IN_PROCESS},
+        "evonav sweep": _IN_PROCESS,
         "evonav measures": {**_AGENTS, "--out": "--md"},
         "evonav pack": _AGENTS,
         "evonav paper": {"--out": "--md"},

@@ -54,14 +54,18 @@ class ProtocolConfig:
         """Reject sensors that the protocol does not grant.
 
         Raises:
-            InvalidArgumentError: The motion is neither `waypoints` nor `actions`, a schedule has no views or too many,
-                or travel or range exceed the caps.
+            InvalidArgumentError: The motion is neither `waypoints` nor `actions`, a schedule has no views, too many or
+                more than a full turn between two, or travel or range exceed the caps.
         """
         if sensors.motion not in ("waypoints", "actions"):
             raise InvalidArgumentError(f"sensors.motion = {sensors.motion!r}: must be `waypoints` or `actions`")
         for name, schedule in (("first_round", sensors.first_round), ("later_rounds", sensors.later_rounds)):
             if not 1 <= schedule.count <= self.max_views:
                 raise InvalidArgumentError(f"sensors.{name}.count = {schedule.count}: must be 1..{self.max_views}")
+            if not abs(schedule.spacing_deg) <= 360.0:
+                raise InvalidArgumentError(
+                    f"sensors.{name}.spacing_deg = {schedule.spacing_deg}: must be at most 360 degrees"
+                )
         if not 0.0 < sensors.max_travel_m <= self.max_travel_m:
             raise InvalidArgumentError(
                 f"sensors.max_travel_m = {sensors.max_travel_m}: must be in (0, {self.max_travel_m}]"

@@ -102,11 +102,15 @@ def _without_main() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
+class EndedError(SystemExit):
+    """The end of this process, which was asked for by its parent: nothing may take it for an error of an agent."""
+
+
 def end_with_parent() -> None:
     """Make a child ignore interrupts and end with its parent, running every `finally`."""
 
     def end(number: int, _: object) -> None:
-        raise SystemExit(128 + number)
+        raise EndedError(128 + number)
 
     def watch() -> None:
         parent = multiprocessing.parent_process()

@@ -81,4 +81,8 @@ def serve(work_name: str, settings: str, jobs: Iterator[str], send: Callable[[st
             for kind, message in steps(work, text):
                 send(kind, message)
     finally:
-        end_work(work)
+        try:
+            end_work(work)
+        except SystemExit:  # the parent's signal came in the middle of it, or before its first line
+            end_work(work)
+            raise

@@ -20,13 +20,13 @@ from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
-from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.episode.spec import EpisodeSpec, opaque_task_id
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.record_diff import record_differences
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, make_agent
-from evonav.evaluation.run.run import agent_seed, perception_seed
+from evonav.evaluation.run.run import NAMES_KEY, agent_seed, perception_seed
 from evonav.evaluation.run.settings import EXCHANGES_NAME
 from evonav.perception.weights import MODELS_VARIABLE
 from evonav.replay.recorder import Loss, Recorder
@@ -72,6 +72,7 @@ class RunReplay:
         with RunStore(run_dir) as store:
             config = store.meta("config") or {}
             models = store.meta("models_dir")
+            self._secret: str = store.meta(NAMES_KEY) or ""  # runs of earlier versions have none
         try:
             self.seed = int(config["seed"])
             self.protocol = ProtocolConfig.from_header(config["protocol"])
@@ -124,7 +125,9 @@ class RunReplay:
             raise InvalidArgumentError(
                 f"{self._run_dir}: no record of task {task_id!r} by agent {agent!r}{_near(self._run_dir, task_id)}"
             )
-        case = self.backend.tasks.create(self._task_path(task_id))
+        case = replace(
+            self.backend.tasks.create(self._task_path(task_id)), opaque_id=opaque_task_id(self._secret, task_id)
+        )
         for stage in self._stages(case, agent, stored, maps, on_round):
             yield replace(stage, differences=_differences(texts.get(stage.record.stage), stage))
 

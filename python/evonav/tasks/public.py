@@ -21,7 +21,7 @@ class TaskInfo:
     """
 
     task_id: str
-    """A name for the task, the same for all agents of a run; it does not tell the house or how it was generated."""
+    """A name for the task in this run, the same for all its agents. Another run has another name: it tells nothing."""
     num_stages: int
     max_rounds: int
     """Decision rounds per stage (paper: 50)."""

@@ -8,6 +8,8 @@ MAX_MESSAGE = 2000
 """Longest message of an error, in characters."""
 MAX_TRACEBACK = 20_000
 """Longest traceback, in characters; its end is what remains."""
+MAX_NAME = 200
+"""Longest name of a type, module or function in a message, in characters."""
 NUM_FRAMES = 3
 """Number of places of a traceback, the innermost ones."""
 
@@ -26,24 +28,26 @@ def describe(error: BaseException, *, caller: str | None = None) -> str:
         error: The exception.
         caller: Package that called the agent in this process; its own places are left out.
     """
-    try:
-        text = str(error)
-    except Exception:
-        text = "(its message cannot be read)"
-    text = _ADDRESS.sub("0x...", f"{type(error).__name__}: {text}")
-    text = clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
+    text = _bounded(_ADDRESS.sub("0x...", f"{_type_name(error)}: {_message(error)}"))
     if "NoneType" in text and _reads_colours(error.__traceback__):
         text += f" ({COLOURS_HINT})"
     places = _places(error.__traceback__, _OURS if caller is None else (*_OURS, f"{caller}."))
     return f"{text} [{' > '.join(places)}]" if places else text
 
 
+def message_of(error: BaseException) -> str:
+    """Return an exception's message alone, cut to its limit."""
+    return _bounded(_message(error))
+
+
 def traceback_of(error: BaseException) -> str:
     """Return the whole traceback, for people who look for the cause; it differs from process to process."""
     try:
         return clean("".join(traceback.format_exception(error)))[-MAX_TRACEBACK:]
-    except Exception:  # its message cannot be read
-        return f"{type(error).__name__}"
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # its message cannot be read
+        return _type_name(error)
 
 
 def clean(text: str) -> str:
@@ -51,12 +55,33 @@ def clean(text: str) -> str:
     return text.encode("utf-8", "replace").decode()
 
 
+def _bounded(text: str) -> str:
+    return clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
+
+
+def _type_name(error: BaseException) -> str:
+    """Return the name of an exception's type, which its metaclass cannot hide."""
+    name: str = type.__dict__["__name__"].__get__(type(error))
+    return name[:MAX_NAME]
+
+
+def _message(error: BaseException) -> str:
+    """Return an exception's message, cut to a few times its limit; the agent's code may run, and raise anything."""
+    try:
+        return str(error)[: 4 * MAX_MESSAGE]
+    except KeyboardInterrupt:
+        raise
+    except BaseException:
+        return "(its message cannot be read)"
+
+
 def _places(trace: TracebackType | None, outside: tuple[str, ...]) -> list[str]:
     places: list[str] = []
     while trace is not None:
-        module = str(trace.tb_frame.f_globals.get("__name__", "?"))
+        found = trace.tb_frame.f_globals.get("__name__")
+        module = found[:MAX_NAME] if isinstance(found, str) else "?"
         if places or not module.startswith(outside):
-            places.append(clean(f"{module}:{trace.tb_lineno} in {trace.tb_frame.f_code.co_name}"))
+            places.append(clean(f"{module}:{trace.tb_lineno} in {trace.tb_frame.f_code.co_name[:MAX_NAME]}"))
         trace = trace.tb_next
     return places[-NUM_FRAMES:]
 

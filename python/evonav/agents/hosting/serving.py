@@ -23,8 +23,8 @@ from typing import Any, Literal, Protocol
 
 from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
-from evonav.agents.hosting import wire
-from evonav.agents.hosting.error_text import clean, describe, traceback_of
+from evonav.agents.hosting import sandbox, wire
+from evonav.agents.hosting.error_text import describe, message_of, traceback_of
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
@@ -165,7 +165,7 @@ class _Server:
         try:
             parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
-            return {"failure": _failed("decision", clean(str(error)), error)}
+            return {"failure": _failed("decision", message_of(error), error)}
         except Exception as error:
             return {"failure": _failed("agent", describe(error), error)}
         return parts
@@ -209,7 +209,7 @@ class _Server:
             try:
                 parts["diagnostics"] = wire.DIAGNOSTICS.write(explaining_agent.diagnostics())
             except DecisionError as error:
-                parts["diagnostics_failure"] = _failed("decision", clean(str(error)), error)
+                parts["diagnostics_failure"] = _failed("decision", message_of(error), error)
             except Exception as error:
                 parts["diagnostics_failure"] = _failed("agent", describe(error), error)
         return parts
@@ -238,7 +238,7 @@ def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) 
 def peak_memory_mb(process: int | str = "self") -> float | None:
     """Return the peak of a process's resident memory; `None` where the system does not report it."""
     try:
-        status = Path(f"/proc/{process}/status").read_text()
+        status = sandbox.own_status() if process == "self" else Path(f"/proc/{process}/status").read_text()
     except OSError:
         return None
     found = next((line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")), None)

@@ -8,7 +8,7 @@ depend on where it ran.
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Generic, Literal, TypeVar
 
 import numpy as np
@@ -42,11 +42,21 @@ from evonav.world.simulator import Action
 
 MAX_DIAGNOSTICS_BYTES = 1_000_000
 """Limit of a round's diagnostics as JSON: the records hold them."""
+MAX_STAGE_BYTES = 32_000_000
+"""Limit of the diagnostics of a stage's rounds together: a record is one text."""
 MAX_ENTRIES_BYTES = 16_000_000
 MAX_DEPTH = 32
 """Limit of lists and dictionaries in each other, in diagnostics."""
 MAX_VALUE = 200
 """Longest value in an error, in characters."""
+MAX_M = 1e6
+"""Largest coordinate and edge of a box, in metres: sums and squares of such numbers are finite."""
+MAX_LABEL = 1000
+"""Longest label of an entry, in characters."""
+MAX_COUNTERS = 1000
+"""Largest number of a round's counters."""
+MAX_COUNT = 10**15
+"""Largest count and cost; sums of such numbers are still finite, and SQLite can hold them."""
 
 T = TypeVar("T")
 
@@ -60,7 +70,7 @@ class Part(Generic[T]):
         Args:
             name: Name in errors.
             adapter: Type of the value.
-            max_bytes: Limit of the JSON that is written.
+            max_bytes: Limit of the JSON that is written or read.
         """
         self._name = name
         self._adapter = adapter
@@ -76,8 +86,7 @@ class Part(Generic[T]):
             text = _json_of(value)
         except (TypeError, ValueError, RecursionError) as error:
             raise InvalidArgumentError(f"{self._name}: not JSON-ready: {error}") from error
-        if len(text) > self._max_bytes:
-            raise InvalidArgumentError(f"{self._name}: {len(text)} bytes of JSON: must be at most {self._max_bytes}")
+        self._check_size(text)
         return text
 
     def read(self, text: bytes) -> T:
@@ -86,10 +95,15 @@ class Part(Generic[T]):
         Raises:
             InvalidArgumentError: The text is malformed; the message has the first field that is wrong, and its value.
         """
+        self._check_size(text)
         try:
             return self._adapter.validate_json(text, strict=True)
         except ValidationError as error:
             raise InvalidArgumentError(_first_problem(error, self._name)) from None
+
+    def _check_size(self, text: bytes) -> None:
+        if len(text) > self._max_bytes:
+            raise InvalidArgumentError(f"{self._name}: {len(text)} bytes of JSON: must be at most {self._max_bytes}")
 
 
 def _json_of(value: object) -> bytes:
@@ -127,16 +141,19 @@ def _short_reason(stop: Stop) -> Stop:
     return Stop(stop.reason[:MAX_MESSAGE])
 
 
-def _finite(action: NavigateTo) -> NavigateTo:
-    if not all(map(math.isfinite, (*action.position_m, *(action.face_m or ())))):
+def _near(action: NavigateTo) -> NavigateTo:
+    coordinates_m = (*action.position_m, *(action.face_m or ()))
+    if not all(map(math.isfinite, coordinates_m)):
         raise ValueError("coordinates must be finite")
+    if max(map(abs, coordinates_m)) > MAX_M:
+        raise ValueError(f"coordinates must be within {MAX_M:g} m")
     return action
 
 
 _KINDS = {"move": Move, "navigate_to": NavigateTo, "stop": Stop}
 _Action = Annotated[
     Annotated[Move, AfterValidator(_one_stop), Tag("move")]
-    | Annotated[NavigateTo, AfterValidator(_finite), Tag("navigate_to")]
+    | Annotated[NavigateTo, AfterValidator(_near), Tag("navigate_to")]
     | Annotated[Stop, AfterValidator(_short_reason), Tag("stop")],
     Discriminator(lambda value: value.get("kind") if isinstance(value, dict) else None),
 ]
@@ -160,7 +177,7 @@ def read_action(text: bytes) -> AgentAction:
     """Return the action of a JSON text; a move of `STOP` is a `Stop`.
 
     Raises:
-        InvalidArgumentError: It is no action, or has a coordinate that is not finite.
+        InvalidArgumentError: It is no action, or has a coordinate that is not finite or out of range.
     """
     return _ACTION.read(text)
 
@@ -168,9 +185,35 @@ def read_action(text: bytes) -> AgentAction:
 # Beliefs
 
 
-def _shallow(diagnostics: RoundDiagnostics) -> RoundDiagnostics:
+def _possible_entry(entry: EntryBelief) -> EntryBelief:
+    if max(map(abs, entry.centre_m)) > MAX_M:
+        raise ValueError(f"centre_m must be within {MAX_M:g} m")
+    if not 0.0 <= min(entry.size_m) <= max(entry.size_m) <= MAX_M:
+        raise ValueError(f"size_m must be 0 to {MAX_M:g} m")
+    if len(entry.label) > MAX_LABEL:
+        raise ValueError(f"label must have at most {MAX_LABEL} characters")
+    if not -(2**63) <= entry.entry_id < 2**63:
+        raise ValueError("entry_id must have at most 64 bits")
+    _check_count("num_detections", entry.num_detections, 0)
+    return entry
+
+
+def _possible_diagnostics(diagnostics: RoundDiagnostics) -> RoundDiagnostics:
     _check_depth(diagnostics.details, MAX_DEPTH - 1)
-    return diagnostics
+    for name in ("num_entries", "num_frontiers"):
+        _check_count(name, getattr(diagnostics, name), 0)
+    if len(diagnostics.counters) > MAX_COUNTERS:
+        raise ValueError(f"counters must be at most {MAX_COUNTERS}")
+    for name, count in diagnostics.counters.items():
+        _check_count(f"counters.{name[:MAX_VALUE]}", count, -MAX_COUNT)
+    if diagnostics.chosen_entry is not None:
+        _possible_entry(diagnostics.chosen_entry)
+    return replace(diagnostics, choice=diagnostics.choice[:MAX_MESSAGE])
+
+
+def _check_count(name: str, count: int, least: int) -> None:
+    if not least <= count <= MAX_COUNT:
+        raise ValueError(f"{name} must be {least} to {MAX_COUNT}")
 
 
 def _check_depth(value: object, depth: int) -> None:
@@ -204,10 +247,14 @@ def write_sensors(agent: Agent) -> bytes:
 
 
 DIAGNOSTICS: Part[RoundDiagnostics] = Part(
-    "diagnostics", TypeAdapter(Annotated[RoundDiagnostics, AfterValidator(_shallow)]), MAX_DIAGNOSTICS_BYTES
+    "diagnostics",
+    TypeAdapter(Annotated[RoundDiagnostics, AfterValidator(_possible_diagnostics)]),
+    MAX_DIAGNOSTICS_BYTES,
 )
 ENTRIES: Part[list[EntryBelief]] = Part(
-    "entries", TypeAdapter(Annotated[list[EntryBelief], FailFast()]), MAX_ENTRIES_BYTES
+    "entries",
+    TypeAdapter(Annotated[list[Annotated[EntryBelief, AfterValidator(_possible_entry)]], FailFast()]),
+    MAX_ENTRIES_BYTES,
 )
 """An object memory."""
 
@@ -224,11 +271,7 @@ _CostName = Literal[
     "cost_usd",
     "agent_peak_rss_mb",
 ]
-_MAX_AMOUNT = 1e15
-"""Largest cost; sums of such numbers are still finite, and SQLite can hold them."""
-_Amount = (
-    Annotated[int, Field(ge=0, le=_MAX_AMOUNT)] | Annotated[float, Field(ge=0, le=_MAX_AMOUNT, allow_inf_nan=False)]
-)
+_Amount = Annotated[int, Field(ge=0, le=MAX_COUNT)] | Annotated[float, Field(ge=0, le=MAX_COUNT, allow_inf_nan=False)]
 COSTS = Part("costs", TypeAdapter(dict[_CostName, _Amount]), MAX_DIAGNOSTICS_BYTES)
 """Costs of an agent's decision model and process."""
 
@@ -238,10 +281,12 @@ class Failure:
     """An exception of an agent."""
 
     kind: Literal["agent", "decision"]
-    message: str
+    message: Annotated[str, AfterValidator(lambda text: text[:MAX_FAILURE])]
     traceback: Annotated[str, AfterValidator(lambda text: text[-MAX_TRACEBACK:])]
 
 
+MAX_FAILURE = 2 * MAX_MESSAGE
+"""Longest description of an exception, with the places where it was raised."""
 FAILURE = Part("failure", TypeAdapter(Failure), MAX_DIAGNOSTICS_BYTES)
 
 
@@ -251,7 +296,7 @@ FAILURE = Part("failure", TypeAdapter(Failure), MAX_DIAGNOSTICS_BYTES)
 @dataclass(frozen=True, slots=True)
 class _Head:
     number: int
-    cpu_s: Annotated[float, Field(ge=0, le=_MAX_AMOUNT, allow_inf_nan=False)]
+    cpu_s: Annotated[float, Field(ge=0, le=MAX_COUNT, allow_inf_nan=False)]
     parts: tuple[str, ...]
 
 

@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from evonav.agents.hosting.sandbox import landlock_abi, why_not
 from evonav.cli.examples import DOCS
 from evonav.counted import counted
 from evonav.parallel.local import num_cores
@@ -103,6 +104,7 @@ def all_checks(where: Where) -> Iterator[Check]:
         "processor": _processor,
         "run folder": partial(_folder, where.out),
         **{f"extra {extra}": partial(_extra, extra) for extra in EXTRAS},
+        "sandbox": _sandbox,
         "GPU": _gpu,
         **{f"models {stack}": partial(_models, stack) for stack in STACKS},
         "models coco": _coco,
@@ -232,6 +234,12 @@ def _extra(extra: str) -> Result:
         remedy = f"pip install --force-reinstall 'evonav[{extra}]'"
         return "failed", f"{purpose} ({', '.join(broken)} is installed and cannot be found)", remedy
     return "ok", f"{purpose} ({', '.join(found)})"
+
+
+def _sandbox() -> Result:
+    if reason := why_not():
+        return "missing", f"--isolation sandbox: {reason}"
+    return "ok", f"--isolation sandbox: Landlock {landlock_abi()} and seccomp shut agents in"
 
 
 def _gpu() -> Result:

@@ -135,7 +135,7 @@ def settings_options(name: str) -> Options:
 
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
     pool = ("workers", "engine", "ray_address")
-    agents = ("in_process", "agent_timeout_s")
+    agents = ("isolation", "agent_timeout_s")
     return {
         "decisions": Options(
             settings.DecisionSettings,

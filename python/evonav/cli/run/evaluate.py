@@ -95,7 +95,7 @@ def evaluate(
         from evonav.evaluation.hosting.debugger import check_terminal
 
         check_terminal()
-        run = run.model_copy(update={"workers": 0, "in_process": True})
+        run = run.model_copy(update={"workers": 0, "isolation": "none"})
     workforce = run.workforce()
     recorded = recorded_backend(out)
     backend = Backend(

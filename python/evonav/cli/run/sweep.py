@@ -155,12 +155,13 @@ def _print_plan(
     from rich.table import Table
 
     from evonav.cli.display import status
+    from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import check_agent_name
     from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
     from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
-        check_agent_name(agent, is_in_process=settings.in_process)
+        check_agent_name(agent, None if settings.isolation == "none" else AgentHosting())
     has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
     table = Table(title=f"{counted(len(cells), 'cell')} into {out}", title_justify="left")
     table.add_column("cell", overflow="fold", min_width=20)

@@ -8,6 +8,7 @@ from evonav.agents.hosting import error_text
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
+from evonav.parallel.local import EndedError
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
@@ -53,15 +54,25 @@ def attribute_errors(kind: ErrorKind) -> Iterator[None]:
     except AgentFailedError as error:
         raise StageFailedError(error.kind, str(error)) from error
     except DecisionError as error:
-        raise StageFailedError(ErrorKind.DECISION, error_text.clean(str(error))) from error
+        raise StageFailedError(ErrorKind.DECISION, error_text.message_of(error)) from error
     except Exception as error:
         if kind is ErrorKind.AGENT:
-            raise StageFailedError(kind, error_text.describe(error, caller="evonav.evaluation")) from error
+            raise _agent_failed(error) from error
         if isinstance(error, SimulationError):
             is_lost = isinstance(error, SimulatorLostError)
             kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
             raise StageFailedError(kind, str(error)) from error
         raise StageFailedError(kind, f"{type(error).__name__}: {error}") from error
+    except (KeyboardInterrupt, EndedError):  # the user's, the driver's
+        raise
+    except BaseException as error:  # `sys.exit()` in an agent ends its stage, not the run
+        if kind is not ErrorKind.AGENT:
+            raise
+        raise _agent_failed(error) from error
+
+
+def _agent_failed(error: BaseException) -> StageFailedError:
+    return StageFailedError(ErrorKind.AGENT, error_text.describe(error, caller="evonav.evaluation"))
 
 
 def traceback_of(failure: StageFailedError) -> str:

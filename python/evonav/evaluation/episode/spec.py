@@ -1,6 +1,7 @@
 """Describe a task as the evaluator runs it: its stages, targets and hidden changes."""
 
 import hashlib
+import hmac
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,6 +67,8 @@ class EpisodeSpec:
     start: Pose
     """The start pose of stage 1, from the manifest."""
     stages: tuple[StageSpec, ...] = field(repr=False)
+    opaque_id: str = "task"
+    """The name that agents are given instead of `task_id`: see `opaque_task_id`."""
 
     def parsed_house(self, stage: int) -> House:
         """Parse the house as it is in a stage (1-based).
@@ -155,12 +158,14 @@ def _guided_walk(oracle: OracleStage) -> GuidedWalk:
     return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
 
 
-def opaque_task_id(perception_seed: int) -> str:
-    """Return a task's name for agents, which tells neither the house nor the generator's seed.
+def opaque_task_id(secret: str, task_id: str) -> str:
+    """Return a task's name for agents, from which only who knows the run's secret can tell the task.
 
-    It is the same for all agents of a run, and in a run that is resumed or replayed.
+    It is the same for all agents of a run, and in a run that is resumed or replayed. Nothing in a record depends on
+    it, unless an agent makes it so.
 
     Args:
-        perception_seed: Seed of the perception, which is drawn from the run's seed and the task's id.
+        secret: The run's own, from its header.
+        task_id: The task's id, which names the house and the generator's seed.
     """
-    return hashlib.sha256(f"task\0{perception_seed}".encode()).hexdigest()[:12]
+    return hmac.new(secret.encode(), task_id.encode(), hashlib.sha256).hexdigest()[:16]

@@ -12,7 +12,7 @@ from evonav.evaluation.episode.oracle_baselines import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
-from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, opaque_task_id
+from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
@@ -170,7 +170,7 @@ class Stage:
             self._sensor_config = self._granted()
             self._agent.begin_task(
                 TaskInfo(
-                    task_id=opaque_task_id(self._perception_seed),
+                    task_id=self._spec.opaque_id,
                     num_stages=len(self._spec.stages),
                     max_rounds=self._protocol.budget(self._sensor_config),
                     map_frame=map_frame(self._simulator.occupancy()),

@@ -18,6 +18,9 @@ from evonav.tasks.public import Goal, TaskInfo
 class HostedAgent(ABC):
     """An agent whose answers were read from JSON, wherever it runs."""
 
+    _num_bytes = 0
+    """Size of the stage's diagnostics so far."""
+
     @property
     @abstractmethod
     def sensors(self) -> SensorConfig:
@@ -57,6 +60,14 @@ class HostedAgent(ABC):
         """Return what its decision model has cost so far, by field of `StageCosts`; empty where that is not known."""
         return {}
 
+    def _read_diagnostics(self, text: bytes) -> RoundDiagnostics:
+        self._num_bytes += len(text)
+        if self._num_bytes > wire.MAX_STAGE_BYTES:
+            raise InvalidArgumentError(
+                f"diagnostics: {self._num_bytes} bytes of JSON in a stage: must be at most {wire.MAX_STAGE_BYTES}"
+            )
+        return wire.DIAGNOSTICS.read(text)
+
 
 class LocalAgent(HostedAgent):
     """An agent in the evaluator's own process."""
@@ -77,6 +88,7 @@ class LocalAgent(HostedAgent):
 
     def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
+        self._num_bytes = 0
         self._agent.begin_stage(goal)
 
     def act(self, observation: Observation) -> AgentAction:
@@ -87,7 +99,7 @@ class LocalAgent(HostedAgent):
         """Return what the agent said of the last round, right after it."""
         if self._explaining is None:
             return RoundDiagnostics()
-        return wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(self._explaining.diagnostics()))
+        return self._read_diagnostics(wire.DIAGNOSTICS.write(self._explaining.diagnostics()))
 
     def entries(self) -> Sequence[EntryBelief] | None:
         """Return the object memory; None if the agent does not explain itself."""
@@ -159,6 +171,7 @@ class RemoteAgent(HostedAgent):
 
     def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
+        self._num_bytes = 0
         self._describe(f"{self._label} stage {goal.stage}")
         self._sense(self._ask("begin_stage", goal))
 
@@ -172,7 +185,7 @@ class RemoteAgent(HostedAgent):
         if (failure := self._last_parts.get("diagnostics_failure")) is not None:
             raise failure_of(failure)
         text = self._last_parts.get("diagnostics")
-        return RoundDiagnostics() if text is None else wire.DIAGNOSTICS.read(text)
+        return RoundDiagnostics() if text is None else self._read_diagnostics(text)
 
     def entries(self) -> Sequence[EntryBelief] | None:
         """Return the object memory; None if the agent does not explain itself."""

@@ -6,26 +6,31 @@ receives pickled observations, with their arrays in one block of shared memory, 
 inherits only three descriptors and its output, receives no path but those of its decision model's files, and leads a
 process group, so that processes that an agent has started end with it.
 
-This is no sandbox: an agent can read every file that this user can read. To prevent this, run evonav in a container.
+Unless it is in a sandbox (`evonav.agents.hosting.sandbox`), an agent can read every file that this user can read.
 """
 
+import json
 import os
 import pickle
 import select
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean
+from evonav.agents.hosting.sandbox import Policy
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
+from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
@@ -42,7 +47,8 @@ _PART_BYTES = 1 << 18
 _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
 """Time between two checks that a process lives, on systems that cannot notify."""
-_START = "import sys; sys.path[:] = sys.argv[4:]; from {} import main; main(*map(int, sys.argv[1:4]))"
+_START = "import sys; sys.path[:] = sys.argv[4:]; {}from {} import main; main(*map(int, sys.argv[1:4]))"
+_SHUT_IN = "from evonav.agents.hosting.sandbox import begin; begin(int(sys.argv[1])); "
 
 
 class AgentFailedError(EvonavError):
@@ -73,8 +79,19 @@ class AgentHosting:
     """Largest address space of an agent's process; default: no limit."""
     log: str | None = None
     """File to which the output of agents is appended; default: the evaluator's standard error."""
+    is_sandboxed: bool = False
+    """Shut an agent's process in, so that it reads no file of a run or a task, and reaches no network (Linux)."""
+    hidden: tuple[str, ...] = ()
+    """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
+    scratch: str | None = None
+    """Folder for the folders in which processes in a sandbox may write; default: the system's for temporary files."""
     is_debugged: bool = False
     """Open Python's debugger where an agent raises; only in the evaluator's own process, on a terminal."""
+
+    @property
+    def isolation(self) -> Isolation:
+        """The isolation of agents, in one word."""
+        return "none" if self.is_in_process else "sandbox" if self.is_sandboxed else "process"
 
 
 class AgentProcess:
@@ -98,16 +115,21 @@ class AgentProcess:
         """CPU time that the process reports."""
         self._hosting = hosting
         self._block = SharedBlock()
+        self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
         self._connection, far_end = socket.socketpair()
         life, self._life = os.pipe()
         output = None if hosting.log is None else OutputLog(Path(hosting.log), name)
         self._log = output
         try:
             arguments = (far_end.fileno(), life, self._block.descriptor)
+            shut_in = "" if self._scratch is None else _SHUT_IN
+            path = sys.path if self._scratch is None else search_path()
             with one_thread_each():
                 self._process = subprocess.Popen(  # noqa: S603 - ourselves
-                    [sys.executable, "-c", _START.format(self.serving), *map(str, arguments), *sys.path],
+                    [sys.executable, "-c", _START.format(shut_in, self.serving), *map(str, arguments), *path],
                     pass_fds=arguments,
+                    cwd=self._scratch,
+                    env=None if self._scratch is None else environment(self._scratch),
                     stdin=subprocess.DEVNULL,
                     stdout=sys.__stderr__ if output is None else output.descriptor,
                     stderr=None if output is None else output.descriptor,
@@ -127,10 +149,18 @@ class AgentProcess:
         self._is_waiting = False
         self._is_closed = False
         try:
+            if self._scratch is not None:
+                name = with_absolute_file(name)
+                self._shut_in(policy_of(name, self._scratch, hosting.hidden, hosting.memory_mb))
             self.ask("load", name, hosting.memory_mb, timeout_s=max(hosting.timeout_s, LOAD_TIMEOUT_S))
         except BaseException:
             self.close(is_at_once=True)
             raise
+
+    def _shut_in(self, policy: Policy) -> None:
+        data = json.dumps(asdict(policy)).encode()
+        with suppress(OSError):  # a process that has ended already: the next request says so
+            self._connection.sendall(LENGTH.pack(len(data)) + data)
 
     @property
     def is_usable(self) -> bool:
@@ -231,9 +261,14 @@ class AgentProcess:
             return
         self._is_closed = True
         self._connection.close()
-        if not is_at_once and not self._is_waiting:
-            with suppress(subprocess.TimeoutExpired):
-                self._process.wait(timeout=2.0)
+        try:
+            if not is_at_once and not self._is_waiting:
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(timeout=2.0)
+        finally:  # also in a worker that is asked to end meanwhile
+            self._end_group()
+
+    def _end_group(self) -> None:
         # Processes that it started may still run in its group.
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
@@ -242,6 +277,8 @@ class AgentProcess:
         if self._watch is not None:
             os.close(self._watch)
         self._block.close()
+        if self._scratch is not None:
+            shutil.rmtree(self._scratch, ignore_errors=True)
         if self._log is not None:
             self._log.end()
 
@@ -271,21 +308,32 @@ class AgentProcesses:
 
     def close(self) -> None:
         """End all processes; safe to call twice."""
-        while self._processes:
-            self._processes.popitem()[1].close()
+        for process in self._processes.values():
+            process.close()
+        self._processes.clear()
 
 
-def check_importable(name: str) -> None:
+def check_importable(name: str, hosting: AgentHosting) -> None:
     """Check that an agent can be imported, in a process of its own, which then ends.
+
+    Args:
+        name: Name of the agent.
+        hosting: Settings of the process.
 
     Raises:
         InvalidArgumentError: The agent cannot be imported.
     """
     try:
-        AgentProcess(name, AgentHosting()).close()
+        AgentProcess(name, replace(hosting, log=None)).close()
     except AgentFailedError as error:
         message = str(error).removeprefix("InvalidArgumentError: ").partition(" [")[0]
         raise InvalidArgumentError(message) from None
+
+
+def _new_scratch(hosting: AgentHosting) -> Path:
+    """Make a folder; that of the hosting is not there on other machines of a cluster."""
+    folder = hosting.scratch if hosting.scratch is not None and Path(hosting.scratch).is_dir() else None
+    return Path(tempfile.mkdtemp(prefix="evonav-agent-", dir=folder))
 
 
 def failure_of(text: bytes) -> AgentFailedError:

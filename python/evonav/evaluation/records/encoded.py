@@ -1,11 +1,17 @@
 """Encode a finished stage once, as the text that workers send and the store keeps."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+
+from pydantic import ValidationError
 
 from evonav.evaluation.metrics.stage_metrics import encode_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageFailure, StageRecord
+
+MAX_VALUE = 100
+"""Longest wrong value in `invalid_record`, in characters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,3 +90,22 @@ def encode_stage(
         failure=failure,
         floor_plan=None if floor_plan is None else floor_plan.model_dump_json(),
     )
+
+
+def invalid_record(text: str, error: ValidationError) -> str:
+    """Name a record that cannot be read, and its first wrong field with its value, in one sentence.
+
+    Args:
+        text: The record as it is stored.
+        error: The error of the model that read it.
+    """
+    problem = error.errors(include_url=False, include_context=False)[0]
+    place = ".".join(map(str, problem["loc"]))
+    value = repr(problem["input"])
+    what = f"{place} = {value[:MAX_VALUE]}: {problem['msg']}" if place else problem["msg"]
+    try:
+        key = json.loads(text)
+        name = f"the record of {key['agent']}, {key['task_id']}, stage {key['stage']}"
+    except (ValueError, TypeError, KeyError):
+        name = "a record"
+    return f"{name} is not valid: {what}"

@@ -24,7 +24,9 @@ class _Record(BaseModel):
     """A frozen record that rejects unknown fields."""
 
     # Parts of a record are validated again with the whole: `model_copy` does not validate.
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always", allow_inf_nan=False
+    )
 
 
 class EndState(str, Enum):

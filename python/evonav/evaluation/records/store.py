@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION
-from evonav.evaluation.records.encoded import EncodedStage
+from evonav.evaluation.records.encoded import EncodedStage, invalid_record
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
@@ -233,10 +233,7 @@ class RunStore:
         for text in self._texts(
             "json_remove(record, '$.trace', '$.entries')" if is_brief else "record", agent, task_id
         ):
-            try:
-                yield StageRecord.model_validate_json(text)
-            except ValidationError as error:
-                raise StoreError(f"{self.path}: {error}") from error
+            yield self._parsed(text)
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:
@@ -275,10 +272,14 @@ class RunStore:
         text = self.record_text(agent, task_id, stage)
         if text is None:
             raise StoreError(f"{self.path}: no record of {agent}, {task_id}, stage {stage}")
+        return self._parsed(text)
+
+    def _parsed(self, text: str) -> StageRecord:
         try:
             return StageRecord.model_validate_json(text)
         except ValidationError as error:
-            raise StoreError(f"{self.path}: {error}") from error
+            hint = "`evonav evaluate` with the run's options sets it aside and runs its stage again"
+            raise StoreError(f"{self.path}: {invalid_record(text, error)}; {hint}") from error
 
     def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
         """Yield agent, task and stage, the version of the stored metrics, and the metrics; `None` without metrics."""

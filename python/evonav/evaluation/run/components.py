@@ -13,7 +13,7 @@ from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.process import check_importable
+from evonav.evaluation.hosting.process import AgentHosting, check_importable
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style, vertical_fov_deg
@@ -143,12 +143,12 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     return new_oracle_baseline(name, decision) if name in ORACLE_BASELINES else new_agent(agent_factory(name), decision)
 
 
-def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
+def check_agent_name(name: str, hosting: AgentHosting | None = None) -> None:
     """Check that workers can make an agent of this name.
 
     Args:
         name: Name of an agent.
-        is_in_process: Import the agent in this process; otherwise in a process of its own, unless it is built in.
+        hosting: Settings of agents' processes: one that is not built in is imported there. Default: in this process.
 
     Raises:
         InvalidArgumentError: No agent has this name, or it cannot be imported.
@@ -156,10 +156,10 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
     if name in ORACLE_BASELINES:
         return
     try:
-        if is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
+        if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
             agent_factory(name)
         else:
-            check_importable(name)
+            check_importable(name, hosting)
     except InvalidArgumentError as error:
         if ":" in name or name.endswith(".py") or RULE_MARK in name:
             raise

@@ -18,16 +18,17 @@ MAX_SESSIONS = 50
 """Largest number of noted sessions: the first one and the latest."""
 
 
-def note_session(store: RunStore, num_workers: int) -> None:
+def note_session(store: RunStore, num_workers: int, isolation: str) -> None:
     """Note the command that is about to evaluate, its machine and versions.
 
     Args:
         store: The run's store.
         num_workers: Number of processes that evaluate.
+        isolation: The isolation of agents, see `isolation_facts`.
     """
     before = store.meta(KEY) or []
     sessions = [*before[:1], *before[1:][-(MAX_SESSIONS - 2) :]]
-    store.set_meta(KEY, [*sessions, {**session_facts(), "workers": num_workers}])
+    store.set_meta(KEY, [*sessions, {**session_facts(), "workers": num_workers, "isolation": isolation}])
 
 
 def session_facts() -> dict[str, Any]:

@@ -1,18 +1,24 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
+import secrets
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from evonav._core import __version__
+from evonav.agents.hosting.sandbox import why_not
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.episode.spec import opaque_task_id
+from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
@@ -26,7 +32,11 @@ from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import FORMER, former_digest
 from evonav.tasks.listing import TaskFile
 
+NAMES_KEY = "key_of_names"
+"""Place in a run's header of the secret key by which agents' names of tasks are made; nothing shows it."""
+
 __all__ = [
+    "NAMES_KEY",
     "NUM_RETRIES",
     "Progress",
     "RunConfig",
@@ -141,6 +151,7 @@ def evaluate_all(
         if not (request.run_dir / FILE_NAME).exists():  # a run that cannot begin leaves no folder behind
             request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
+        requests = _with_scratch(requests, stack)
         runs: list[RunJobs] = []
         for index, request in enumerate(requests):
             stack.enter_context(writing(request.run_dir))
@@ -168,6 +179,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         _claim(store, request)
         if retry_errored:
             _forget_errored(store, request)
+        secret = store.meta(NAMES_KEY)
         states = store.states()
         floor_plans = store.floor_plan_keys()
     config = request.config
@@ -176,7 +188,9 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
-    for task in request.tasks:
+    names = {task.task_id: opaque_task_id(secret, task.task_id) for task in request.tasks}
+    # An agent's process may count its episodes: in the order of the tasks' ids, the number would tell the task.
+    for task in sorted(request.tasks, key=lambda task: names[task.task_id]):
         stages = range(1, task.num_stages + 1)
         agents = [name for name in request.agents if any((name, task.task_id, stage) not in states for stage in stages)]
         are_missing = any((task.task_id, stage) not in floor_plans for stage in stages)
@@ -184,6 +198,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
             EpisodeJob(
                 agent,
                 task.task_id,
+                names[task.task_id],
                 str(task.path.absolute()),
                 agent_seed(config.seed, agent, task.task_id),
                 perception_seed(config.seed, task.task_id),
@@ -194,7 +209,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     if jobs:
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)
-            note_session(store, num_workers)
+            note_session(store, num_workers, isolation_facts(hosting.isolation))
     return RunJobs(request.run_dir, worker_config, limit_s, request.agents, request.tasks, jobs, states)
 
 
@@ -210,11 +225,23 @@ def _forget_errored(store: RunStore, request: RunRequest) -> None:
             store.forget_episode(agent, task_id, stage)
 
 
+def _with_scratch(requests: Sequence[RunRequest], stack: ExitStack) -> Sequence[RunRequest]:
+    """Give sandboxes a folder that is deleted at the end, also if a worker could not clean up."""
+    if not any(request.config.hosting.is_sandboxed for request in requests):
+        return requests
+    scratch = stack.enter_context(TemporaryDirectory(prefix="evonav-agents-", ignore_cleanup_errors=True))
+    configs = [replace(one.config, hosting=replace(one.config.hosting, scratch=scratch)) for one in requests]
+    return [replace(one, config=config) for one, config in zip(requests, configs, strict=True)]
+
+
 def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
     hosting = request.config.hosting
     return replace(
         hosting,
         is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
+        hidden=tuple(
+            sorted({str(request.run_dir.absolute()), *(str(t.path.absolute().parent) for t in request.tasks)})
+        ),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
 
@@ -233,7 +260,7 @@ def perception_seed(seed: int, task_id: str) -> int:
 def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
     if len({request.run_dir.absolute() for request in requests}) != len(requests):
         raise InvalidArgumentError("two runs have the same folder")
-    checked: set[tuple[str, bool]] = set()
+    checked: set[tuple[str, str]] = set()
     for request in requests:
         if not request.agents:
             raise InvalidArgumentError("no agent to evaluate")
@@ -241,7 +268,9 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
             raise InvalidArgumentError(f"an agent is named twice: {', '.join(request.agents)}")
         if not request.tasks:
             raise InvalidArgumentError("no task to evaluate on")
-        is_in_process = _hosting(request, num_workers).is_in_process
+        hosting = _hosting(request, num_workers)
+        if hosting.is_sandboxed:
+            _check_sandbox(hosting, request.config.backend)
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
@@ -251,9 +280,24 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
                     "or use num_workers=0"
                 )
         for agent in request.agents:
-            if (agent, is_in_process) not in checked:
-                check_agent_name(agent, is_in_process=is_in_process)
-                checked.add((agent, is_in_process))
+            if (agent, hosting.isolation) not in checked:
+                check_agent_name(agent, hosting)
+                checked.add((agent, hosting.isolation))
+
+
+def _check_sandbox(hosting: AgentHosting, backend: Backend) -> None:
+    """Check that agents can be shut in.
+
+    Raises:
+        InvalidArgumentError: They cannot, and why.
+    """
+    reason = why_not()
+    if hosting.is_in_process:
+        reason = reason or "agents run in the evaluator's own process: use one worker or more"
+    if backend.decision.host_options or "path" in backend.decision.options:
+        reason = reason or "the decision model needs files or a network, which a sandbox shuts: use `process`"
+    if reason:
+        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:
@@ -316,6 +360,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
                 "(docs/tasks.md says how to make them)"
             )
         check_same_run(stored, wanted, request.run_dir)
+        set_aside_invalid(store)
     store.set_header(
         {
             "config": wanted,
@@ -324,5 +369,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
+            CHECKED_KEY: True,
+            NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }
     )

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from evonav.evaluation.hosting.isolation import Isolation
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.settings_model import NUM_RETRIES, SettingError, Settings
 from evonav.parallel.local import num_cores
@@ -28,8 +29,8 @@ class RunSettings(Settings):
     """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
     num_retries: int = Field(default=NUM_RETRIES, ge=0)
     """Number of retries of a stage that lost its worker, simulator or agent process."""
-    in_process: bool = False
-    """Run agents in the evaluator's process, for debuggers; a crash of an agent then ends the worker."""
+    isolation: Isolation = "process"
+    """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux)."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
     """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
@@ -74,5 +75,10 @@ class RunSettings(Settings):
             protocol=protocol or ProtocolConfig(),
             backend=backend,
             stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
-            hosting=AgentHosting(self.in_process, timeout_s, self.agent_memory_mb),
+            hosting=AgentHosting(
+                self.isolation == "none",
+                timeout_s,
+                self.agent_memory_mb,
+                is_sandboxed=self.isolation == "sandbox",
+            ),
         )

@@ -12,7 +12,7 @@ process or a failure of the harness; `evonav.evaluation.run.scheduler` retries a
 import json
 from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -31,6 +31,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
+from evonav.parallel.local import EndedError
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
@@ -58,6 +59,8 @@ class EpisodeJob:
 
     agent: str
     task_id: str
+    opaque_id: str
+    """The task's name for the agent."""
     path: str
     """Folder of the task."""
     seed: int
@@ -119,7 +122,9 @@ class WorkerContext:
             if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINES:
                 return self._debugged_agent(job)
             return make_agent(job.agent, self.config.backend.decision.create(job.seed))
-        except Exception as error:
+        except (KeyboardInterrupt, EndedError):
+            raise
+        except BaseException as error:
             return _FailedAgent(error)
 
     def _debugged_agent(self, job: EpisodeJob) -> HostedAgent:
@@ -145,7 +150,7 @@ class WorkerContext:
 class _FailedAgent(LocalAgent):
     """An agent that could not be made: every stage of it is errored with the same error."""
 
-    def __init__(self, error: Exception) -> None:
+    def __init__(self, error: BaseException) -> None:
         self._error = error
 
     @property
@@ -202,7 +207,7 @@ class EpisodeWork:
         job, context = EpisodeJob(**json.loads(head)), self._context(config_text)
         num_left = _Retries(context.config.num_retries)
         try:
-            spec = context.config.backend.tasks.create(Path(job.path))
+            spec = replace(context.config.backend.tasks.create(Path(job.path)), opaque_id=job.opaque_id)
             is_whole = False
             while not is_whole:
                 is_whole = True
@@ -228,8 +233,9 @@ class EpisodeWork:
 
     def close(self) -> None:
         """Close all contexts."""
-        while self._contexts:
-            self._contexts.popitem()[1].close()
+        for context in self._contexts.values():
+            context.close()
+        self._contexts.clear()
 
 
 def _text(event: EncodedStage | StageFailure | None) -> str:

@@ -1,0 +1,185 @@
+"""An agent in a sandbox reads no file of the run or the tasks, reaches nobody, and leaves nothing behind."""
+
+import os
+import shutil
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from short_tasks import short_tasks
+from test_agent_process import is_running
+from test_engine import TOY, records, texts
+from toy_house import write_tasks
+
+from evonav.agents.hosting import sandbox
+from evonav.component import Component
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.hosting.isolation import environment, policy_of
+from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.report import write_report
+from evonav.sweeps.file import read_sweep
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
+
+NEEDS_SANDBOX = pytest.mark.skipif(bool(sandbox.why_not()), reason=f"no sandbox here: {sandbox.why_not()}")
+SHORT = ProtocolConfig(max_rounds=3)
+SANDBOX = AgentHosting(is_sandboxed=True, timeout_s=20.0)
+
+
+def spied(folder, monkeypatch, *, is_sandboxed):
+    """Evaluate the spy from a folder that holds its file, notes, the tasks and the run, and return what it reached."""
+    project = folder / "project"
+    project.mkdir()
+    shutil.copy(Path(__file__).with_name("spying_agent.py"), project / f"spy_{is_sandboxed}.py")
+    (project / "notes.txt").write_text("the agent's own")
+    write_tasks(project / "tasks")
+    (project / "shortcut").symlink_to(project / "tasks")
+    monkeypatch.setenv("SOME_KEY", "canary-of-the-evaluator")
+    monkeypatch.chdir(project)
+    config = RunConfig(backend=TOY, protocol=SHORT, hosting=replace(SANDBOX, is_sandboxed=is_sandboxed))
+    tasks = task_files(project / "tasks", 1)
+    evaluate([f"./spy_{is_sandboxed}.py:Spy"], tasks, project / "run", config=config, num_workers=1)
+    (first, *_) = records(project / "run", f"./spy_{is_sandboxed}.py:Spy")
+    assert first.error is None
+    return project, first.trace[0].details
+
+
+@NEEDS_SANDBOX
+def test_a_spy_in_a_sandbox_reaches_nothing(tmp_path, monkeypatch):
+    project, found = spied(tmp_path, monkeypatch, is_sandboxed=True)
+    assert found["files beside"] == ["notes.txt", "spy_True.py"]
+    assert found["link"] == []
+    assert found["package"] == ["wordpiece.txt.gz"]
+    assert found["home"][:-1] == []
+    assert Path(found["home"][-1]).name.startswith("evonav-agent-")
+    for name in ("passwords", "parent", "own environment", "write beside", "network", "unix socket", "signal"):
+        assert found[name] == "PermissionError", name
+    assert found["canary"] == []
+    assert found["folder"] == []
+    assert len(found["descriptors"]) <= 5  # socket, pipe, shared memory twice, its own status
+    assert found["write scratch"] == 1
+    assert found["pair"] == [None, None]
+    assert found["child"] == "15"  # it may start a process, for which the same holds
+    assert found["session"] == 7
+    assert found["large file"] == "OSError"
+    assert found["memory"] in ("OSError", "MemoryError")
+    assert (found["trace"], found["namespace"], found["ring"]) == (1, 1, 1)
+    assert found["open files"] == sandbox.MAX_OPEN_FILES
+    assert not (project / "written").exists()
+    assert not Path(found["home"][-1]).exists()
+    until_s = time.monotonic() + 10.0
+    while is_running(found["left child"]) and time.monotonic() < until_s:
+        time.sleep(0.05)
+    assert not is_running(found["left child"])
+
+
+def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
+    """Or the test above would show nothing."""
+    _, found = spied(tmp_path, monkeypatch, is_sandboxed=False)
+    assert "records.sqlite" in found["files beside"]
+    assert "records.sqlite" in found["link"]
+    assert "houses.jsonl.gz" in found["package"]
+    assert found["canary"]
+    assert found["network"] is None
+    assert found["unix socket"] is None
+    assert found["signal"] is None
+    assert found["write beside"] == 1
+
+
+@NEEDS_SANDBOX
+def test_agents_do_the_same_in_a_sandbox(tmp_path):
+    agents = ["fu", "random-walk", "msgnav"]
+    with bundled_tasks() as directory:
+        tasks, reader = short_tasks(directory, 2)
+        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4))
+        evaluate(agents, tasks, tmp_path / "free", config=config, num_workers=1)
+        config = replace(config, hosting=SANDBOX)
+        evaluate(agents, tasks, tmp_path / "shut", config=config, num_workers=1)
+    assert texts(tmp_path / "shut") == texts(tmp_path / "free")
+    with RunStore(tmp_path / "shut") as shut, RunStore(tmp_path / "free") as free:
+        assert shut.meta("sessions")[0]["isolation"].startswith("sandbox (Landlock ")
+        assert free.meta("sessions")[0]["isolation"] == "process"
+        assert all("agent_peak_rss_mb" in costs for costs in shut.costs().values())
+        assert shut.meta("config") == free.meta("config")  # it does not decide records
+    assert "sandbox (Landlock" in write_report(tmp_path / "shut").read_text(encoding="utf-8")
+
+
+@NEEDS_SANDBOX
+def test_failures_are_contained_as_without_a_sandbox(tmp_path):
+    write_tasks(tmp_path / "tasks")
+    agents = {"unruly_agents:Segfaulting": ErrorKind.CRASH, "unruly_agents:Hungry": ErrorKind.AGENT}
+    agents |= {"unruly_agents:LeavingChildren": ErrorKind.CRASH, "toy_agents:Raising": ErrorKind.AGENT}
+    config = RunConfig(backend=TOY, protocol=SHORT, hosting=SANDBOX)
+    evaluate(list(agents), task_files(tmp_path / "tasks", 1), tmp_path / "run", config=config, num_workers=1)
+    for agent, kind in agents.items():
+        first, second, third = records(tmp_path / "run", agent)
+        assert (first.is_scored, second.state, third.is_scored) == (True, EndState.ERRORED, True)
+        assert second.error.kind is kind
+
+
+@pytest.mark.parametrize(
+    ("change", "num_workers", "reason"),
+    [
+        ({}, 0, "use one worker or more"),
+        ({"decision": Component("evonav.decision.backends:vlm", {}, {"cache": "x"})}, 1, "needs files or a network"),
+        ({"decision": Component("evonav.decision.backends:vlm", {"path": "x.py"})}, 1, "needs files or a network"),
+    ],
+)
+def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, change, num_workers, reason):
+    monkeypatch.setattr("evonav.evaluation.run.run.why_not", lambda: "")
+    write_tasks(tmp_path / "tasks")
+    config = RunConfig(backend=replace(TOY, **change), hosting=SANDBOX)
+    with pytest.raises(InvalidArgumentError, match=f"isolation = sandbox: .*{reason}"):
+        evaluate(
+            ["stay-still"], task_files(tmp_path / "tasks"), tmp_path / "run", config=config, num_workers=num_workers
+        )
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_system_without_one_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("evonav.evaluation.run.run.why_not", lambda: "this kernel offers no Landlock")
+    write_tasks(tmp_path / "tasks")
+    config = RunConfig(backend=TOY, hosting=SANDBOX)
+    with pytest.raises(InvalidArgumentError, match="isolation = sandbox: this kernel offers no Landlock"):
+        evaluate(["stay-still"], task_files(tmp_path / "tasks"), tmp_path / "run", config=config, num_workers=1)
+
+
+def test_what_is_hidden_is_left_out_wherever_it_lies(tmp_path):
+    for name in ("agent/run/records", "agent/run2", "agent/lib/deep/tasks/a", "agent/lib/other", "scratch"):
+        (tmp_path / name).mkdir(parents=True)
+    for name in ("agent/mine.py", "agent/lib/weights"):
+        (tmp_path / name).write_text("")
+    agent = tmp_path / "agent"
+    (agent / "link").symlink_to(agent / "run")
+    hidden = [str(agent / "run"), str(agent / "lib/deep/tasks")]
+    policy = policy_of(f"{agent}/mine.py:Mine", tmp_path / "scratch", hidden, None)
+    mine = {path for path in policy.read if path.startswith(str(tmp_path))}
+    assert mine == {str(agent / name) for name in ("mine.py", "run2", "lib/other", "lib/weights")}
+    named = {path for path in policy.names if path.startswith(str(tmp_path))}
+    assert named == {str(agent), str(agent / "lib"), str(agent / "lib/deep")}
+    assert policy.write == (str(tmp_path / "scratch"),)
+    assert policy.memory_mb > 0
+    assert policy_of("fu", tmp_path, [str(Path("/"))], 500).read == ()
+
+
+def test_the_environment_is_a_list_of_what_is_allowed(tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", "secret")
+    monkeypatch.setenv("LANG", "C.UTF-8")
+    given = environment(tmp_path)
+    assert "secret" not in given.values()
+    assert given["LANG"] == "C.UTF-8"
+    assert given["HOME"] == given["TMPDIR"] == str(tmp_path)
+    assert given["PATH"] == os.environ["PATH"]
+
+
+@pytest.mark.parametrize(("said", "isolation"), [("in_process = true", "none"), ("in_process = false", "process")])
+def test_older_sweep_files_say_in_process(tmp_path, said, isolation):
+    path = tmp_path / "sweep.toml"
+    path.write_text(f'name = "old"\nagents = ["fu"]\ntasks = ["bundled:1"]\n{said}\n')
+    assert read_sweep(path).isolation == isolation
