@@ -5,6 +5,7 @@
 mod scenes;
 
 mod images;
+mod lit;
 mod png;
 mod raster;
 mod shading;

@@ -26,7 +26,7 @@ pub fn scene_of(parts: &[Part]) -> Scene {
 
 /// Moeller & Trumbore 1997, front side only. Returns the distance and how deep inside the
 /// triangle the ray passes (smallest barycentric coordinate).
-fn intersect(triangle: &Triangle, origin_m: Vec3, direction: Vec3) -> Option<(f64, f64)> {
+pub fn intersect(triangle: &Triangle, origin_m: Vec3, direction: Vec3) -> Option<(f64, f64)> {
     let [a, b, c] = triangle.vertices_m;
     let (ab, ac, to_origin) = (sub(b, a), sub(c, a), sub(origin_m, a));
     let normal = cross(ab, ac);
@@ -122,7 +122,7 @@ fn view() -> impl Strategy<Value = View> {
 }
 
 /// Origin and direction of the look through a pixel: lengths along it are planar depths.
-fn look_through(view: &View, image_px: [f64; 2]) -> (Vec3, Vec3) {
+pub fn look_through(view: &View, image_px: [f64; 2]) -> (Vec3, Vec3) {
     let Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad } =
         view.camera;
     let half_m = view.half_height_m.unwrap_or((vertical_fov_rad / 2.0).tan());
