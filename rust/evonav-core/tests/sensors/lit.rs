@@ -37,7 +37,7 @@ impl Picture<'_> {
     }
 
     fn nearness(&self, place: [i64; 2]) -> f64 {
-        let depth_m = f64::from(self.depth_m[self.index(place).unwrap()]);
+        let depth_m = f64::from(self.depth_m[self.index(place).expect("a place in the picture")]);
         1.0 / depth_m.min(CLIP_M[1])
     }
 
@@ -81,7 +81,7 @@ impl Picture<'_> {
         }
         // Each end: its place, and whether the pixel's own side goes around it or the other one.
         let ends = [-1, 1].map(|sign: i64| {
-            let steps = sign * (1..).find(|steps| !differs(sign * steps)).unwrap();
+            let steps = sign * (1..).find(|steps| !differs(sign * steps)).expect("an end");
             let beyond = face(steps, 0);
             let goes = |side| i32::from(beyond == face(steps - sign, side));
             let place = if sign < 0 { steps + 1 } else { steps };
@@ -113,7 +113,7 @@ impl Picture<'_> {
             .into_iter()
             .flat_map(|(across, along)| self.changes(pixel, across, along))
             .collect();
-        let own = self.colours[self.index(pixel).unwrap()];
+        let own = self.colours[self.index(pixel).expect("a pixel in the picture")];
         let sum = |i: usize| own[i] + changes.iter().map(|change| change[i]).sum::<f64>();
         (std::array::from_fn(|i| sum(i).clamp(0.0, 255.0)), changes.len())
     }
@@ -133,7 +133,7 @@ fn face_at(triangles: &[Triangle], view: &View, [column, row]: [i64; 2]) -> Face
     let (origin_m, ray) = look_through(view, [column as f64 + 0.5, row as f64 + 0.5]);
     let hits = triangles.iter().filter_map(|triangle| {
         let (distance, inside) = intersect(triangle, origin_m, ray)?;
-        let is_met = inside >= 0.0 && distance >= CLIP_M[0] && distance < CLIP_M[1];
+        let is_met = inside >= 0.0 && (CLIP_M[0]..CLIP_M[1]).contains(&distance);
         is_met.then_some((distance, triangle))
     });
     let (_, triangle) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
