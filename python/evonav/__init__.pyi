@@ -9,6 +9,7 @@ from .errors import EvonavError
 from .evaluation.contract.check import check_agent
 from .memory.objects import ObjectMap
 from .memory.occupancy import OccupancyMap
+from .memory_benchmark.check import check_memory
 from .sensors.observation import Observation
 from .tasks.public import Goal, TaskInfo
 from .world.pose import Pose
@@ -34,6 +35,7 @@ __all__ = [
     "TaskInfo",
     "__version__",
     "check_agent",
+    "check_memory",
     "evaluate",
     "generate_tasks",
     "load_houses",

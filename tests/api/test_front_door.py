@@ -11,7 +11,7 @@ import pytest
 import evonav
 
 NAMES = {
-    "do": ("evaluate", "generate_tasks", "check_agent", "load_run", "load_tasks", "load_houses"),
+    "do": ("evaluate", "generate_tasks", "check_agent", "check_memory", "load_run", "load_tasks", "load_houses"),
     "write an agent": (
         "Agent",
         "Explanation",
@@ -32,7 +32,7 @@ SIGNATURES = Path(__file__).with_name("signatures.txt")
 
 
 def test_the_names_are_those_of_the_front_door() -> None:
-    assert len(ALL) == 24
+    assert len(ALL) == 25
     assert sorted(evonav.__all__) == sorted(dir(evonav)) == ALL
 
 

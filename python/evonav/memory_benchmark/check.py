@@ -55,6 +55,15 @@ def check_memory(memory: MemorySource, *, timeout_s: float = 60.0) -> MemoryRepo
         memory: `./file.py:Class` or `package.module:Class`, the same with options as a `Component`, or a function that
             makes a memory. A named one runs in a process of its own first, where it can do no harm.
         timeout_s: Time limit of a call in that process.
+
+    Examples:
+        >>> import evonav
+        >>> from evonav.memory_benchmark.references import NumpyList
+        >>> report = evonav.check_memory(NumpyList)
+        >>> report.is_ok
+        True
+        >>> [check.name for check in report.checks if check.verdict == "warn"]
+        ['updates']
     """
     name = memory if isinstance(memory, str) else getattr(memory, "path", None) or getattr(memory, "__name__", "memory")
     return MemoryReport(str(name), tuple(_checks(memory, Settings(timeout_s=timeout_s, runs_twice=True))))
