@@ -11,7 +11,7 @@ from itertools import takewhile
 from benches.table import write_section
 from evonav.speed_benchmark.timing import Sampling, one_core
 
-PRODUCT = {"agents", "generation", "gym", "navigation", "rendering"}
+PRODUCT = {"agents", "generation", "gym", "mapping", "navigation", "rendering"}
 """Sections of `evonav bench`, modules of `evonav.speed_benchmark`; the other modules are beside this one."""
 ON_ALL_CORES = {"gym"}
 SECTIONS = {
@@ -20,6 +20,7 @@ SECTIONS = {
     "evaluation": "Evaluation",
     "generation": "Task generation",
     "gym": "Gymnasium",
+    "mapping": "Mapping",
     "memory": "Memory",
     "navigation": "Navigation",
     "perception": "Perception",
