@@ -71,7 +71,7 @@ def test_every_extra_is_looked_for():
     section = text.split("[project.optional-dependencies]")[1].split("\n[")[0]
     declared = dict(re.findall(r"^(\w+) = \[(.*)\]$", section, re.MULTILINE))
     packages = {
-        name: {re.split(r"[\[<>=]", word)[0] for word in re.findall(r'"([^"]+)"', part)}
+        name: {re.split(r"[\[<>=;]", word)[0] for word in re.findall(r'"([^"]+)"', part)}
         for name, part in declared.items()
     }
     packages["video"].add("av")  # imageio[pyav]

@@ -249,7 +249,7 @@ def test_a_row_that_is_no_record_is_an_error_that_names_the_run(write_run: Write
     with sqlite3.connect(run_dir / "records.sqlite") as database:
         database.execute("UPDATE stages SET record = '{}' WHERE task_id = 'task-2'")
     database.close()
-    with pytest.raises(StoreError, match="validation errors for StageRecord"):
+    with pytest.raises(StoreError, match="a record is not valid: agent"):
         write_report(run_dir)
 
 
@@ -327,7 +327,9 @@ def test_a_run_notes_its_command_and_versions(tmp_path: Path) -> None:
     with RunStore(tmp_path) as store:
         sessions = store.meta("sessions")
     assert len(sessions) == 2  # the second call had nothing to do
-    assert {"command", "began", "evonav", "git", "python", "platform", "cpus", "workers"} == set(sessions[0])
+    assert {"command", "began", "evonav", "git", "python", "platform", "cpus", "workers", "isolation"} == set(
+        sessions[0]
+    )
 
 
 def test_a_run_is_loaded_from_its_metrics_without_parsing_traces(write_run: WriteRun) -> None:

@@ -52,6 +52,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "bench render": ("evonav bench render", "evonav bench render --limit 2 --out out/bench"),
     "bench navigation": ("evonav bench navigation --against out/bench/navigation/speed.json",),
+    "bench mapping": ("evonav bench mapping --limit 2",),
     "bench gym": ("evonav bench gym --envs 1,16 --peer sync",),
     "bench agents": ("evonav bench agents --agent fu --no-growth",),
     "bench generation": ("evonav bench generation --limit 100",),
@@ -120,7 +121,8 @@ PAGES = {
     "bench memory export": "memory-benchmark.md",
     "bench memory score": "memory-benchmark.md",
     **dict.fromkeys(
-        ("bench render", "bench navigation", "bench gym", "bench agents", "bench generation"), "benchmarks.md"
+        ("bench render", "bench navigation", "bench mapping", "bench gym", "bench agents", "bench generation"),
+        "benchmarks.md",
     ),
     "perception": "perception-quality.md",
     "view": "report.md",

