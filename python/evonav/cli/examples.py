@@ -16,6 +16,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav evaluate --houses bundled --limit 10 --out out/houses",
         "evonav evaluate --perception noisy:poor,miss_rate=0.3 --out out/poor",
         "evonav evaluate --decision vlm --model gpt-4o --dry-run --out out/gpt",
+        "evonav evaluate --agent fu --limit 4 --profile --out out/profiled",
     ),
     "sweep": (
         "evonav sweep sweep.toml --dry-run",

@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 
 from evonav.component import import_callable
+from evonav.parallel.profiling import sampled
 
 Work = Callable[[str], str | Generator[str, None, str]]
 """Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
@@ -77,9 +78,10 @@ def serve(work_name: str, settings: str, jobs: Iterator[str], send: Callable[[st
         return
     try:
         send("ready", "")
-        for text in jobs:
-            for kind, message in steps(work, text):
-                send(kind, message)
+        with sampled("workers"):
+            for text in jobs:
+                for kind, message in steps(work, text):
+                    send(kind, message)
     finally:
         try:
             end_work(work)

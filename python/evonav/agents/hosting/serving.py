@@ -29,6 +29,7 @@ from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
 from evonav.errors import DecisionError, InvalidArgumentError
+from evonav.parallel import profiling
 
 LENGTH = struct.Struct("<Q")
 """Format of the size of the message that follows."""
@@ -70,7 +71,8 @@ def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], S
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     faulthandler.enable()
     _end_with_parent(life_fd)
-    with socket.socket(fileno=socket_fd) as connection, suppress(BrokenPipeError, ConnectionResetError):
+    closed = suppress(BrokenPipeError, ConnectionResetError)
+    with socket.socket(fileno=socket_fd) as connection, closed, profiling.sampled("agents"):
         _serve(connection, _Block(block_fd), (new_server or _Server)())
 
 
@@ -180,6 +182,7 @@ class _Server:
         """Import the factory of agents."""
         if memory_mb is not None:
             limit_memory(memory_mb)
+        profiling.rename(f"agent {name}")
         self._factory = agent_factory(name)
         return {}
 

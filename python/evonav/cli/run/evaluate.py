@@ -1,13 +1,13 @@
 """`evonav evaluate`: run agents on tasks."""
 
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
+from evonav.cli.display import generation_progress, interruptible, print_table, progress, show_tables, status
 from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
@@ -77,6 +77,14 @@ def evaluate(
             help="Open the debugger where an agent raises, then stop. Agents run in this process; it needs a terminal.",
         ),
     ] = False,
+    profile: Annotated[
+        bool,
+        typer.Option(
+            "--profile",
+            rich_help_panel=DEVELOP_PANEL,
+            help="Print where CPU time goes, and write a flame graph for speedscope.app, in OUT/profile.",
+        ),
+    ] = False,
     dry_run: DryRun = False,
 ) -> None:
     """Evaluate agents on tasks; run again to resume.
@@ -86,11 +94,14 @@ def evaluate(
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
+    from evonav.report.profile import profiling
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     if houses is None and (assets is not None or start != "file"):
         raise typer.BadParameter("--assets and --start belong to --houses: tasks hold houses as they were generated")
+    if profile:
+        check_profile(run)
     if pdb:
         from evonav.evaluation.hosting.debugger import check_terminal
 
@@ -114,7 +125,8 @@ def evaluate(
         if dry_run:
             print_estimate(spending, names, task_files, config, run.num_workers)
             return
-        with running(out, config, has_bar=not pdb) as show, stopping_early(out):
+        sampling = profiling(out) if profile else nullcontext()
+        with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling:
             (summaries,) = evaluate_all(
                 [RunRequest(tuple(names), tuple(task_files), out, config)],
                 workforce,
@@ -123,6 +135,8 @@ def evaluate(
                 on_progress=lambda _, state: show(stopped_early(state, pdb) if fail_fast or pdb else state),
             )
     print_results(out, summaries)
+    if profile:
+        print_profile(out)
     exit_if_incomplete(summaries)
 
 
@@ -215,6 +229,31 @@ def print_results(out: Path, summaries: "list[AgentSummary]") -> None:
     print_table(summaries)
     print_failures(out)
     print_spending(out)
+
+
+def check_profile(run: "RunSettings") -> None:
+    """Check that all processes of a run can be sampled.
+
+    Raises:
+        BadParameter: They cannot.
+    """
+    from evonav.parallel.profiling import IS_SUPPORTED
+
+    if not IS_SUPPORTED:
+        raise typer.BadParameter("--profile needs a system with interval timers, such as Linux or macOS")
+    if run.engine == "ray":
+        raise typer.BadParameter("--profile samples workers on this machine only: use --engine local")
+    if run.isolation == "sandbox":
+        raise typer.BadParameter("--profile needs agents that can write their samples: use --isolation process")
+
+
+def print_profile(out: Path) -> None:
+    """Write the profile of a run, and print its tables."""
+    from evonav.report.profile import write_profile
+
+    profile = write_profile(out)
+    show_tables(profile.tables)
+    typer.echo(f"flame graph, for https://www.speedscope.app: {profile.flame_graph}")
 
 
 def exit_if_incomplete(summaries: "list[AgentSummary]") -> None:
