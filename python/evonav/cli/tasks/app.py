@@ -10,6 +10,7 @@ from evonav.cli.options import completion
 from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of, task_folder
 from evonav.cli.tasks.card import card
 from evonav.cli.tasks.generate import generate
+from evonav.cli.tasks.seal import key, seal, unseal
 from evonav.cli.tasks.stats import stats
 from evonav.cli.tasks.validate import validate
 from evonav.cli.tasks.write import write
@@ -170,4 +171,4 @@ def subset(
     typer.echo(f"{len(ids)} task ids in {out}")
 
 
-add_commands(tasks_app, generate, validate, stats, write, card)
+add_commands(tasks_app, generate, validate, stats, write, card, key, seal, unseal)

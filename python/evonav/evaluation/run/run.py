@@ -1,8 +1,9 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
+import os
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,8 +31,10 @@ from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import open_pool
 from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import FORMER, former_digest
-from evonav.tasks.listing import TaskFile
+from evonav.tasks.listing import KEY_VARIABLE, TaskFile
 
+SEALED_KEY = "is_sealed"
+"""Place in a run's header of whether its tasks were sealed, so that its records must not be shown."""
 NAMES_KEY = "key_of_names"
 """Place in a run's header of the secret key by which agents' names of tasks are made; nothing shows it."""
 
@@ -239,11 +242,16 @@ def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
     return replace(
         hosting,
         is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
-        hidden=tuple(
-            sorted({str(request.run_dir.absolute()), *(str(t.path.absolute().parent) for t in request.tasks)})
-        ),
+        hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
+
+
+def _hidden_from_agents(request: RunRequest) -> Iterator[Path]:
+    yield request.run_dir
+    yield from (task.path.parent for task in request.tasks)
+    if key := os.environ.get(KEY_VARIABLE):
+        yield Path(key)
 
 
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
@@ -271,6 +279,10 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
         hosting = _hosting(request, num_workers)
         if hosting.is_sandboxed:
             _check_sandbox(hosting, request.config.backend)
+        elif any(task.was_sealed for task in request.tasks):
+            raise InvalidArgumentError(
+                f"isolation = {hosting.isolation}: the tasks were sealed, so agents must not read them: use sandbox"
+            )
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
@@ -369,6 +381,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
+            SEALED_KEY: any(task.was_sealed for task in request.tasks),  # likewise
             CHECKED_KEY: True,
             NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }
