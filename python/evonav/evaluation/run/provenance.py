@@ -7,6 +7,7 @@ import subprocess
 import sys
 from datetime import datetime, timezone
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from evonav import __version__
 from evonav.evaluation.records.store import RunStore
 
 KEY = "sessions"
+_ADDRESS = "--base-url"
 MAX_SESSIONS = 50
 """Largest number of noted sessions: the first one and the latest."""
 
@@ -45,10 +47,18 @@ def session_facts() -> dict[str, Any]:
 
 
 def typed_command() -> str:
-    """Return the command as typed if it is evonav's, else an empty string."""
+    """Return the command as typed if it is evonav's, else an empty string.
+
+    Addresses of models' servers, which may hold a password, are `***`.
+    """
     name = Path(sys.argv[0]).name if sys.argv else ""
-    is_ours = name in ("evonav", "__main__.py")
-    return shlex.join(["evonav", *sys.argv[1:]]) if is_ours else ""
+    if name not in ("evonav", "__main__.py"):
+        return ""
+    arguments = [
+        "***" if before == _ADDRESS else f"{_ADDRESS}=***" if word.startswith(f"{_ADDRESS}=") else word
+        for before, word in pairwise(sys.argv)
+    ]
+    return shlex.join(["evonav", *arguments])
 
 
 @cache
