@@ -111,7 +111,8 @@ def _change(holder: Json, holders: list[Json], draws: random.Random) -> None:
     elif isinstance(old, bool):
         holder[key] = not old
     elif isinstance(old, int | float):
-        holder[key] = old + draws.choice((1, -1, 1e-6, 0.5, 1000))
+        step = draws.choice((1, -1, 1e-6, 0.5, 1000))
+        holder[key] = old + (step if abs(old) < 1e300 else 1)
     elif isinstance(old, str):
         holder[key] = mutated_bytes(old.encode(), draws).decode(errors="replace")
     elif isinstance(old, list):

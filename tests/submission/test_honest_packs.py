@@ -14,6 +14,7 @@ from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
 from evonav.submission.file import About, SubmissionFile
 from evonav.submission.pack import pack
+from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
@@ -55,6 +56,8 @@ def test_a_resumed_run_of_several_workers(tasks: list[TaskFile], tmp_path: Path)
         store.forget_episode("fu", tasks[1].task_id, 2)
     evaluate(["fu"], tasks[:2], tmp_path / "run", num_workers=2)
     assert_accepted(tmp_path / "run", tasks, limit=2, num_workers=2)
+    with SubmissionFile(tmp_path / "run.zip") as file:
+        assert packed_setup(file.header).isolation == "none, process"
 
 
 def test_a_retried_run_of_an_agent_that_takes_single_steps(

@@ -77,7 +77,10 @@ class Submission(_Part):
     """Version of evonav that packed the file."""
     about: About
     config: dict[str, Any]
-    """The run's protocol, seed, simulator, perception and decision model; only protocol and simulator are checked."""
+    """The run's protocol, seed, simulator, perception, decision model, and where its agents ran (`isolation`).
+
+    Only protocol and simulator are checked.
+    """
     tasks: tuple[PackedTask, ...]
     records: tuple[PackedRecords, ...]
     summary: dict[str, Any]

@@ -18,6 +18,7 @@ from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.provenance import KEY as SESSIONS_KEY
+from evonav.evaluation.run.provenance import isolations_of
 from evonav.parallel.folders import replacing
 from evonav.submission.file import EPOCH, HEADER_NAME, About, PackedRecords, PackedTask, Submission, member_name
 
@@ -81,7 +82,7 @@ def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> t
             )
         records[agent] = [record.model_copy(update={"trace": (), "entries": ()}) for record in mine]
         texts[agent] = "".join(f"{text}\n" for text in store.record_texts(agent)).encode()
-    config = store.meta("config")
+    config = {**store.meta("config"), "isolation": ", ".join(isolations_of(store)) or None}
     header = Submission(
         evonav=str(config["evonav"]),
         about=About(),

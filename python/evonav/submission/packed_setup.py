@@ -29,6 +29,8 @@ class PackedSetup:
     """The decision model's name, if it has one."""
     simulator: str
     """Simulator and camera, unless they are the usual ones."""
+    isolation: str
+    """The agents' `--isolation`; several if the run was continued with another."""
 
 
 def camera_of(backend: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,6 +64,7 @@ def packed_setup(header: Submission) -> PackedSetup:
         decision=",".join([kind, *rates]),
         model=str(decision.get("model", decision.get("path", ""))),
         simulator=",".join([simulator, *camera] if camera or simulator != _SIMULATOR else []),
+        isolation=str(header.config.get("isolation") or ""),
     )
 
 

@@ -107,6 +107,8 @@ def _print(file: Path, verdict: "Verdict") -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from evonav.submission.packed_setup import packed_setup
+
     marks = {True: ("ok", "green"), False: ("fail", "bold red")}
     print_checks(
         f"{file.name}: {'accepted' if verdict.is_accepted else 'REJECTED'}",
@@ -115,6 +117,9 @@ def _print(file: Path, verdict: "Verdict") -> None:
     num_tasks = 0 if verdict.submission is None else len(verdict.submission.tasks)
     if verdict.is_accepted and verdict.num_required < num_tasks:
         typer.echo(f"verified {verdict.num_required} of {counted(num_tasks, 'task')}; without --limit, all")
+    if verdict.is_accepted and verdict.submission is not None:
+        isolation = packed_setup(verdict.submission).isolation
+        typer.echo(f"isolation of agents, as the run notes it: {isolation or 'not noted'}")
     if verdict.is_accepted and verdict.summary is not None:
         scores = Table(title="SR and SPL in %, as scored again")
         for column in ("agent", "n", "SR", "SPL"):

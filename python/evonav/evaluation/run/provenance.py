@@ -15,6 +15,7 @@ from evonav import __version__
 from evonav.evaluation.records.store import RunStore
 
 KEY = "sessions"
+_ISOLATIONS_KEY = "isolations"
 _ADDRESS = "--base-url"
 MAX_SESSIONS = 50
 """Largest number of noted sessions: the first one and the latest."""
@@ -30,7 +31,18 @@ def note_session(store: RunStore, num_workers: int, isolation: str) -> None:
     """
     before = store.meta(KEY) or []
     sessions = [*before[:1], *before[1:][-(MAX_SESSIONS - 2) :]]
-    store.set_meta(KEY, [*sessions, {**session_facts(), "workers": num_workers, "isolation": isolation}])
+    kind = isolation.partition(" ")[0]
+    store.set_header(
+        {
+            KEY: [*sessions, {**session_facts(), "workers": num_workers, "isolation": isolation}],
+            _ISOLATIONS_KEY: sorted({*isolations_of(store), kind}),
+        }
+    )
+
+
+def isolations_of(store: RunStore) -> list[str]:
+    """Return every `--isolation` with which agents of a run were evaluated; empty in runs that note none."""
+    return store.meta(_ISOLATIONS_KEY) or []
 
 
 def session_facts() -> dict[str, Any]:
