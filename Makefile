@@ -7,7 +7,7 @@ LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
+.PHONY: help setup demo test fuzz test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -39,6 +39,12 @@ test: export PROPTEST_RNG_SEED ?= 20261121
 test: setup  ## run every Rust and Python test
 	cargo test --workspace
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_OPTIONS)
+
+# CI runs 300 cases as a test. SEED and CASES are which and how many.
+SEED ?= 0
+CASES ?= 100000
+fuzz: setup  ## fuzz the reader of packed runs with 100,000 mutated files
+	PYTHONPATH=tests/helpers $(BIN)/python tests/fuzzing/fuzz.py packs --seed $(SEED) --cases $(CASES)
 
 # Whole houses by the published generator, which has an environment of its own (docs/procthor.md).
 $(VENV)-procthor/.dependencies: pyproject.toml

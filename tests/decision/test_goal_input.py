@@ -28,7 +28,7 @@ from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.evaluation.run.settings_model import SettingError
 from evonav.memory.colours import Layout, layouts
-from evonav.submission.pack import Submission
+from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import COLOURS

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import SimulatorSettings
-from evonav.submission.pack import About, pack
+from evonav.submission.file import About
+from evonav.submission.pack import pack
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
 from evonav.tasks.bundled import bundled_tasks

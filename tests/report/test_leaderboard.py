@@ -17,9 +17,10 @@ from evonav.cli import app
 from evonav.evaluation.metrics.navigation import summarise
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import evaluate
+from evonav.submission.file import About
 from evonav.submission.leaderboard import Leaderboard, TaskSet, Unranked, packed_files, rank
 from evonav.submission.leaderboard_page import write_leaderboard
-from evonav.submission.pack import About, pack
+from evonav.submission.pack import pack
 from evonav.tasks.bundled import FORMER_IMAGES, bundled_tasks
 from evonav.tasks.listing import task_files
 
@@ -128,7 +129,7 @@ def test_false_actions_are_found_unless_only_scores_are_checked(folder: Path, ta
     ours = folder / "packs" / "ours.evonav.zip"
     with zipfile.ZipFile(ours) as source:
         before = source.read("records/1.jsonl")
-        after = before.replace(b'"is_geodesic_success":true', b'"is_geodesic_success":false', 1)
+        after = before.replace(b'"is_action_success":true', b'"is_action_success":false', 1)
         assert after != before
         header = source.read("submission.json")
     with zipfile.ZipFile(tmp_path / "x.evonav.zip", "w", zipfile.ZIP_DEFLATED) as target:

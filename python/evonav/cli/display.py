@@ -102,6 +102,7 @@ def write_texts(
 def print_table(summaries: "list[AgentSummary]") -> None:
     """Print the rates of agents, and how many stages are missing."""
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target moved")
     table.add_column("agent", overflow="fold", min_width=12)  # may be a long path
@@ -110,13 +111,13 @@ def print_table(summaries: "list[AgentSummary]") -> None:
     for summary in summaries:
         splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
         table.add_row(
-            summary.agent,
+            Text(summary.agent),
             str(summary.n),
-            _percent(summary.sr),
+            percent(summary.sr),
             _percent_interval(summary.sr_ci95),
-            _percent(summary.spl),
+            percent(summary.spl),
             _percent_interval(summary.spl_ci95),
-            *("-" if rates is None else f"{_percent(rates.sr)} ({rates.n})" for rates in splits),
+            *("-" if rates is None else f"{percent(rates.sr)} ({rates.n})" for rates in splits),
         )
     show(table)
     for summary in summaries:
@@ -125,7 +126,8 @@ def print_table(summaries: "list[AgentSummary]") -> None:
             typer.echo(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
 
 
-def _percent(value: float | None) -> str:
+def percent(value: float | None) -> str:
+    """Return a rate of 0 to 1 in percent, `-` without one."""
     return "-" if value is None else f"{100 * value:.1f}"
 
 

@@ -19,9 +19,12 @@ from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.counting import Counting
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.relay import RelayedClient
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
 
+VLM = "evonav.decision.backends:vlm"
+"""Import path of `vlm`."""
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
     "top_p": 0.95,
@@ -84,6 +87,7 @@ def vlm(
     noise: Mapping[str, float] | None = None,
     tells_of_change: bool | None = None,
     goal_input: GoalInput = "text",
+    relay: int | None = None,
 ) -> DecisionModel:
     """Make a model behind an OpenAI-compatible endpoint.
 
@@ -104,24 +108,59 @@ def vlm(
         noise: Rates of mistakes.
         tells_of_change: See `with_notice`.
         goal_input: Form of the goal that agents go by: text, image or both.
+        relay: Descriptor of a connection to a process that asks the model for this one, see `RelayedClient`; options
+            on how the model is reached are that process's.
 
     Raises:
         InvalidArgumentError: An option makes no sense.
         StoreError: The file of exchanges cannot be opened.
     """
+    client: VlmClient | RelayedClient
+    if relay is None:
+        client = vlm_client(
+            model=model,
+            request=request,
+            server=server,
+            cache=cache,
+            mode=mode,
+            keeps_images=keeps_images,
+            ledger=ledger,
+            account=account,
+            price=price,
+            max_cost_usd=max_cost_usd,
+        )
+    else:
+        client = RelayedClient(relay, never_asks=mode == "replay")
+    decision = VlmDecision(
+        client, structured=structured, needs_images=images, tells_of_change=tells_of_change, goal_input=goal_input
+    )
+    return _with_noise(decision, noise, seed)
+
+
+def vlm_client(
+    *,
+    model: str,
+    request: Mapping[str, Any] | None = None,
+    server: Mapping[str, Any] | None = None,
+    cache: str | None = None,
+    mode: Any = None,  # noqa: ANN401 - JSON, checked
+    keeps_images: bool = True,
+    ledger: str | None = None,
+    account: str | None = None,
+    price: Sequence[float] | None = None,
+    max_cost_usd: float | None = None,
+    **_: Any,  # noqa: ANN401 - other options of `vlm`, which say how its answers are used
+) -> VlmClient:
+    """Make the client of `vlm`, which has its arguments and errors."""
     store = None if cache is None else ResponseCache(Path(cache))
-    config = vlm_config(model, request, server)
     booked = Account(
         None if price is None else Price(*price),
         max_cost_usd,
         ledger=None if ledger is None else Ledger(ledger),
         model=account or model,
     )
-    client = VlmClient(config, store=store, mode=mode, account=booked, keeps_failures=True, keeps_images=keeps_images)
-    decision = VlmDecision(
-        client, structured=structured, needs_images=images, tells_of_change=tells_of_change, goal_input=goal_input
-    )
-    return _with_noise(decision, noise, seed)
+    config = vlm_config(model, request, server)
+    return VlmClient(config, store=store, mode=mode, account=booked, keeps_failures=True, keeps_images=keeps_images)
 
 
 def own(

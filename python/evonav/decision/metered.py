@@ -53,13 +53,17 @@ class Metered:
             "num_questions": self._num_questions,
         }
         account = _account_of(self.model)
-        if account is not None:
-            costs["num_replayed"] = account.num_replayed
-            costs["input_tokens"] = account.usage.input_tokens
-            costs["output_tokens"] = account.usage.output_tokens
-            if account.cost_usd is not None:
-                costs["cost_usd"] = account.cost_usd
-        return costs
+        return costs if account is None else {**costs, **account_costs(account)}
+
+
+def account_costs(account: Account) -> dict[str, float]:
+    """Return the tokens of an account, and money if it knows prices."""
+    costs: dict[str, float] = {
+        "num_replayed": account.num_replayed,
+        "input_tokens": account.usage.input_tokens,
+        "output_tokens": account.usage.output_tokens,
+    }
+    return costs if account.cost_usd is None else {**costs, "cost_usd": account.cost_usd}
 
 
 def _account_of(model: Any) -> Account | None:  # noqa: ANN401 - any wrapper

@@ -7,7 +7,7 @@ from evonav.drawing.svg import slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.cards.hub_benchmark import METRICS, RESULTS_DIR, eval_results_yaml
 from evonav.report.cards.yaml_text import Yaml
-from evonav.submission.pack import SUFFIX, SubmissionFile
+from evonav.submission.file import SUFFIX, SubmissionFile
 from evonav.submission.packed_setup import packed_setup
 
 

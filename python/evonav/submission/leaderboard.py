@@ -8,9 +8,10 @@ from pathlib import Path
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentSummary, summarise
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.submission.pack import SUFFIX, Submission, SubmissionError, SubmissionFile
-from evonav.submission.packed_setup import packed_setup
-from evonav.submission.verify import Verdict, read_records, verify
+from evonav.submission.archive import SubmissionError
+from evonav.submission.file import SUFFIX, Submission, SubmissionFile
+from evonav.submission.packed_setup import PackedSetup, packed_setup
+from evonav.submission.verify import Verdict, brief, read_records, verify
 from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
 from evonav.tasks.listing import TaskFile
 
@@ -62,6 +63,8 @@ class Entry:
     date: str | None
     model: str
     """The decision model's name, if it has one."""
+    isolation: str
+    """The agent's `--isolation`; empty if the file does not say it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,8 +136,8 @@ def rank(
                 board.unranked.append(reason)
                 continue
             setup = packed_setup(header)
-            entries = list(_entries(path, header, date, setup.model))
-        except SubmissionError as error:
+            entries = list(_entries(path, header, date, setup))
+        except (SubmissionError, InvalidArgumentError) as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
         images = FORMER_IMAGES if any(is_former(task.task_id, task.digest) for task in header.tasks) else ""
@@ -186,10 +189,10 @@ def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -
     return None
 
 
-def _entries(path: Path, header: Submission, date: str | None, model: str) -> Iterable[tuple[str, Entry]]:
+def _entries(path: Path, header: Submission, date: str | None, setup: PackedSetup) -> Iterable[tuple[str, Entry]]:
     """Yield each agent of a verified file with the SHA-256 of its records."""
     num_stages = sum(task.num_stages for task in header.tasks)
     with SubmissionFile(path) as file:
         for part in header.records:
-            summary = summarise(part.agent, read_records(file, part), num_stages)
-            yield part.sha256, Entry(path.name, summary, header, date, model)
+            summary = summarise(part.agent, [brief(record) for record in read_records(file, part)], num_stages)
+            yield part.sha256, Entry(path.name, summary, header, date, setup.model, setup.isolation)

@@ -23,7 +23,7 @@ _DECISIONS = {
     "vlm": "decisions by a model",
     "own": "decisions by a model of its own",
 }
-_COLUMNS = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "Entry", "Model", "Seed", "Date", "evonav", "File")
+_COLUMNS = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "Entry", "Model", "Seed", "Date", "evonav", "Isolation", "File")
 
 
 def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
@@ -87,6 +87,7 @@ def _row(entry: Entry) -> dict[str, object]:
             short(str(entry.header.config.get("seed", NONE))),
             entry.date or NONE,
             short(entry.header.evonav),
+            short(entry.isolation) or NONE,
             short(entry.file),
         ],
     }

@@ -4,13 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.run.components import USUAL_CAMERA, Backend
 from evonav.evaluation.run.settings import RULES
 from evonav.perception.shorthand import word_of
-from evonav.submission.pack import Submission
+from evonav.submission.file import Submission
 
 _SIMULATOR = f"{Backend.__module__}:embedded_simulator"
+
+CAMERA_LIMITS = {"width_px": (1, 2048), "height_px": (1, 2048), "hfov_deg": (1, 179)}
+"""Least and largest options of a packed run's camera: images that any machine can hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +29,23 @@ class PackedSetup:
     """The decision model's name, if it has one."""
     simulator: str
     """Simulator and camera, unless they are the usual ones."""
+    isolation: str
+    """The agents' `--isolation`; several if the run was continued with another."""
 
 
 def camera_of(backend: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options of a packed run's camera that are not the usual ones."""
+    """Return the options of a packed run's camera that are not the usual ones.
+
+    Raises:
+        InvalidArgumentError: An option is no number, or outside of `CAMERA_LIMITS`.
+    """
     options = _mapping(backend.get("simulator_options"))
-    return {key: options[key] for key in USUAL_CAMERA if key in options}
+    camera = {key: options[key] for key in USUAL_CAMERA if key in options}
+    for key, value in camera.items():
+        least, most = CAMERA_LIMITS[key]
+        if type(value) not in (int, type(USUAL_CAMERA[key])) or not least <= value <= most:
+            raise InvalidArgumentError(f"{key} = {str(value)[:100]}: must be a number of {least} to {most}")
+    return camera
 
 
 def packed_setup(header: Submission) -> PackedSetup:
@@ -49,6 +64,7 @@ def packed_setup(header: Submission) -> PackedSetup:
         decision=",".join([kind, *rates]),
         model=str(decision.get("model", decision.get("path", ""))),
         simulator=",".join([simulator, *camera] if camera or simulator != _SIMULATOR else []),
+        isolation=str(header.config.get("isolation") or ""),
     )
 
 

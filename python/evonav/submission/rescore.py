@@ -18,13 +18,13 @@ from evonav.agents.agent import (
     RoundDiagnostics,
     SensorConfig,
     Stop,
-    ViewSchedule,
 )
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.convert import sensor_config
 from evonav.evaluation.records.record_diff import record_differences
 from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
 from evonav.evaluation.run.components import Backend
@@ -51,7 +51,9 @@ class RecordedAgent:
         """Turn to the stage's record."""
         self._record = self._records[goal.stage]
         self._num_acted = 0
-        self.sensors = _sensing_of(self._record)
+        if self._record.sensing is None:
+            raise InvalidArgumentError(f"{self._record.task_id} stage {goal.stage}: the record has no `sensing`")
+        self.sensors = sensor_config(self._record.sensing)
 
     def act(self, observation: Observation) -> AgentAction:
         """Return the recorded action of this round."""
@@ -151,19 +153,6 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
         return json.dumps([[stage, list(differences)] for stage, differences in found if differences])
 
     return answer
-
-
-def _sensing_of(record: StageRecord) -> SensorConfig:
-    granted = record.sensing
-    if granted is None:
-        raise InvalidArgumentError(f"{record.task_id} stage {record.stage}: the record has no `sensing`")
-    return SensorConfig(
-        first_round=ViewSchedule(*granted.first_round),
-        later_rounds=ViewSchedule(*granted.later_rounds),
-        motion=granted.motion,
-        max_travel_m=granted.max_travel_m,
-        occupancy_range_m=granted.occupancy_range_m,
-    )
 
 
 def _action_of(recorded: ActionRecord) -> AgentAction:

@@ -5,32 +5,37 @@ No file can show that an agent chose its actions by itself: for that, the agent 
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
-from evonav.evaluation.metrics.scoring import score_stage
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
-from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
+from evonav.submission.archive import SubmissionError
+from evonav.submission.file import PackedRecords, Submission, SubmissionFile, first_problem
+from evonav.submission.pack import packed_summary
 from evonav.submission.packed_setup import camera_of
+from evonav.submission.recorded_path import TOLERANCE, path_findings
 from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
 """Findings that one check lists; the others are counted."""
-TOLERANCE = 1e-9
-"""Allowed difference of a claimed score, since other machines may round sums differently."""
+MAX_FINDING = 300
+"""Longest finding, in characters."""
 EPISODE_TIMEOUT_S = 1800.0
 _OUR_SIMULATORS = ("embedded_simulator", "lenient_simulator")
 """Simulators in which actions can be executed again; no other name is taken from a file."""
@@ -57,11 +62,94 @@ class Verdict:
     """True if the actions were executed again; otherwise scores only agree with the traces."""
     num_required: int = 0
     """Number of tasks that were required, and whose actions were executed again."""
+    summary: Mapping[str, Any] | None = None
+    """The scores of the required tasks, computed from the records; `None` if they were not read to their end."""
 
     @property
     def is_accepted(self) -> bool:
         """True if every check passed."""
         return all(check.is_passed for check in self.checks)
+
+
+@dataclass(slots=True)
+class _Findings:
+    """Counts what contradicts a check, and keeps the first findings."""
+
+    shown: list[str] = field(default_factory=list)
+    num: int = 0
+
+    def add(self, findings: Iterable[str], where: str = "") -> None:
+        """Add findings, and name where they are."""
+        for finding in findings:
+            self.num += 1
+            if len(self.shown) < MAX_WORDS:
+                self.shown.append(_shown(f"{where}: {finding}" if where else finding))
+
+    def check(self, name: str, if_none: str) -> Check:
+        """Return the check that is passed without findings."""
+        more = f"; and {self.num - MAX_WORDS} more" if self.num > MAX_WORDS else ""
+        return Check(name, self.num == 0, "; ".join(self.shown) + more if self.num else if_none)
+
+
+class _Records:
+    """The records of a file, read one after the other; what scores need of them is kept."""
+
+    def __init__(self, file: SubmissionFile, known: Mapping[str, TaskFile]) -> None:
+        """Read the records of a file whose tasks are all known.
+
+        Raises:
+            SubmissionError: A member is not what the header says, or a line is not a record as evonav writes it.
+        """
+        self.brief: dict[str, list[StageRecord]] = {}
+        """Records without rounds and memory, by agent."""
+        self.complete, self.targets, self.paths = _Findings(), _Findings(), _Findings()
+        self._known = known
+        self._protocol = ProtocolConfig.from_header(file.header.config["protocol"])
+        self._expected = [
+            (task.task_id, stage) for task in file.header.tasks for stage in range(1, task.num_stages + 1)
+        ]
+        if not file.header.records:
+            self.complete.add(["there is no agent"])
+        for part in file.header.records:
+            if part.agent in self.brief:
+                self.complete.add([f"{part.agent} is there twice"])
+            if part.agent in ORACLE_BASELINES:
+                self.complete.add([f"{part.agent} is an oracle baseline: it knows what agents do not"])
+            self.brief[part.agent] = self._of_agent(file, part)
+
+    def _of_agent(self, file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
+        mine: list[StageRecord] = []
+        records, task_id, spec, before = read_records(file, part), "", None, None
+        for expected, record in zip(self._expected, records, strict=False):  # in this order: none is taken and lost
+            found = (record.task_id, record.stage)
+            if found != expected:
+                stage = f"{found[0]} stage {found[1]} instead of {expected[0]} stage {expected[1]}"
+                self.complete.add([f"not every stage of every task, once and in order: {stage}"], part.agent)
+                break
+            where = f"{part.agent} {record.task_id} stage {record.stage}"
+            if record.agent != part.agent:
+                self.complete.add([f"a record of {record.agent}"], where)
+            if not record.is_scored and record.state is not EndState.GUIDED:
+                self.complete.add([f"it is {record.state.value}"], where)
+            if record.task_id != task_id:
+                task_id, before, spec = record.task_id, None, self._spec(record.task_id)
+            if spec is not None:
+                self.targets.add(_target_findings(record, spec), where)
+            self.paths.add(path_findings(record, before, self._protocol), where)
+            before = brief(record)
+            mine.append(before)
+        else:
+            num_found = len(mine) + sum(1 for _ in records)
+            if num_found != len(self._expected):
+                self.complete.add([f"{num_found} records of {len(self._expected)} stages"], part.agent)
+        return mine
+
+    def _spec(self, task_id: str) -> EpisodeSpec | None:
+        try:
+            return Backend().tasks.create(self._known[task_id].path)
+        except EvonavError as error:
+            self.targets.add([f"the task to verify with cannot be read: {error}"], task_id)
+            return None
 
 
 def verify(
@@ -83,28 +171,46 @@ def verify(
         num_workers: Number of processes; 0 runs in this one.
         on_progress: Called with the number of episodes executed again, and of all.
     """
-    checks: list[Check] = []
-    try:
-        with SubmissionFile(path) as file:
-            header = file.header
-            records = {part.agent: read_records(file, part) for part in header.records}
-    except SubmissionError as error:
-        return Verdict((Check("file", False, str(error)),), None, False)
-    checks.append(Check("file", True, f"records: {sum(map(len, records.values()))}, agents: {', '.join(records)}"))
     known = {task.task_id: task for task in tasks}
     required = list(known)[:limit]
-    checks.append(_check("protocol", _protocol_findings(header), "the benchmark's"))
-    checks.append(_check("tasks", _task_findings(header, known, required), _known_tasks(header)))
-    checks.append(_check("complete", _gaps(header, records), "every stage once, and scored"))
-    if all(check.is_passed for check in checks):
-        scored = (finding for mine in records.values() for record in mine for finding in score_findings(record, header))
-        checks.append(_check("paths", scored, "lengths, distances, success and SPL follow from the recorded paths"))
-        checks.append(_check("scores", _claims(header, records), "the claimed summary is that of the records"))
-        if not scores_only:
-            chosen = {agent: [r for r in mine if r.task_id in set(required)] for agent, mine in records.items()}
-            found = _rescore(header, chosen, known, num_workers, on_progress)
-            checks.append(_check("actions", found, "replayed, they give the same records, byte for byte"))
-    return Verdict(tuple(checks), header, checks[-1].name == "actions", len(required))
+    try:
+        with SubmissionFile(path) as file:
+            return _verdict(file, known, required, None if scores_only else (num_workers, on_progress))
+    except SubmissionError as error:
+        return Verdict((Check("file", False, _shown(str(error), len(str(path)) + 2 * MAX_FINDING)),), None, False)
+
+
+def _verdict(
+    file: SubmissionFile,
+    known: Mapping[str, TaskFile],
+    required: Sequence[str],
+    replay: tuple[int, Callable[[int, int], None]] | None,
+) -> Verdict:
+    header = file.header
+    agents = ", ".join(part.agent for part in header.records)
+    checks = [
+        _check("protocol", _protocol_findings(header), "the benchmark's"),
+        _check("tasks", _task_findings(header, known, required), _known_tasks(header)),
+    ]
+    if not all(check.is_passed for check in checks):
+        unread = Check("file", True, _shown(f"the header; the records of {agents} were not read"))
+        return Verdict((unread, *checks), header, False, len(required))
+    records = _Records(file, known)
+    num_records = sum(map(len, records.brief.values()))
+    checks.insert(0, Check("file", True, _shown(f"records: {num_records}, agents: {agents}")))
+    checks.append(records.complete.check("complete", "every stage once, and scored"))
+    if not all(check.is_passed for check in checks):
+        return Verdict(tuple(checks), header, False, len(required))
+    checks.append(records.targets.check("targets", "houses, goals, targets and changes are those of the tasks"))
+    follows = "lengths, distances, success and SPL follow from the recorded paths"
+    checks.append(records.paths.check("paths", follows))
+    checks.append(_check("scores", _claims(header, records.brief), "the claimed summary is that of the records"))
+    if replay is not None:
+        found = _rescore(file, known, required, *replay)
+        checks.append(_check("actions", found, "replayed, they give the same records, byte for byte"))
+    chosen = {agent: [r for r in mine if r.task_id in set(required)] for agent, mine in records.brief.items()}
+    num_stages = sum(task.num_stages for task in header.tasks if task.task_id in set(required))
+    return Verdict(tuple(checks), header, replay is not None, len(required), packed_summary(chosen, num_stages))
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
@@ -115,76 +221,32 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "is_rescored": verdict.is_rescored,
         "checks": [asdict(check) for check in verdict.checks],
         "about": None if header is None else header.about.model_dump(),
-        "summary": None if header is None else header.summary,
+        "summary": verdict.summary,
     }
 
 
-def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
-    """Yield the contradictions between a scored record and its own path.
-
-    The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
-    """
-    if record.state is EndState.GUIDED:
-        return  # a guided stage has no score
-    where = f"{record.agent} {record.task_id} stage {record.stage}"
-    start, end, trace = record.effective_start, record.terminal, record.trace
-    if start is None or end is None or record.reference_length_m is None or record.path_length_m is None or not trace:
-        yield f"{where}: a scored stage without start, end, rounds or lengths"
-        return
-    points = [(start.x_m, start.z_m), *(point for entry in trace for point in entry.path_m), (end.x_m, end.z_m)]
-    if any(
-        before.path_m[-1] != after.path_m[0] or (after.pose.x_m, after.pose.z_m) != after.path_m[0]
-        for before, after in pairwise(trace)
-    ):
-        yield f"{where}: the path jumps between rounds"
-    if points[0] != points[1] or points[-1] != points[-2]:
-        yield f"{where}: the path does not lead from start to end"
-    length_m = sum(math.fsum(math.dist(a, b) for a, b in pairwise(entry.path_m)) for entry in trace)
-    target = (record.target.position_m[0], record.target.position_m[2])
-    score = score_stage(
-        points[0],
-        points[-1],
-        target,
-        path_length_m=length_m,
-        reference_length_m=record.reference_length_m,
-        success_radius_m=header.config["protocol"]["success_radius_m"],
-    )
-    made: dict[str, object] = {
-        "num_rounds": len(trace),
-        "num_target_visible_rounds": sum(entry.is_target_visible for entry in trace),
-        "has_stopped": trace[-1].action.kind == "stop",
-        "state": EndState.SUCCESS if score.is_success else EndState.FAILURE,
-        "path_length_m": length_m,
-        "start_distance_m": score.start_distance_m,
-        "terminal_distance_m": score.terminal_distance_m,
-        "spl": score.spl,
-        "soft_spl": score.soft_spl,
-    }
-    for field, value in made.items():
-        claimed = getattr(record, field)
-        is_close = isinstance(value, float) and claimed is not None and math.isclose(claimed, value, abs_tol=TOLERANCE)
-        if not is_close and claimed != value:
-            yield f"{where}: {field} is {claimed}, its path gives {value}"
-
-
-def read_records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
-    """Return the records of one agent.
+def read_records(file: SubmissionFile, part: PackedRecords) -> Iterator[StageRecord]:
+    """Yield the records of one agent.
 
     Raises:
         SubmissionError: The member is not what the header says, or a line is not a record as evonav writes it.
     """
-    records = []
     for number, text in enumerate(file.texts(part), start=1):
+        where = f"{file.path}: {part.member}, line {number}"
         try:
             record = StageRecord.model_validate_json(text)
+            is_ours = record.model_dump_json() == text
         except ValidationError as error:
-            first = error.errors()[0]
-            field = ".".join(str(step) for step in first["loc"])
-            raise SubmissionError(f"{file.path}: {part.member}, line {number}: {field}: {first['msg']}") from error
-        if record.model_dump_json() != text:
-            raise SubmissionError(f"{file.path}: {part.member}, line {number}: not as evonav writes records")
-        records.append(record)
-    return records
+            raise SubmissionError(f"{where}: {first_problem(error)}") from error
+        if not is_ours:
+            raise SubmissionError(f"{where}: not as evonav writes records")
+        yield record
+
+
+def brief(record: StageRecord) -> StageRecord:
+    """Return what scores need of a record."""
+    large = {"trace": (), "entries": (), "stale_entries": (), "moved_objects": (), "stop_reason": ""}
+    return record.model_copy(update=large)
 
 
 def _protocol_findings(header: Submission) -> Iterator[str]:
@@ -195,9 +257,19 @@ def _protocol_findings(header: Submission) -> Iterator[str]:
     # Packs of earlier versions have other reference paths, and no entry for them.
     is_earlier = "reference_in_room" not in claimed
     expected = ProtocolConfig(reference_in_room=not is_earlier).header()
-    for name in expected.keys() | claimed.keys():
-        if claimed.get(name) != expected.get(name):
-            yield f"{name} is {claimed.get(name)}, the benchmark's is {expected.get(name)}"
+    for name in sorted(expected.keys() | claimed.keys()):
+        value, right = claimed.get(name), expected.get(name)
+        if value != right or type(value) is not type(right):
+            yield f"{name} is {value!r}, the benchmark's is {right!r}"
+    yield from _camera_findings(header)
+
+
+def _camera_findings(header: Submission) -> Iterator[str]:
+    backend = header.config.get("backend")
+    try:
+        camera_of(backend if isinstance(backend, dict) else {})
+    except InvalidArgumentError as error:
+        yield f"backend.simulator_options.{error}"
 
 
 def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: Sequence[str]) -> Iterator[str]:
@@ -209,7 +281,10 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
             yield f"{task.task_id} is not among the tasks to verify with"
         elif there.num_stages != task.num_stages or task.digest not in (there.digest, former_digest(there)):
             yield f"{task.task_id} is another task than the one of this name"
-    packed = {task.task_id for task in header.tasks}
+    names = [task.task_id for task in header.tasks]
+    if names != sorted(set(names)):
+        yield "they are not each there once, in order"
+    packed = set(names)
     missing = set(required) - packed
     if missing and packed == set(required[: len(packed)]):
         yield f"only the first {len(packed)} of {len(required)} are there: --limit {len(packed)} verifies those"
@@ -223,22 +298,18 @@ def _known_tasks(header: Submission) -> str:
     return f"{len(header.tasks)}, all known" + (f"; {num_former} with {FORMER_IMAGES}" if num_former else "")
 
 
-def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
-    if len(records) != len(header.records) or not records:
-        yield "an agent is there twice, or none is"
-    expected = sorted((task.task_id, stage) for task in header.tasks for stage in range(1, task.num_stages + 1))
-    for part in header.records:
-        mine = records[part.agent]
-        if part.agent in ORACLE_BASELINES:
-            yield f"{part.agent} is an oracle baseline: it knows what agents do not"
-        if [(record.task_id, record.stage) for record in mine] != expected:
-            yield f"{part.agent}: not every stage of every task, once and in order"
-        for record in mine:
-            if record.agent != part.agent:
-                yield f"{part.agent}: a record of {record.agent}"
-            # Whether the task has this guided stage shows when the actions are executed again.
-            if not record.is_scored and record.state is not EndState.GUIDED:
-                yield f"{part.agent} {record.task_id} stage {record.stage} is {record.state.value}"
+def _target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:
+    """Yield where a record describes another stage than the task's."""
+    blank, stage = spec.blank_record(record.agent, record.stage), spec.stages[record.stage - 1]
+    transition = record.transition.model_copy(update={"is_agent_in_room": blank.transition.is_agent_in_room})
+    found = record.model_copy(update={"transition": transition})
+    for name in ("house", "num_stages", "goal", "target", "transition"):
+        if getattr(found, name) != getattr(blank, name):
+            yield f"{name} is another than the task's"
+    if (record.state is EndState.GUIDED) != (stage.guided is not None):
+        yield f"it is {record.state.value}, the task's stage is {'not ' if stage.guided is None else ''}guided"
+    if record.stage == 1 and record.requested_start != pose_record(spec.start):
+        yield "requested_start is another than the task's"
 
 
 def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
@@ -270,12 +341,13 @@ def _is_close(claimed: Any, computed: Any) -> bool:  # noqa: ANN401 - JSON
 
 
 def _rescore(
-    header: Submission,
-    records: Mapping[str, Sequence[StageRecord]],
+    file: SubmissionFile,
     known: Mapping[str, TaskFile],
+    required: Sequence[str],
     num_workers: int,
     on_progress: Callable[[int, int], None],
 ) -> Iterator[str]:
+    header = file.header
     backend = with_current_paths(header.config.get("backend"))
     simulator = str(backend.get("simulator")) if isinstance(backend, dict) else ""
     module, _, name = simulator.partition(":")
@@ -283,19 +355,21 @@ def _rescore(
         yield f"simulator {simulator!r}: actions can be replayed only in evonav's own simulator (see --scores-only)"
         return
     settings = {"protocol": header.config["protocol"], "simulator": simulator, "camera": camera_of(backend)}
-    episodes: dict[tuple[str, str], list[StageRecord]] = {}
-    for agent, mine in records.items():
-        for record in mine:
-            episodes.setdefault((agent, record.task_id), []).append(record)
-    names = list(episodes)
+    chosen = set(required)
+    num_episodes = len(header.records) * len(chosen & {task.task_id for task in header.tasks})
+    names: list[tuple[str, str]] = []
+
+    def jobs() -> Iterator[Job]:
+        for part in header.records:
+            for task_id, mine in groupby(read_records(file, part), key=lambda record: record.task_id):
+                if task_id in chosen:
+                    names.append((part.agent, task_id))
+                    yield Job(len(names) - 1, _episode_text(known[task_id].path, mine))
+
     work = "evonav.submission.rescore:work"
     with open_pool(work, json.dumps(settings), Workforce(num_workers), timeout_s=EPISODE_TIMEOUT_S) as pool:
-        jobs = (
-            Job(number, _episode_text(known[task_id].path, mine))
-            for number, ((_, task_id), mine) in enumerate(episodes.items())
-        )
-        for num_done, answer in enumerate(answers(pool, jobs), start=1):
-            on_progress(num_done, len(names))
+        for num_done, answer in enumerate(answers(pool, jobs()), start=1):
+            on_progress(num_done, num_episodes)
             agent, task_id = names[answer.key]
             if answer.failure is not None:
                 yield f"{agent} {task_id}: {answer.detail.strip().splitlines()[-1]}"
@@ -304,13 +378,17 @@ def _rescore(
                 yield f"{agent} {task_id} stage {stage}: {'; '.join(differences)}"
 
 
-def _episode_text(path: Path, records: Sequence[StageRecord]) -> str:
+def _episode_text(path: Path, records: Iterable[StageRecord]) -> str:
     return json.dumps({"path": str(path), "records": [record.model_dump_json() for record in records]})
 
 
 def _check(name: str, findings: Iterator[str], if_none: str) -> Check:
-    found = list(findings)
-    if not found:
-        return Check(name, True, if_none)
-    more = f"; and {len(found) - MAX_WORDS} more" if len(found) > MAX_WORDS else ""
-    return Check(name, False, "; ".join(found[:MAX_WORDS]) + more)
+    found = _Findings()
+    found.add(findings)
+    return found.check(name, if_none)
+
+
+def _shown(text: str, length: int = MAX_FINDING) -> str:
+    """Return a text of a file as it can be printed: on one line, without control characters, cut if it is long."""
+    line = "".join(letter if letter.isprintable() else " " for letter in text[:length])
+    return line if len(text) <= length else f"{line[:-1]}…"

@@ -328,19 +328,27 @@ def _endpoint(where: Where) -> Result:
     if not where.uses_network:
         return "ok", f"{shown} configured, not asked (--no-network)"
     from urllib.error import HTTPError, URLError
-    from urllib.request import Request, urlopen
+    from urllib.request import HTTPRedirectHandler, Request, build_opener
+
+    from evonav.decision.vlm.secrets import without_secrets
+
+    class NoRedirects(HTTPRedirectHandler):
+        """Keeps the key from the server that another one names: a redirection is answered as an error is."""
+
+        def redirect_request(self, *_: object) -> None:
+            return None
 
     if not url.startswith(("http://", "https://")):
         return "failed", f"{shown}: no http address", f"set {URL_VARIABLE} to http(s)://.../v1"
     request = Request(f"{shown}/models", headers={"Authorization": f"Bearer {key or 'none'}"})  # noqa: S310 - http
     try:
-        with urlopen(request, timeout=PING_S) as answer:  # noqa: S310 - http
+        with build_opener(NoRedirects).open(request, timeout=PING_S) as answer:
             answer.read(1)
     except HTTPError as error:
         is_key = error.code in (401, 403)
         remedy = f"check {KEY_VARIABLE}" if is_key else f"check {URL_VARIABLE}: it ends in /v1 for most servers"
         return "failed", f"{shown} answers {error.code}", remedy
     except (URLError, OSError, ValueError) as error:
-        reason = getattr(error, "reason", error)
+        reason = without_secrets(str(getattr(error, "reason", error)), [key or ""])
         return "failed", f"{shown}: {reason}", "is the server up? --no-network skips this"
     return "ok", f"{shown} answers; {KEY_VARIABLE} is {'set' if key else 'not set'}"

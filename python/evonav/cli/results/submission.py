@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_checks, progress_bar, show
+from evonav.cli.display import percent, print_checks, progress_bar, show
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import AsJson, Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
 from evonav.counted import counted
@@ -50,7 +50,8 @@ def pack(
     written in the form of the Hugging Face Hub.
     """
     from evonav.submission.eval_results import write_eval_results
-    from evonav.submission.pack import SUFFIX, About, pack
+    from evonav.submission.file import SUFFIX, About
+    from evonav.submission.pack import pack
 
     run = run.absolute()
     target = out or run.with_name(run.name + SUFFIX)
@@ -108,6 +109,9 @@ def verify(
 
 def _print(file: Path, verdict: "Verdict") -> None:
     from rich.table import Table
+    from rich.text import Text
+
+    from evonav.submission.packed_setup import packed_setup
 
     marks = {True: ("ok", "green"), False: ("fail", "bold red")}
     print_checks(
@@ -118,11 +122,14 @@ def _print(file: Path, verdict: "Verdict") -> None:
     if verdict.is_accepted and verdict.num_required < num_tasks:
         typer.echo(f"verified {verdict.num_required} of {counted(num_tasks, 'task')}; without --limit, all")
     if verdict.is_accepted and verdict.submission is not None:
+        isolation = packed_setup(verdict.submission).isolation
+        typer.echo(f"isolation of agents, as the run notes it: {isolation or 'not noted'}")
+    if verdict.is_accepted and verdict.summary is not None:
         scores = Table(title="SR and SPL in %, as scored again")
         for column in ("agent", "n", "SR", "SPL"):
             scores.add_column(column, justify="left" if column == "agent" else "right")
-        for agent, row in verdict.submission.summary["agents"].items():
-            scores.add_row(agent, str(row["n"]), f"{100 * row['sr']:.1f}", f"{100 * row['spl']:.1f}")
+        for agent, row in verdict.summary["agents"].items():
+            scores.add_row(Text(agent), str(row["n"]), percent(row["sr"]), percent(row["spl"]))
         show(scores)
         if not verdict.is_rescored:
             typer.echo("The actions were not replayed: the recorded paths were trusted.")

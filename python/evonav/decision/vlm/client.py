@@ -11,9 +11,11 @@ import base64
 import json
 import os
 import threading
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.pacing import Pace
 from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, image_name, png_of
+from evonav.decision.vlm.secrets import REMOVED, without_secrets
 from evonav.errors import DecisionError, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -33,8 +36,6 @@ if TYPE_CHECKING:
 
 MAX_ANSWER_BYTES = 2**20
 """Longest response that is read."""
-MIN_SECRET_CHARACTERS = 8
-"""Shortest key that is removed from messages: local servers have keys such as `x`, a common letter in answers."""
 KEY_VARIABLE, URL_VARIABLE = "OPENAI_API_KEY", "OPENAI_BASE_URL"
 
 
@@ -209,6 +210,11 @@ class VlmClient(CachingClient):
         except (openai.AuthenticationError, openai.PermissionDeniedError) as error:
             raise VlmError("unauthorized", self._message_of(error)) from None
         except openai.APIStatusError as error:
+            if 300 <= error.status_code < 400:  # what was asked would go to another server, and perhaps the key
+                place = urlsplit(error.response.headers.get("location", "")[:1000])
+                host = self._without_secrets(place.netloc.rpartition("@")[2]) or "another address"
+                message = f"the server redirects to {host}: give the address of the API itself"
+                raise VlmError("bad_request", message) from None
             kind: Literal["server", "bad_request"] = "server" if error.status_code >= 500 else "bad_request"
             raise VlmError(kind, self._message_of(error)) from None
         except openai.OpenAIError as error:
@@ -240,26 +246,37 @@ class VlmClient(CachingClient):
                 key = self._key()
                 if not key and base_url is None:
                     raise DecisionError(f"asking a model needs a key: set {KEY_VARIABLE}, or give a base URL")
+                http = openai.DefaultHttpxClient(follow_redirects=False)
+                weakref.finalize(self, http.close)
                 self._sdk = openai.OpenAI(
                     api_key=key or "none",
                     base_url=base_url,
                     timeout=self.config.timeout_s,
                     max_retries=self.config.max_retries,
+                    http_client=http,
                 )
             return self._sdk
 
     def _key(self) -> str:
-        return self.config.api_key or os.environ.get(KEY_VARIABLE) or ""
+        """Return the key, without the line end of a file that it may have been read from.
+
+        Raises:
+            DecisionError: No header can hold it.
+        """
+        key = (self.config.api_key or os.environ.get(KEY_VARIABLE) or "").strip()
+        if not (key.isascii() and key.isprintable()):
+            raise DecisionError(f"{KEY_VARIABLE}: holds characters that no key has, such as a line end")
+        return key
 
     def _message_of(self, error: BaseException) -> str:
         """Return an error's message without secrets."""
-        return self._without_secrets(" ".join(str(error).split())[:500])
+        return self._without_secrets(" ".join(str(error)[:MAX_ANSWER_BYTES].split()))[:500]
 
     def _without_secrets(self, text: str) -> str:
-        """Remove the key and the address, which servers quote, from a text; very short keys stay."""
-        for secret in (self._key(), self.config.base_url or os.environ.get(URL_VARIABLE) or ""):
-            text = text.replace(secret, "***") if len(secret) >= MIN_SECRET_CHARACTERS else text
-        return text
+        """Remove the key and the address with its password, which servers quote, from a text."""
+        url = self.config.base_url or os.environ.get(URL_VARIABLE) or ""
+        text = text.replace(url, REMOVED) if url else text
+        return without_secrets(text, (self._key(), unquote(urlsplit(url).password or "")))
 
 
 def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]) -> JsonObject:

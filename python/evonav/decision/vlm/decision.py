@@ -17,6 +17,7 @@ from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.caching_client import CachingClient
 from evonav.decision.vlm.errors import VlmError, VlmFailure
+from evonav.decision.vlm.relay import RelayedClient
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 
 A = TypeVar("A")
@@ -51,7 +52,7 @@ class VlmDecision:
 
     def __init__(
         self,
-        client: CachingClient,
+        client: CachingClient | RelayedClient,
         *,
         structured: Structured = "auto",
         needs_images: bool = True,

@@ -9,6 +9,7 @@ from evonav.agents.hosting import wire
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.hosting.model_relay import is_relayed
 from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, AgentProcesses, failure_of
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
@@ -200,12 +201,18 @@ class RemoteAgent(HostedAgent):
             costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
         except (InvalidArgumentError, AgentFailedError):  # they decide nothing
             return {}
-        return {str(name): amount for name, amount in costs.items()}
+        trusted = {} if self._process.relay is None else self._process.relay.costs()
+        return {**{str(name): amount for name, amount in costs.items()}, **trusted}
 
     def _make(self) -> None:
         self._process = self._processes.process(self._name)
         self._describe(self._label)
-        self._sense(self._ask("make", self._decision.path, self._seed, self._decision.keywords))
+        relay = self._process.relay
+        if relay is not None and is_relayed(self._decision):
+            options: Mapping[str, object] = relay.use(self._decision)
+        else:
+            options = self._decision.keywords
+        self._sense(self._ask("make", self._decision.path, self._seed, options))
 
     def _sense(self, parts: Mapping[str, bytes]) -> None:
         self._sensors = wire.SENSORS.read(_part(parts, "sensors"))

@@ -31,6 +31,7 @@ from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
+from evonav.evaluation.hosting.model_relay import ModelRelay
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
@@ -81,6 +82,8 @@ class AgentHosting:
     """File to which the output of agents is appended; default: the evaluator's standard error."""
     is_sandboxed: bool = False
     """Shut an agent's process in, so that it reads no file of a run or a task, and reaches no network (Linux)."""
+    relays_model: bool = False
+    """Ask the decision model for processes in a sandbox, which have no network."""
     hidden: tuple[str, ...] = ()
     """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
     scratch: str | None = None
@@ -116,18 +119,21 @@ class AgentProcess:
         self._hosting = hosting
         self._block = SharedBlock()
         self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
+        self.relay = ModelRelay() if hosting.is_sandboxed and hosting.relays_model else None
+        """Asks the decision model for a process in a sandbox."""
         self._connection, far_end = socket.socketpair()
         life, self._life = os.pipe()
         output = None if hosting.log is None else OutputLog(Path(hosting.log), name)
         self._log = output
         try:
             arguments = (far_end.fileno(), life, self._block.descriptor)
+            inherited = arguments if self.relay is None else (*arguments, self.relay.far_descriptor)
             shut_in = "" if self._scratch is None else _SHUT_IN
             path = sys.path if self._scratch is None else search_path()
             with one_thread_each():
                 self._process = subprocess.Popen(  # noqa: S603 - ourselves
                     [sys.executable, "-c", _START.format(shut_in, self.serving), *map(str, arguments), *path],
-                    pass_fds=arguments,
+                    pass_fds=inherited,
                     cwd=self._scratch,
                     env=None if self._scratch is None else environment(self._scratch),
                     stdin=subprocess.DEVNULL,
@@ -138,6 +144,8 @@ class AgentProcess:
         finally:
             far_end.close()
             os.close(life)
+            if self.relay is not None:
+                self.relay.close_far_end()
             if output is not None:
                 output.begin()
         self._watch = os.pidfd_open(self._process.pid) if hasattr(os, "pidfd_open") else None
@@ -165,7 +173,8 @@ class AgentProcess:
     @property
     def is_usable(self) -> bool:
         """True if the process is alive and waits for a request."""
-        return not self._is_closed and not self._is_waiting and self._process.poll() is None
+        is_relaying = self.relay is None or self.relay.is_open
+        return is_relaying and not self._is_closed and not self._is_waiting and self._process.poll() is None
 
     @property
     def memory_mb(self) -> float | None:
@@ -277,6 +286,8 @@ class AgentProcess:
         if self._watch is not None:
             os.close(self._watch)
         self._block.close()
+        if self.relay is not None:
+            self.relay.close()
         if self._scratch is not None:
             shutil.rmtree(self._scratch, ignore_errors=True)
         if self._log is not None:

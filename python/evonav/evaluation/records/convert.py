@@ -1,6 +1,6 @@
 """Convert poses, sensors and actions to the parts of records that describe them."""
 
-from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig
+from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig, ViewSchedule
 from evonav.evaluation.records.schema import ActionRecord, PoseRecord, SensingRecord
 from evonav.world.pose import Pose
 
@@ -19,6 +19,17 @@ def sensing_record(sensors: SensorConfig) -> SensingRecord:
         motion=sensors.motion,
         max_travel_m=sensors.max_travel_m,
         occupancy_range_m=sensors.occupancy_range_m,
+    )
+
+
+def sensor_config(record: SensingRecord) -> SensorConfig:
+    """Return the sensors that a record describes."""
+    return SensorConfig(
+        first_round=ViewSchedule(*record.first_round),
+        later_rounds=ViewSchedule(*record.later_rounds),
+        motion=record.motion,
+        max_travel_m=record.max_travel_m,
+        occupancy_range_m=record.occupancy_range_m,
     )
 
 

@@ -14,9 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
 
-Point2 = tuple[float, float]
+Real = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
+Whole = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+"""A count or number of a record: 64 bits."""
+Point2 = tuple[Real, Real]
 """`(x, z)`."""
-Point3 = tuple[float, float, float]
+Point3 = tuple[Real, Real, Real]
 """`(x, y, z)`."""
 
 
@@ -109,11 +113,11 @@ class StageFailure:
 class PoseRecord(_Record):
     """A pose of the agent."""
 
-    x_m: float
-    y_m: float
-    z_m: float
-    yaw_rad: float
-    horizon_rad: float
+    x_m: Real
+    y_m: Real
+    z_m: Real
+    yaw_rad: Real
+    horizon_rad: Real
 
 
 class GoalRecord(_Record):
@@ -158,10 +162,10 @@ class TransitionRecord(_Record):
     is_agent_in_room: bool = False
     """True if the agent stands in the evolved room at the start of the stage."""
     relocations: tuple[Relocation, ...] = ()
-    num_added: int = 0
+    num_added: Whole = 0
     """Objects that an extension added. The two fields below are of extensions, too."""
-    num_removed: int = 0
-    num_states: int = 0
+    num_removed: Whole = 0
+    num_states: Whole = 0
     """Doors and objects that opened, closed, or went on or off."""
 
     @property
@@ -177,11 +181,11 @@ class TransitionRecord(_Record):
 class EntryRecord(_Record):
     """An object entry as the agent believed it, judged by the evaluator."""
 
-    entry_id: int
+    entry_id: Whole
     label: str
     centre_m: Point3
     size_m: Point3
-    num_detections: int
+    num_detections: Whole
     is_stale: bool
     """The entry is stale, as `evonav.evaluation.episode.staleness` defines it."""
 
@@ -189,16 +193,16 @@ class EntryRecord(_Record):
 class MemoryRecord(_Record):
     """The agent's entries compared with the stage's house."""
 
-    num_entries: int
-    num_right: int
+    num_entries: Whole
+    num_right: Whole
     """Entries that are right, as `evonav.evaluation.episode.staleness` defines it: the others are stale."""
-    num_held: int
+    num_held: Whole
     """Objects that right entries stand for, each with the nearest one of its label."""
-    num_seen: int
+    num_seen: Whole
     """Objects of the house that were in view so far in the episode."""
-    num_seen_held: int
+    num_seen_held: Whole
     """Seen objects that a right entry stands for."""
-    position_error_m: float | None
+    position_error_m: Real | None
     """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
 
 
@@ -207,9 +211,9 @@ class StaleEntryRecord(_Record):
 
     label: str
     centre_m: Point3
-    evident_round: int | None = None
+    evident_round: Whole | None = None
     """The first round whose views show that its place is empty."""
-    cleared_round: int | None = None
+    cleared_round: Whole | None = None
     """The round, from the evident one on, after which the entry is gone or corrected."""
 
 
@@ -217,9 +221,9 @@ class MovedObjectRecord(_Record):
     """An object moved in the transition before the stage, far enough that an entry of it would be stale."""
 
     object_id: str
-    seen_round: int | None = None
+    seen_round: Whole | None = None
     """The first round in which it is in view at its new place."""
-    found_round: int | None = None
+    found_round: Whole | None = None
     """The round, from that one on, after which an entry stands for it."""
 
 
@@ -243,18 +247,18 @@ class SensingRecord(_Record):
     Together with the actions, this is enough to carry them out again (`evonav.submission.rescore`).
     """
 
-    first_round: tuple[int, float]
+    first_round: tuple[Whole, Real]
     """Views, and degrees between them."""
-    later_rounds: tuple[int, float]
+    later_rounds: tuple[Whole, Real]
     motion: Literal["waypoints", "actions"]
-    max_travel_m: float
-    occupancy_range_m: float
+    max_travel_m: Real
+    occupancy_range_m: Real
 
 
 class RoundRecord(_Record):
     """One decision round: where the agent stood, what it chose, how it went."""
 
-    round: int
+    round: Whole
     """0-based."""
     pose: PoseRecord
     """The agent's pose at the observation."""
@@ -267,9 +271,9 @@ class RoundRecord(_Record):
     choice: str
     """The choice as the agent describes it: `object 12`, `frontier 3`, `none`."""
     chosen_entry: EntryRecord | None
-    num_entries: int
-    num_frontiers: int
-    counters: dict[str, int]
+    num_entries: Whole
+    num_frontiers: Whole
+    counters: dict[str, Whole]
     """Cumulative over the task, such as `conflicts` or `rejected_entries`."""
     details: dict[str, Any]
 
@@ -282,13 +286,13 @@ class StageRecord(_Record):
     """The name by which the agent was requested: `fu`, `stage-reset`, `my_package:MyAgent`."""
     task_id: str
     house: str
-    stage: Annotated[int, Field(ge=1)]
-    num_stages: int
+    stage: Annotated[Whole, Field(ge=1)]
+    num_stages: Whole
     state: EndState
     error: StageError | None = None
-    failed_before: tuple[int, ...] = ()
+    failed_before: tuple[Whole, ...] = ()
     """Earlier stages of the episode in which the agent failed: it may know less than otherwise."""
-    memory_lost_at: int | None = None
+    memory_lost_at: Whole | None = None
     """The last stage, up to this one, that the agent began anew, without memory: its process was lost before."""
     goal: GoalRecord
     target: TargetRecord
@@ -301,35 +305,35 @@ class StageRecord(_Record):
     is_snapped: bool = False
     sensing: SensingRecord | None = None
     terminal: PoseRecord | None = None
-    num_rounds: int = 0
+    num_rounds: Whole = 0
     has_stopped: bool = False
     """The agent ended the stage itself (otherwise the budget did). Success needs no stop (paper, Sec. C.2)."""
     stop_reason: str = ""
-    start_distance_m: float | None = None
+    start_distance_m: Real | None = None
     """Ground-plane distance to the target at the effective start."""
-    terminal_distance_m: float | None = None
+    terminal_distance_m: Real | None = None
     """Ground-plane distance to the target at the end: the success criterion."""
-    path_length_m: float | None = None
+    path_length_m: Real | None = None
     """L_k: length of the executed polyline on the ground plane."""
-    reference_length_m: float | None = None
+    reference_length_m: Real | None = None
     """L*_k: shortest path from the effective start to the target."""
-    spl: float | None = None
-    soft_spl: float | None = None
+    spl: Real | None = None
+    soft_spl: Real | None = None
     """SPL with success replaced by the share of the start distance that was covered."""
-    num_target_visible_rounds: int = 0
+    num_target_visible_rounds: Whole = 0
 
-    reference_ring_m: float | None = None
+    reference_ring_m: Real | None = None
     """The part of the reference path that lies outside of the success radius; 0 for a start within it."""
-    terminal_box_distance_m: float | None = None
+    terminal_box_distance_m: Real | None = None
     """Ground-plane distance to the target's box at the end."""
-    terminal_geodesic_m: float | None = None
+    terminal_geodesic_m: Real | None = None
     """Length of the shortest path to the target at the end; `None` where there is none."""
     is_geodesic_success: bool | None = None
     """True if that is shorter than the success radius."""
     memory_at_start: MemoryRecord | None = None
     """The memory after the agent received the goal; like the next fields, `None` for an agent without entries."""
     memory_at_end: MemoryRecord | None = None
-    num_forgotten: int | None = None
+    num_forgotten: Whole | None = None
     """Objects that an entry stood for at the start and none at the end, though they stand where they stood."""
     stale_entries: tuple[StaleEntryRecord, ...] = ()
     moved_objects: tuple[MovedObjectRecord, ...] = ()
@@ -383,7 +387,7 @@ class FloorPlan(_Record):
     schema_version: Literal[1] = 1
     task_id: str
     house: str
-    stage: int
+    stage: Whole
     rooms: tuple[RoomFootprint, ...]
     walls: tuple[tuple[Point2, Point2], ...]
     """Wall segments on the floor plan; open-plan ones left out."""

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from datetime import datetime, timezone
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from evonav import __version__
 from evonav.evaluation.records.store import RunStore
 
 KEY = "sessions"
+_ISOLATIONS_KEY = "isolations"
+_ADDRESS = "--base-url"
 MAX_SESSIONS = 50
 """Largest number of noted sessions: the first one and the latest."""
 
@@ -28,7 +31,18 @@ def note_session(store: RunStore, num_workers: int, isolation: str) -> None:
     """
     before = store.meta(KEY) or []
     sessions = [*before[:1], *before[1:][-(MAX_SESSIONS - 2) :]]
-    store.set_meta(KEY, [*sessions, {**session_facts(), "workers": num_workers, "isolation": isolation}])
+    kind = isolation.partition(" ")[0]
+    store.set_header(
+        {
+            KEY: [*sessions, {**session_facts(), "workers": num_workers, "isolation": isolation}],
+            _ISOLATIONS_KEY: sorted({*isolations_of(store), kind}),
+        }
+    )
+
+
+def isolations_of(store: RunStore) -> list[str]:
+    """Return every `--isolation` with which agents of a run were evaluated; empty in runs that note none."""
+    return store.meta(_ISOLATIONS_KEY) or []
 
 
 def session_facts() -> dict[str, Any]:
@@ -45,10 +59,18 @@ def session_facts() -> dict[str, Any]:
 
 
 def typed_command() -> str:
-    """Return the command as typed if it is evonav's, else an empty string."""
+    """Return the command as typed if it is evonav's, else an empty string.
+
+    Addresses of models' servers, which may hold a password, are `***`.
+    """
     name = Path(sys.argv[0]).name if sys.argv else ""
-    is_ours = name in ("evonav", "__main__.py")
-    return shlex.join(["evonav", *sys.argv[1:]]) if is_ours else ""
+    if name not in ("evonav", "__main__.py"):
+        return ""
+    arguments = [
+        "***" if before == _ADDRESS else f"{_ADDRESS}=***" if word.startswith(f"{_ADDRESS}=") else word
+        for before, word in pairwise(sys.argv)
+    ]
+    return shlex.join(["evonav", *arguments])
 
 
 @cache

@@ -15,6 +15,7 @@ from evonav.agents.hosting.sandbox import why_not
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.spec import opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
+from evonav.evaluation.hosting.model_relay import is_relayed
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -243,6 +244,7 @@ def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
         hosting,
         is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
         hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
+        relays_model=hosting.is_sandboxed and is_relayed(request.config.backend.decision),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
 
@@ -306,8 +308,9 @@ def _check_sandbox(hosting: AgentHosting, backend: Backend) -> None:
     reason = why_not()
     if hosting.is_in_process:
         reason = reason or "agents run in the evaluator's own process: use one worker or more"
-    if backend.decision.host_options or "path" in backend.decision.options:
-        reason = reason or "the decision model needs files or a network, which a sandbox shuts: use `process`"
+    needs_more = backend.decision.host_options or "path" in backend.decision.options
+    if needs_more and not is_relayed(backend.decision):
+        reason = reason or "a decision model of your own needs files or a network, which a sandbox shuts: use `process`"
     if reason:
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 

@@ -17,7 +17,9 @@ from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
-from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
+from evonav.submission.archive import MAX_RATIO, SubmissionError
+from evonav.submission.file import About, SubmissionFile
+from evonav.submission.pack import pack
 from evonav.submission.rescore import rescore
 from evonav.submission.verify import verify
 from evonav.tasks.listing import TaskFile, task_files

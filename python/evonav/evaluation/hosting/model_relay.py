@@ -1,0 +1,97 @@
+"""Ask the decision model for an agent's process that has no network (`evonav.decision.vlm.relay` is its side).
+
+The key, the address, the recorded exchanges and the spending stay in the evaluator's process. The agent can ask the one
+model of the run whatever it likes, within the run's limit of costs, and reach nothing else.
+"""
+
+import socket
+import threading
+from contextlib import suppress
+
+from pydantic import ValidationError
+
+from evonav.component import Component
+from evonav.decision.backends import VLM, vlm_client
+from evonav.decision.metered import account_costs
+from evonav.decision.question import DecisionModel
+from evonav.decision.vlm.client import VlmClient
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.relay import REQUEST, RESPONSE, Response, read_message, write_message
+from evonav.errors import EvonavError, InvalidArgumentError
+
+MAX_ERROR = 2000
+"""Longest error that an agent is sent, in characters."""
+
+
+def is_relayed(decision: Component[DecisionModel]) -> bool:
+    """Return whether a decision model can be asked for an agent's process."""
+    return decision.path == VLM
+
+
+class ModelRelay:
+    """Answers the questions of one agent's process, one after the other."""
+
+    def __init__(self) -> None:
+        """Open the connection; `far_descriptor` is the end for the agent's process, to be closed here then."""
+        self._near, self._far = socket.socketpair()
+        self.far_descriptor = self._far.fileno()
+        self._client: VlmClient | None = None
+        self._thread: threading.Thread | None = None
+
+    def use(self, decision: Component[DecisionModel]) -> dict[str, object]:
+        """Make the client of a decision model, and return the options with which the agent's process makes its side.
+
+        Raises:
+            DecisionError: The model cannot be asked.
+            InvalidArgumentError: An option makes no sense.
+        """
+        self._client = vlm_client(**decision.keywords)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._serve, daemon=True)
+            self._thread.start()
+        return {**decision.options, "mode": self._client.mode, "relay": self.far_descriptor}
+
+    @property
+    def is_open(self) -> bool:
+        """True if questions can be asked."""
+        return self._near.fileno() >= 0
+
+    def costs(self) -> dict[str, float]:
+        """Return what the model has cost since `use`, as the evaluator counts it; empty before."""
+        return {} if self._client is None else account_costs(self._client.account)
+
+    def close_far_end(self) -> None:
+        """Close this process's copy of the agent's end."""
+        self._far.close()
+
+    def close(self) -> None:
+        """End the connection; a question that the model is answering is given up."""
+        with suppress(OSError):
+            self._near.shutdown(socket.SHUT_RDWR)
+        if self._thread is None:
+            self._near.close()
+
+    def _serve(self) -> None:
+        descriptor = self._near.fileno()
+        # An end of the agent's process, or a message of an impossible size, after which no next one can be found.
+        with self._near, suppress(OSError, InvalidArgumentError):
+            while True:
+                write_message(descriptor, RESPONSE.dump_json(self._answer(read_message(descriptor))))
+
+    def _answer(self, text: bytes) -> Response:
+        try:
+            request = REQUEST.validate_json(text, strict=True)
+        except ValidationError as error:
+            problem = error.errors(include_url=False, include_input=False)[0]
+            place = ".".join(map(str, problem["loc"]))
+            return Response(error=f"malformed question: {place}: {problem['msg']}"[:MAX_ERROR])
+        client = self._client
+        assert client is not None  # made before the thread
+        try:
+            if request.operation == "is_cached":
+                return Response(is_cached=client.is_cached(request.prompt, request.attempt))
+            return Response(answer=client.ask(request.prompt, request.attempt))
+        except VlmError as error:
+            return Response(failure=error.kind, error=error.message)
+        except EvonavError as error:
+            return Response(error=str(error)[:MAX_ERROR])

@@ -1,0 +1,17 @@
+"""A short run of the fuzzers, always of the same cases; `make fuzz` runs many more."""
+
+from pathlib import Path
+
+import pytest
+from fuzz import TARGETS, fuzz, peak_mb
+
+NUM_CASES = {"packs": 300}
+
+
+@pytest.mark.parametrize("name", sorted(TARGETS))
+def test_a_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
+    before_mb = peak_mb()
+    ends, failed = fuzz(TARGETS[name](tmp_path), range(NUM_CASES[name]), seed=1, out=tmp_path / "failed")
+    assert not failed, [path.read_text()[-2000:] for path in (tmp_path / "failed").glob("*.txt")]
+    assert len(ends) > 1, "cases end in different ways, or nothing is tried"
+    assert peak_mb() < before_mb + 500

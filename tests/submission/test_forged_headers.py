@@ -1,0 +1,187 @@
+"""Packed runs whose headers somebody has tampered with: `verify` rejects each of them, for the right reason.
+
+The forger corrects all checksums, and where it says so all scores that follow from what was altered.
+"""
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from forged_pack import ForgedPack, assert_rejected, rescored
+
+from evonav.submission.file import MAX_VALUES
+from evonav.submission.verify import verify
+from evonav.tasks.listing import TaskFile
+
+Forge = Callable[[ForgedPack], Any]
+
+
+def test_a_forger_that_alters_nothing_is_accepted(parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path) -> None:
+    for mine in parts.rows:
+        for row in mine:
+            before = dict(row)
+            rescored(row)
+            assert row == before
+    parts.claim()
+    assert verify(parts.write(tmp_path / "same.zip"), tasks, scores_only=True).is_accepted
+
+
+def setting(*path: str | int, value: Any) -> Forge:
+    def forge(parts: ForgedPack) -> None:
+        at: Any = parts.header
+        for step in path[:-1]:
+            at = at[step]
+        at[path[-1]] = value
+
+    return forge
+
+
+def camera(**options: Any) -> Forge:
+    return setting("config", "backend", "simulator_options", value=options)
+
+
+def task_twice(parts: ForgedPack) -> None:
+    """Every stage of the first task counts twice."""
+    parts.header["tasks"].insert(1, parts.header["tasks"][0])
+    for mine in parts.rows:
+        mine[:4] = [row for row in mine[:4] for _ in range(2)]
+
+
+def first_task_dropped(parts: ForgedPack) -> None:
+    first = parts.header["tasks"].pop(0)["task_id"]
+    parts.rows = [[row for row in mine if row["task_id"] != first] for mine in parts.rows]
+    parts.claim()
+
+
+def last_task_dropped(parts: ForgedPack) -> None:
+    last = parts.header["tasks"].pop()["task_id"]
+    parts.rows = [[row for row in mine if row["task_id"] != last] for mine in parts.rows]
+    parts.claim()
+
+
+def no_agents(parts: ForgedPack) -> None:
+    parts.header["records"], parts.rows = [], []
+    parts.claim()
+
+
+def agent_twice(parts: ForgedPack) -> None:
+    parts.header["records"][1]["agent"] = "fu"
+    parts.rows[1] = parts.rows[0]
+
+
+def tasks_in_other_order(parts: ForgedPack) -> None:
+    parts.header["tasks"].reverse()
+
+
+HEADERS: dict[str, tuple[Forge, str, str]] = {
+    "more rounds": (setting("config", "protocol", "max_rounds", value=80), "protocol", "max_rounds is 80"),
+    "a larger radius": (
+        setting("config", "protocol", "success_radius_m", value=3.0),
+        "protocol",
+        "success_radius_m is 3",
+    ),
+    "a text as radius": (setting("config", "protocol", "success_radius_m", value="2.0"), "protocol", "is '2.0'"),
+    "a count with a point": (
+        setting("config", "protocol", "max_rounds", value=50.0),
+        "protocol",
+        r"max_rounds is 50\.0",
+    ),
+    "truth as a number": (
+        setting("config", "protocol", "reference_in_room", value=1),
+        "protocol",
+        "reference_in_room is 1",
+    ),
+    "no protocol": (setting("config", "protocol", value=None), "protocol", "has no protocol"),
+    "more protocol": (setting("config", "protocol", "surprise", value=1), "protocol", "surprise is 1"),
+    "a huge camera": (camera(width_px=10**9), "protocol", "width_px = 1000000000: must be"),
+    "a camera of text": (camera(height_px="300"), "protocol", "height_px = 300: must be"),
+    "a camera without sight": (camera(hfov_deg=0.0), "protocol", "hfov_deg = 0.0: must be"),
+    "another task's checksum": (setting("tasks", 0, "digest", value="0" * 64), "tasks", "another task than"),
+    "more stages": (setting("tasks", 0, "num_stages", value=9), "tasks", "another task than"),
+    "a foreign task": (setting("tasks", 0, "task_id", value="aa"), "tasks", "aa is not among"),
+    "no tasks": (setting("tasks", value=[]), "tasks", "there is none"),
+    "a task twice": (task_twice, "tasks", "each there once"),
+    "tasks in another order": (tasks_in_other_order, "tasks", "in order"),
+    "a hard task left out": (first_task_dropped, "tasks", "is missing"),
+    "the last task left out": (last_task_dropped, "tasks", "only the first 1 of 2"),
+    "no agents": (no_agents, "complete", "no agent"),
+    "an agent twice": (agent_twice, "complete", "fu is there twice"),
+    "an oracle": (setting("records", 0, "agent", value="shortest-path"), "complete", "oracle baseline"),
+    "another name": (setting("records", 0, "agent", value="mine"), "complete", "a record of fu"),
+    "control characters": (setting("records", 0, "agent", value="fu\x1b[2J"), "file", "agent: .*printable"),
+    "a long name": (setting("records", 0, "agent", value="f" * 10**6), "file", "agent: .*1000 characters"),
+    "a member elsewhere": (setting("records", 0, "member", value="../../evil"), "file", "expected records/1.jsonl"),
+    "members exchanged": (setting("records", 0, "member", value="records/2.jsonl"), "file", "expected records/1.jsonl"),
+    "another format": (setting("format_version", value=2), "file", "format_version"),
+    "an unknown field": (setting("surprise", value=1), "file", "surprise: Extra"),
+    "a field less": (lambda parts: parts.header.pop("config"), "file", "config: Field required"),
+    "a number as text": (setting("tasks", 0, "num_stages", value="4"), "file", "num_stages: .*valid integer"),
+    "no stages": (setting("tasks", 0, "num_stages", value=0), "file", "num_stages"),
+    "a checksum that is none": (setting("tasks", 0, "digest", value="../x"), "file", "digest"),
+    "NaN in the configuration": (setting("config", "seed", value=float("nan")), "file", "NaN: numbers must be finite"),
+    "claimed success": (setting("summary", "agents", "fu", "sr", value=0.999), "scores", "agents.fu.sr is 0.999"),
+    "claimed interval": (setting("summary", "agents", "fu", "spl_ci95", value=[0.9, 1.0]), "scores", "spl_ci95"),
+    "claimed count": (setting("summary", "agents", "fu", "n", value=10**300), "scores", "agents.fu.n is 1000"),
+    "another agent's scores": (setting("summary", "agents", "me", value={"sr": 1.0}), "scores", "agents.me.sr"),
+    "a summary of text": (setting("summary", value={"agents": "x" * 10**6}), "scores", "agents is x"),
+    "an effect of its own": (setting("summary", "paired_differences", value=[]), "scores", "paired_differences"),
+}
+
+
+@pytest.mark.parametrize("name", HEADERS)
+def test_a_forged_header_is_rejected(parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path, name: str) -> None:
+    forge, check, reason = HEADERS[name]
+    forge(parts)
+    verdict = verify(parts.write(tmp_path / "f.zip"), tasks, scores_only=True)
+    assert_rejected(verdict, check, reason)
+    assert max(len(one.detail) for one in verdict.checks) < 3000
+
+
+HEADER_TEXTS = {
+    "a key twice": (lambda text: text.replace(b"{", b'{"evonav": "9.9", ', 1), "'evonav' is there twice"),
+    "infinity": (lambda text: text.replace(b'"seed": 0', b'"seed": 1e999'), "1e999: numbers must be finite"),
+    "nesting": (lambda text: text.replace(b'"seed": 0', b'"seed": ' + b"[" * 10**5 + b"]" * 10**5), "recursion limit"),
+    "too many values": (
+        lambda text: text.replace(b'"seed": 0', b'"seed": [' + b"0," * MAX_VALUES + b"0]"),
+        "2000000 val",
+    ),
+    "too large": (lambda text: text + b" " * (9 << 20), "the limit is"),
+    "half of it": (lambda text: text[: len(text) // 2], "Invalid JSON"),
+    "no JSON": (lambda _: b"\xff\xfe", "Invalid JSON"),
+    "a list": (lambda _: b"[]", "object"),
+    "nothing": (lambda _: b"", "Invalid JSON"),
+    "half of a letter": (lambda text: text.replace(b'"title": ""', b'"title": "\\ud800"'), "Invalid JSON"),
+}
+
+
+@pytest.mark.parametrize("name", HEADER_TEXTS)
+def test_a_header_in_other_bytes_is_rejected(
+    parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path, name: str
+) -> None:
+    forge, reason = HEADER_TEXTS[name]
+    members = parts.members()
+    before = parts.told(members)
+    after = forge(before)
+    assert after != before
+    forged = parts.write(tmp_path / "f.zip", header=after, members=members)
+    assert_rejected(verify(forged, tasks, scores_only=True), "file", reason)
+
+
+def test_intervals_of_an_older_summary_are_not_told(parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path) -> None:
+    """Version 1 of the summary had other intervals, which are not compared: those of the records are told instead."""
+    true = copy.deepcopy(parts.header["summary"])
+    parts.header["summary"]["schema_version"] = 1
+    parts.header["summary"]["agents"]["fu"]["sr_ci95"] = [0.99, 1.0]
+    verdict = verify(parts.write(tmp_path / "f.zip"), tasks, scores_only=True)
+    assert verdict.is_accepted
+    assert verdict.summary == true
+
+
+def test_only_required_tasks_are_in_the_verdicts_summary(packed: Path, tasks: list[TaskFile]) -> None:
+    verdict = verify(packed, tasks, limit=1, scores_only=True)
+    assert verdict.is_accepted
+    assert verdict.summary is not None
+    assert {row["num_tasks"] for row in verdict.summary["agents"].values()} == {1}
+    assert {row["num_stages"] for row in verdict.summary["agents"].values()} == {tasks[0].num_stages}
