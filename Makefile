@@ -7,7 +7,7 @@ LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test fuzz test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
+.PHONY: help setup demo test fuzz notice audit test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -119,6 +119,15 @@ readme: setup  ## renew the table and the picture of the README
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs
 	$(BIN)/python scripts/build_docs.py
+
+notice: setup  ## list the licences of all that a wheel needs in NOTICE
+	$(BIN)/python scripts/notice.py
+
+# Needs a network. Without cargo-deny: cargo install cargo-deny --locked.
+audit: setup  ## look for known vulnerabilities and other licences in all packages
+	cargo deny check
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/python -m pip_audit --requirement requirements-dev.txt --no-deps --disable-pip
 
 # The same file serves every system and version of Python, by markers. Its first lines tell Dependabot how it is made.
 lock: $(VENV)/.maturin  ## renew requirements-dev.txt with the newest versions
