@@ -40,11 +40,14 @@ test: setup  ## run every Rust and Python test
 	cargo test --workspace
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_OPTIONS)
 
-# CI runs 300 cases as a test. SEED and CASES are which and how many.
+# CI runs a few hundred cases of each as a test.
+FUZZ ?= houses messages packs responses sweeps tasks
 SEED ?= 0
 CASES ?= 100000
-fuzz: setup  ## fuzz the reader of packed runs with 100,000 mutated files
-	PYTHONPATH=tests/helpers $(BIN)/python tests/fuzzing/fuzz.py packs --seed $(SEED) --cases $(CASES)
+fuzz: setup  ## fuzz all readers with CASES=100000 mutated inputs each, or some: FUZZ="packs tasks"
+	for reader in $(FUZZ); do \
+		PYTHONPATH=tests/helpers $(BIN)/python tests/fuzzing/fuzz.py $$reader --seed $(SEED) --cases $(CASES) || exit 1; \
+	done
 
 # Whole houses by the published generator, which has an environment of its own (docs/procthor.md).
 $(VENV)-procthor/.dependencies: pyproject.toml

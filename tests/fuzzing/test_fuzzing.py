@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from fuzz import TARGETS, fuzz, peak_mb
 
-NUM_CASES = {"packs": 300}
+NUM_CASES = {"houses": 100, "messages": 1000, "packs": 300, "responses": 1000, "sweeps": 300, "tasks": 100}
 
 
 @pytest.mark.parametrize("name", sorted(TARGETS))
