@@ -41,7 +41,7 @@ test: setup  ## run every Rust and Python test
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_OPTIONS)
 
 # CI runs a few hundred cases of each as a test.
-FUZZ ?= houses messages packs responses sweeps tasks
+FUZZ ?= house_files houses messages packs responses sweeps tasks
 SEED ?= 0
 CASES ?= 100000
 fuzz: setup  ## fuzz all readers with CASES=100000 mutated inputs each, or some: FUZZ="packs tasks"

@@ -38,6 +38,7 @@ class Target(Protocol):
 
 
 TARGETS: dict[str, Callable[[Path], Target]] = {
+    "house_files": readers.house_files,
     "houses": readers.houses,
     "messages": readers.messages,
     "packs": Packs.made_in,

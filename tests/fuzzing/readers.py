@@ -16,7 +16,8 @@ from evonav.agents.hosting import wire
 from evonav.decision.vlm.answer import read_answer, read_response, usage_of
 from evonav.decision.vlm.relay import REQUEST, RESPONSE
 from evonav.errors import EvonavError, InvalidArgumentError
-from evonav.house import bundled_houses
+from evonav.house import bundled_houses, stream_houses
+from evonav.house.asset_sizes import read_asset_sizes
 from evonav.sweeps.file import read_sweep
 from evonav.tasks import load_task
 from evonav.tasks.bundled import bundled_tasks
@@ -75,6 +76,33 @@ def houses(_folder: Path) -> Reader:
         simulator.reachable_positions()
 
     return Reader([house.to_json().encode() for house in bundled_houses(2)], read)
+
+
+def house_files(folder: Path) -> Reader:
+    """Return the reader of files of houses and of sizes of assets, plain or compressed by the first byte."""
+    houses = [json.loads(house.to_json()) for house in bundled_houses(2)]
+    small = [{**house, "objects": house["objects"][:2]} for house in houses]
+    size = {"Cup_1": {"category": "Cup", "size_m": [0.1, 0.1, 0.1]}}
+    seeds = [b"\n".join(map(json_bytes, small)), json_bytes(small), json_bytes(small[0]), json_bytes(size)]
+
+    def read(data: bytes) -> None:
+        kind, content = data[0] % 4, data[1:]
+        path = folder / ("houses.json", "houses.jsonl", "houses.json.gz", "houses.jsonl.gz")[kind]
+        path.write_bytes(content)
+        try:
+            read_asset_sizes(path)
+        except EvonavError:
+            list(stream_houses(path))
+
+    class HouseFiles(Reader):
+        def case(self, draws: random.Random) -> bytes:
+            kind, content = draws.randrange(4), Reader([draws.choice(seeds)], read).case(draws)
+            if kind >= 2:
+                content = gzip.compress(content, 1, mtime=0)
+                content = mutated_bytes(content, draws) if draws.random() < 0.3 else content
+            return bytes([kind]) + content
+
+    return HouseFiles([], read)
 
 
 def tasks(folder: Path) -> Reader:
