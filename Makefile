@@ -7,7 +7,7 @@ LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test fuzz test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
+.PHONY: help setup demo test fuzz notice audit test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,11 +40,14 @@ test: setup  ## run every Rust and Python test
 	cargo test --workspace
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_OPTIONS)
 
-# CI runs 300 cases as a test. SEED and CASES are which and how many.
+# CI runs a few hundred cases of each as a test.
+FUZZ ?= house_files houses messages packs responses sweeps tasks
 SEED ?= 0
 CASES ?= 100000
-fuzz: setup  ## fuzz the reader of packed runs with 100,000 mutated files
-	PYTHONPATH=tests/helpers $(BIN)/python tests/fuzzing/fuzz.py packs --seed $(SEED) --cases $(CASES)
+fuzz: setup  ## fuzz all readers with CASES=100000 mutated inputs each, or some: FUZZ="packs tasks"
+	for reader in $(FUZZ); do \
+		PYTHONPATH=tests/helpers $(BIN)/python tests/fuzzing/fuzz.py $$reader --seed $(SEED) --cases $(CASES) || exit 1; \
+	done
 
 # Whole houses by the published generator, which has an environment of its own (docs/procthor.md).
 $(VENV)-procthor/.dependencies: pyproject.toml
@@ -119,6 +122,15 @@ readme: setup  ## renew the table and the picture of the README
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs
 	$(BIN)/python scripts/build_docs.py
+
+notice: setup  ## list the licences of all that a wheel needs in NOTICE
+	$(BIN)/python scripts/notice.py
+
+# Needs a network. Without cargo-deny: cargo install cargo-deny --locked.
+audit: setup  ## look for known vulnerabilities and other licences in all packages
+	cargo deny check
+	$(BIN)/python -m pip install --quiet pip-audit
+	$(BIN)/python -m pip_audit --requirement requirements-dev.txt --no-deps --disable-pip
 
 # The same file serves every system and version of Python, by markers. Its first lines tell Dependabot how it is made.
 lock: $(VENV)/.maturin  ## renew requirements-dev.txt with the newest versions

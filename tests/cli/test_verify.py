@@ -23,4 +23,6 @@ def test_a_limit_requires_and_replays_only_the_first_tasks(tmp_path: Path) -> No
     ):
         shown = CliRunner().invoke(app, [*words, limit], env={"COLUMNS": "200"})
         assert (shown.exit_code, told in shown.stdout) == (code, True), shown.stdout
-    assert "verified" not in CliRunner().invoke(app, [*words, "2"]).stdout
+    shown = CliRunner().invoke(app, [*words, "2"], env={"COLUMNS": "200"}).stdout
+    assert "verified" not in shown
+    assert "isolation of agents, as the run notes it: none" in shown

@@ -236,6 +236,7 @@ def test_passing_faults_are_tried_again(stub: Stub, config: VlmConfig, fault: di
         ({"raw": b'{"choices": ['}, "malformed"),
         ({"raw": b""}, "malformed"),
         ({"raw": b"[]"}, "malformed"),
+        ({"raw": b"[" * 100_000}, "malformed"),
         ({"raw": b"<html>hello</html>"}, "malformed"),
         ({"raw": b"\xff\xfe"}, "malformed"),
         ({"raw": b'{"choices": []}'}, "malformed"),

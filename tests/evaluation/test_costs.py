@@ -86,6 +86,7 @@ class Silent:
     """The process of an agent whose model cannot tell its costs."""
 
     cpu_s = 0.0
+    relay = None
 
     def process(self, name):
         return self

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+import readers
 from packs import Packs
 
 MAX_CASE_S = 20.0
@@ -36,7 +37,15 @@ class Target(Protocol):
         ...
 
 
-TARGETS: dict[str, Callable[[Path], Target]] = {"packs": Packs.made_in}
+TARGETS: dict[str, Callable[[Path], Target]] = {
+    "house_files": readers.house_files,
+    "houses": readers.houses,
+    "messages": readers.messages,
+    "packs": Packs.made_in,
+    "responses": readers.responses,
+    "sweeps": readers.sweeps,
+    "tasks": readers.tasks,
+}
 
 
 def fuzz(target: Target, numbers: range, seed: int, out: Path | None = None) -> tuple[Counter[str], list[int]]:

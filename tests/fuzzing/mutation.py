@@ -3,6 +3,9 @@
 import copy
 import json
 import random
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 Json = Any
@@ -69,13 +72,25 @@ def mutated_bytes(data: bytes, draws: random.Random) -> bytes:
 
 def mutated_json(value: Json, draws: random.Random) -> Json:
     """Change 1 to 3 places of a JSON value: replace, delete, repeat, exchange, rename, nest, move a number a little."""
-    changed = copy.deepcopy(value)
-    for _ in range(draws.choice((1, 1, 2, 3))):
-        holders = list(_holders(changed))
-        if not holders:
-            return draws.choice(VALUES)
-        _change(draws.choice(holders), holders, draws)
-    return changed
+    with _deep():
+        changed = copy.deepcopy(value)
+        for _ in range(draws.choice((1, 1, 2, 3))):
+            holders = list(_holders(changed))
+            if not holders:
+                return draws.choice(VALUES)
+            _change(draws.choice(holders), holders, draws)
+        return changed
+
+
+@contextmanager
+def _deep() -> Iterator[None]:
+    """Let the mutator itself handle values nested deeper than Python's default limit, which holds for readers."""
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(20_000)
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def _holders(value: Json) -> Any:
@@ -121,4 +136,5 @@ def _change(holder: Json, holders: list[Json], draws: random.Random) -> None:
 
 def json_bytes(value: Json) -> bytes:
     """Return a JSON value compactly, also one that is no number."""
-    return json.dumps(value, separators=(",", ":"), ensure_ascii=False).encode("utf-8", "surrogatepass")
+    with _deep():
+        return json.dumps(value, separators=(",", ":"), ensure_ascii=False).encode("utf-8", "surrogatepass")

@@ -90,5 +90,14 @@ def _make_consistent(parts: ForgedPack, at: int) -> None:
     try:
         rescored(parts.rows[0][at])
         parts.claim()
-    except (ValueError, TypeError, KeyError, IndexError, AssertionError, AttributeError, ArithmeticError):
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        AssertionError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+    ):
         pass

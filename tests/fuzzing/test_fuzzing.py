@@ -5,7 +5,16 @@ from pathlib import Path
 import pytest
 from fuzz import TARGETS, fuzz, peak_mb
 
-NUM_CASES = {"packs": 300}
+CORPUS = Path(__file__).with_name("corpus")
+NUM_CASES = {
+    "house_files": 300,
+    "houses": 100,
+    "messages": 1000,
+    "packs": 300,
+    "responses": 1000,
+    "sweeps": 300,
+    "tasks": 100,
+}
 
 
 @pytest.mark.parametrize("name", sorted(TARGETS))
@@ -15,3 +24,8 @@ def test_a_fuzzer_finds_nothing(name: str, tmp_path: Path) -> None:
     assert not failed, [path.read_text()[-2000:] for path in (tmp_path / "failed").glob("*.txt")]
     assert len(ends) > 1, "cases end in different ways, or nothing is tried"
     assert peak_mb() < before_mb + 500
+
+
+@pytest.mark.parametrize("path", sorted(CORPUS.rglob("*.bin")), ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_what_a_fuzzer_has_found_is_mended(path: Path, tmp_path: Path) -> None:
+    assert TARGETS[path.parent.name](tmp_path).run(path.read_bytes()).endswith("Error")

@@ -2,6 +2,8 @@
 
 import os
 import struct
+import subprocess
+import sys
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -12,7 +14,7 @@ import pytest
 from forged_pack import ForgedPack, assert_rejected, zipped
 
 from evonav.submission.archive import MAX_LIST_BYTES, MAX_RATIO
-from evonav.submission.file import MAX_VALUES
+from evonav.submission.file import MAX_LINE_BYTES, MAX_VALUES
 from evonav.submission.verify import verify
 from evonav.tasks.listing import TaskFile
 
@@ -201,3 +203,26 @@ def test_a_forged_archive_is_rejected(packed: Path, tasks: list[TaskFile], tmp_p
     target = tmp_path / "f.zip"
     forge(packed, target)
     assert_rejected(verify(target, tasks, scores_only=True), "file", reason)
+
+
+LARGE = {
+    "text": b'"x":"' + b"y" * (MAX_LINE_BYTES - 10**6) + b'",',
+    "lists": b'"x":[' + b"[]," * (MAX_VALUES // 2 - 10_000) + b"[]],",
+    "numbers": b'"x":[' + b"0.1234567890123456," * (MAX_VALUES - 100_000) + b"0.5],",
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="the system does not tell a process's memory")
+@pytest.mark.parametrize("kind", LARGE)
+def test_the_largest_records_are_read_in_little_memory(packed: Path, tmp_path: Path, kind: str) -> None:
+    """What an agent says of itself is no part of a score, so the file is accepted."""
+    parts = ForgedPack.of(packed)
+    members = parts.members()
+    members[0] = members[0].replace(b'"details":{', b'"details":{' + LARGE[kind], 1)
+    path = parts.write(tmp_path / "f.zip", header=parts.told(members), members=members)
+    command = [sys.executable, "-m", "evonav", "verify", str(path), "--scores-only", "--limit", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert process.returncode == 0
+    assert used.ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10) < 500

@@ -5,8 +5,8 @@ A house keeps what it is given under `metadata.evonav_assets`, so tasks, workers
 
 import gzip
 import json
-import math
 import re
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -71,7 +71,7 @@ def read_asset_sizes(path: Path | str) -> AssetSizes:
     try:
         text = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
         entries = json.loads(text)
-    except (OSError, EOFError, ValueError) as error:
+    except (OSError, EOFError, ValueError, RecursionError, zlib.error) as error:
         raise HouseError(f"{path}: cannot be read: {error}") from error
     if not isinstance(entries, dict):
         raise HouseError(f"{path}: is a {type(entries).__name__}, expected an object with an entry for each asset id")
@@ -147,12 +147,12 @@ def _box_size(place: _Place, box: Any) -> list[float]:  # noqa: ANN401 - JSON
         if "min" in box and "max" in box:
             edges = {axis: box["max"][axis] - box["min"][axis] for axis in "xyz"}
         return [_edge(place, f"{name}.{axis}", edges[axis]) for axis in "xyz"]
-    except (AttributeError, KeyError, TypeError) as error:
+    except (AttributeError, KeyError, TypeError, OverflowError) as error:
         raise place.error(name, box, "{x, y, z}, {size} or {min, max}") from error
 
 
 def _edge(place: _Place, name: str, edge: Any) -> float:  # noqa: ANN401 - JSON
-    is_number = isinstance(edge, int | float) and not isinstance(edge, bool) and math.isfinite(edge)
+    is_number = isinstance(edge, int | float) and not isinstance(edge, bool)
     if not is_number or not 0.0 < edge <= MAX_EDGE_M:
         raise place.error(name, edge, f"metres, more than 0 and at most {MAX_EDGE_M:g}")
     return max(MIN_EDGE_M, float(edge))

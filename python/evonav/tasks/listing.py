@@ -56,7 +56,7 @@ def task_file(root: Path) -> TaskFile:
     try:
         data = path.read_bytes()
         num_stages = int(json.loads(data)["num_stages"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise TaskError(f"{path}: no task header ({type(error).__name__}: {error})") from error
     return TaskFile(root.name, root, num_stages, sha256_of(data))
 

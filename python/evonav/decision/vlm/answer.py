@@ -23,6 +23,21 @@ class Answer:
     is_replayed: bool
 
 
+def read_response(text: str) -> JsonObject:
+    """Read the body of a response.
+
+    Raises:
+        VlmError: It is no JSON object.
+    """
+    try:
+        response = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise VlmError("malformed", f"not JSON: {error}: {text[:80]!r}") from None
+    if not isinstance(response, dict):
+        raise VlmError("malformed", f"expected an object, got {text[:80]!r}")
+    return response
+
+
 def usage_of(response: JsonObject) -> Usage | None:
     """Return the tokens that the server counted; `None` if it counts none."""
     usage = response.get("usage")

@@ -8,7 +8,6 @@ Keys come from the caller or the environment, are sent in the header, and appear
 """
 
 import base64
-import json
 import os
 import threading
 import weakref
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
-from evonav.decision.vlm.answer import Answer, read_answer, usage_of
+from evonav.decision.vlm.answer import Answer, read_answer, read_response, usage_of
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
@@ -221,14 +220,7 @@ class VlmClient(CachingClient):
             raise VlmError("malformed", self._message_of(error)) from None
         if len(text) > MAX_ANSWER_BYTES:
             raise VlmError("oversized", f"a response of {len(text)} characters")
-        text = self._without_secrets(text)
-        try:
-            response = json.loads(text)
-        except ValueError as error:
-            raise VlmError("malformed", f"not JSON: {error}: {text[:80]!r}") from error
-        if not isinstance(response, dict):
-            raise VlmError("malformed", f"expected an object, got {text[:80]!r}")
-        return response
+        return read_response(self._without_secrets(text))
 
     def _client(self) -> "openai.OpenAI":
         """Return the SDK's client, made once.

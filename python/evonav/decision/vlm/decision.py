@@ -171,7 +171,7 @@ def _fields(text: str) -> dict[str, Any] | None:
     """Return the JSON object with an answer in a text; `None` if there is none."""
     try:
         content = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) and "answer" in content else None
 
