@@ -102,11 +102,11 @@ fn blurred_naive(level: &Level, u: f64, v: f64, halvings: u32, num_weights: i32)
 }
 
 /// Look one place up, as the third of a block of others.
-fn sample(texture: &Texture, u: f32, v: f32, width2: f32) -> [f32; 4] {
+fn sample(texture: &Texture, u: f32, v: f32, width2: f32) -> [f32; 3] {
     let (mut all_u, mut all_v) = ([0.3; 8], [0.7; 8]);
     (all_u[2], all_v[2]) = (u, v);
     let sums = texture.sample(&all_u, &all_v, width2);
-    std::array::from_fn(|i| f32::from(sums[8 + i]) / 256.0)
+    sums.map(|channel| f32::from(channel[2]) / 256.0)
 }
 
 proptest! {
@@ -118,7 +118,7 @@ proptest! {
         let Some(texture) = texture_of(material) else { return Ok(()) };
         let found = sample(texture, u, v, width2);
         let expected = sample_naive(texture.finest(), f64::from(u), f64::from(v));
-        for i in 0..4 {
+        for i in 0..3 {
             // Weights have 8 bits.
             prop_assert!((f64::from(found[i]) - expected[i]).abs() < 2.5, "{found:?} {expected:?}");
         }
@@ -138,7 +138,7 @@ proptest! {
         let num_weights = if is_wide { 9 } else { 5 };
         let expected =
             blurred_naive(texture.finest(), f64::from(u), f64::from(v), halvings, num_weights);
-        for i in 0..4 {
+        for i in 0..3 {
             prop_assert!((f64::from(found[i]) - expected[i]).abs() < 1.1, "{found:?} {expected:?}");
         }
     }

@@ -3,6 +3,7 @@
 //! Sunlight comes through windows and open doors and is looked up pixel by pixel in a map of
 //! shadows. All other light is smooth: it is computed at a few points of each face and interpolated.
 
+mod coarse;
 mod contact;
 mod field;
 mod sources;
@@ -60,6 +61,18 @@ impl Light {
             sun: Arc::clone(&self.sun),
             sunlight: [red * SUNLIGHT[0], green * SUNLIGHT[1], blue * SUNLIGHT[2], 0.0],
         }
+    }
+
+    /// Return the light without the sun at a point of a face, by channel, and the share of sunlight
+    /// that the face's slope takes up: 0 where the sun is not looked for. `None` if there is no such
+    /// face.
+    ///
+    /// # Arguments
+    /// * `face` - index in [`SceneMesh::faces`].
+    pub fn on_face(&self, face: usize, point_m: Vec3) -> Option<[f32; 4]> {
+        let face = self.field.faces.get(face)?;
+        let [x, y, z] = point_m.map(|coordinate| coordinate as f32);
+        Some(self.field.at(face, face.axes.map(|[a, b, c, d]| a * x + b * y + c * z + d)))
     }
 
     /// Return the direction towards the sun, in the world frame.
