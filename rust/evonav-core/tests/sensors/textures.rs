@@ -7,15 +7,15 @@ use evonav_core::{
     },
     geometry::{IDENTITY, Vec3, add, rotate, yaw_rotation},
     sensors::{
-        camera::Camera,
+        camera::{Camera, View},
         raster::{FrameBuffer, Style, Want, render},
     },
     textures::{Level, NEUTRAL, Texel, Texture, texture_of},
     world::{mesh::SceneMesh, skin::Skin},
 };
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::Config};
 
-use crate::scenes::scene_of;
+use crate::{raster::look_through, scenes::scene_of};
 
 fn textures() -> impl Iterator<Item = (MaterialKind, &'static Texture)> {
     let variants = |&kind: &MaterialKind| {
@@ -229,6 +229,75 @@ fn pictures_fill_the_broad_faces_upright() {
         for (found, expected) in upper_left.into_iter().chain(lower_right).zip([0.0, 0.0, 1.0, 1.0])
         {
             assert!((found - expected as f32).abs() < 1e-5, "{upper_left:?} {lower_right:?}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(Config { cases: 64, ..Config::default() })]
+
+    /// Close up, away from edges and corners, colours are those of the texture's mixture at the
+    /// point that a pixel shows.
+    #[test]
+    fn pictures_of_textures_agree_with_points_that_are_looked_up_one_by_one(
+        kind in 0..40_usize, colour in any::<[u8; 3]>(), away_m in 0.25..0.4_f64,
+        aside_m in -0.1..0.1_f64, horizon_rad in 1.0..1.5_f64,
+    ) {
+        let kind = MaterialKind::ALL[kind];
+        let material = Material { kind, variant: 3 };
+        let Some(texture) = texture_of(material) else { return Ok(()) };
+        let mut part = board(kind);
+        part.colour = colour;
+        let mesh = SceneMesh::build(&scene_of(&[vec![part]]));
+        let camera = Camera {
+            width_px: 150,
+            height_px: 120,
+            vertical_fov_rad: 0.4,
+            position_m: [aside_m, 0.1 + away_m, -0.12],
+            yaw_rad: 0.3,
+            horizon_rad,
+        };
+        let mut frame = FrameBuffer::default();
+        let want = Want { rgb: Some(Style::Default), instances: true };
+        render(&mesh, &camera, want, &mut frame).expect("valid");
+        let top = mesh.faces().iter().position(|face| face.normal[1] > 0.5).expect("a top");
+        let skin = mesh.skins()[top];
+        prop_assume!(!skin.is_plain());
+        let view = View::from(camera);
+        let size = texture.size() as f64;
+        for (column, row) in (9..111).step_by(6).flat_map(|row| (9..141).map(move |c| (c, row))) {
+            let index = row * camera.width_px + column;
+            let point_m = |px: [f64; 2]| {
+                let (origin_m, ray) = look_through(&view, px);
+                let along = (0.1 - origin_m[1]) / ray[1];
+                add(origin_m, ray.map(|x| x * along))
+            };
+            let middle = [column as f64 + 0.5, row as f64 + 0.5];
+            let [point_m, right_m, below_m] =
+                [middle, [middle[0] + 1.0, middle[1]], [middle[0], middle[1] + 1.0]].map(point_m);
+            let [place, right, below] = [point_m, right_m, below_m].map(|p| skin.coordinates(p));
+            let texels = |other: [f32; 2]| {
+                let [du, dv] = [0, 1].map(|i| f64::from(other[i] - place[i]) * size);
+                (du * du + dv * dv).sqrt()
+            };
+            // Further surfaces are looked up in blurred copies.
+            if texels(right).max(texels(below)) > 1.4 || point_m[0].abs() > 0.35 || point_m[2].abs() > 0.25 {
+                continue;
+            }
+            let factors = sample_naive(texture.finest(), f64::from(place[0]), f64::from(place[1]));
+            for i in 0..3 {
+                let own = if kind.is_picture() { 128.0 } else { f64::from(colour[i]) };
+                let raised = (factors[i] / 128.0 * own * (1.0 - 22.0 / 255.0)).min(255.0 - 22.0) + 22.0;
+                let bright = raised / 255.0 * 0.85 * 0.88;
+                let expected = 255.0 * bright * (0.80 + 0.55 * bright - 0.40 * bright * bright);
+                let found = f64::from(frame.rgb[3 * index + i]);
+                // A texel's channels are known to 2.5 of 128, as above; 24 bits place it.
+                let slack = 1.5 + 0.012 * own;
+                prop_assert!(
+                    (found - expected).abs() < slack,
+                    "{found} at {column}, {row}, not {expected}, {kind:?}"
+                );
+            }
         }
     }
 }
