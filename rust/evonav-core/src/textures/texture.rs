@@ -111,13 +111,13 @@ impl Texture {
         self.finest.size()
     }
 
-    /// Return the texture's mean around each `[u, v]`, in repeats of the texture: for each place,
-    /// 256 times its four channels.
+    /// Return the texture's mean around each `[u, v]`, in repeats of the texture: for each channel
+    /// of a colour, 256 times its values.
     ///
     /// # Arguments
     /// * `width2` - square of the width of what is averaged, in texels.
     #[inline(always)]
-    pub fn sample(&self, u: &[f32; LANES], v: &[f32; LANES], width2: f32) -> [u16; 4 * LANES] {
+    pub fn sample(&self, u: &[f32; LANES], v: &[f32; LANES], width2: f32) -> [[u16; LANES]; 3] {
         match self.copy_for(width2) {
             None => self.finest.sample(u, v),
             Some(copy) => copy.sample(u, v),
@@ -153,9 +153,9 @@ fn blurred(texels: &[Texel], size: usize) -> Vec<Texel> {
 }
 
 impl Copied {
-    /// Return 256 times the channels of the nearest texels.
+    /// Return 256 times the colours of the nearest texels.
     #[inline(always)]
-    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [u16; 4 * LANES] {
+    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [[u16; LANES]; 3] {
         let size = 1_u32 << self.log2_size;
         let (scale, mask) = (size as f32, size - 1);
         let mut index = [0; LANES];
@@ -164,13 +164,15 @@ impl Copied {
             let y = fixed(v[lane] * scale - 0.5) & mask;
             index[lane] = y << self.log2_size | x;
         }
-        let mut texels = [[0; 4]; LANES];
+        let mut texels = [0; LANES];
         for (texel, index) in texels.iter_mut().zip(index) {
-            *texel = self.texels[index as usize];
+            *texel = u32::from_le_bytes(self.texels[index as usize]);
         }
-        let mut sums = [0; 4 * LANES];
-        for (sum, byte) in sums.iter_mut().zip(texels.as_flattened()) {
-            *sum = u16::from(*byte) << 8;
+        let mut sums = [[0; LANES]; 3];
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            for lane in 0..LANES {
+                sums[lane] = ((texels[lane] >> (8 * channel) & 255) as u16) << 8;
+            }
         }
         sums
     }
@@ -187,9 +189,9 @@ impl Level {
         unpack(self.texels[y * self.size() + x])
     }
 
-    /// Return 256 times the channels of the mixtures of the four texels around each place.
+    /// Return 256 times the colours of the mixtures of the four texels around each place.
     #[inline(always)]
-    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [u16; 4 * LANES] {
+    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [[u16; LANES]; 3] {
         let mask = (1_u32 << self.log2_size) - 1;
         let scale = (256_u32 << self.log2_size) as f32;
         let (mut x, mut y) = ([0; LANES], [0; LANES]);
@@ -197,11 +199,11 @@ impl Level {
             x[lane] = fixed(u[lane] * scale).wrapping_sub(128);
             y[lane] = fixed(v[lane] * scale).wrapping_sub(128);
         }
-        let mut sums = [0; 4 * LANES];
+        let mut sums = [[0; LANES]; 3];
         for lane in 0..LANES {
             let sum = self.mixture(x[lane], y[lane], mask);
-            for (i, sums) in sums[4 * lane..][..4].iter_mut().enumerate() {
-                *sums = (sum >> (16 * i)) as u16;
+            for (channel, sums) in sums.iter_mut().enumerate() {
+                sums[lane] = (sum >> (16 * channel)) as u16;
             }
         }
         sums

@@ -4,7 +4,9 @@
 #[path = "../common/scenes.rs"]
 mod scenes;
 
+mod flat;
 mod images;
+mod light;
 mod lit;
 mod png;
 mod raster;

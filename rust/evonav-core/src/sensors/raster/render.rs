@@ -236,7 +236,8 @@ fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES]) -> [i32; LANES] {
         Some(face) => mesh.faces[face as usize].body as i32 + 1,
         None => 0,
     };
-    if tags.iter().all(|&tag| tag == tags[0]) {
+    // Compared without a branch a lane.
+    if tags.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0 {
         return [body_of(tags[0]); LANES];
     }
     tags.map(body_of)

@@ -77,7 +77,8 @@ impl Contact {
         let at = |axis: usize, size: usize| {
             let place = (point_m[axis] - self.corner_m[axis]) / CELL_M - 0.5;
             let place = place.clamp(0.0, (size - 2) as f64);
-            (place as usize, place.fract() as f32)
+            let whole = place as usize;
+            (whole, (place - whole as f64) as f32)
         };
         let ((column, right), (row, down)) = (at(0, width), at(1, height_px));
         let [low, high] = [0, 1].map(|level| {
@@ -119,20 +120,29 @@ fn clearance_m(
 
 /// Average over squares of `2 reach + 1` cells; the border is continued.
 fn blurred(cells: &[f32], [height, width]: [usize; 2], reach: usize) -> Vec<f32> {
-    let along = |cells: &[f32], num_lines: usize, length: usize, line_step: usize, step: usize| {
-        let mut out = vec![0.0; cells.len()];
-        let share = 1.0 / (2 * reach + 1) as f32;
-        for line in 0..num_lines {
-            let at = |i: usize| line * line_step + i.min(length - 1) * step;
-            let mut sum: f32 = (0..=reach).map(|i| cells[at(i)]).sum();
-            sum += reach as f32 * cells[at(0)];
-            for i in 0..length {
-                out[at(i)] = sum * share;
-                sum += cells[at(i + reach + 1)] - cells[at(i.saturating_sub(reach))];
-            }
+    let share = 1.0 / (2 * reach + 1) as f32;
+    let mut rows = vec![0.0; cells.len()];
+    for (out, row) in rows.chunks_exact_mut(width).zip(cells.chunks_exact(width)) {
+        let at = |i: usize| row[i.min(width - 1)];
+        let mut sum = (0..=reach).map(at).sum::<f32>() + reach as f32 * row[0];
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = sum * share;
+            sum += at(i + reach + 1) - row[i.saturating_sub(reach)];
         }
-        out
-    };
-    let rows = along(cells, height, width, width, 1);
-    along(&rows, width, height, 1, width)
+    }
+    // All columns at once, row by row.
+    let at = |i: usize| &rows[i.min(height - 1) * width..][..width];
+    let mut sums: Vec<f32> = at(0).iter().map(|first| reach as f32 * first).collect();
+    for row in 0..=reach {
+        sums.iter_mut().zip(at(row)).for_each(|(sum, cell)| *sum += cell);
+    }
+    let mut out = vec![0.0; cells.len()];
+    for (row, out) in out.chunks_exact_mut(width).enumerate() {
+        let (next, last) = (at(row + reach + 1), at(row.saturating_sub(reach)));
+        for (((out, sum), next), last) in out.iter_mut().zip(&mut sums).zip(next).zip(last) {
+            *out = *sum * share;
+            *sum += next - last;
+        }
+    }
+    out
 }

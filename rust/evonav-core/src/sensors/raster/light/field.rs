@@ -4,7 +4,7 @@ use crate::{
     geometry::{Vec2, Vec3, sub},
     sensors::raster::{
         canvas::LANES,
-        light::{contact::Contact, sources::Sources, sun::Sun},
+        light::{coarse::Coarse, contact::Contact, sources::Sources, sun::Sun},
     },
     world::{
         mesh::{Face, PartMesh, SceneMesh, dot},
@@ -18,6 +18,9 @@ const SMOOTH: f64 = 0.69;
 const CONTACT_M: f64 = 0.7;
 /// Distance from a surface at which the space before it is looked up.
 const AHEAD_M: f64 = 0.12;
+/// Points of the floor's grid, which follows contact, from one to the next at which lamps and windows
+/// are looked at.
+const FLOOR_STEP: usize = 3;
 /// Spacing of the places at which the sun is looked for.
 const PROBE_M: f64 = 0.09;
 /// Brightness of what shines by itself: screens, and the world behind panes.
@@ -27,7 +30,7 @@ const GLOW: f32 = 1.35;
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::sensors::raster) struct FaceLight {
     /// Column and row of a world point: `axes . [x, y, z, 1]`.
-    axes: [[f32; 4]; 2],
+    pub axes: [[f32; 4]; 2],
     /// Columns and rows, 2 or more.
     size: [u16; 2],
     first: u32,
@@ -55,8 +58,9 @@ impl Field {
             Self { faces: vec![FaceLight::default(); mesh.faces.len()], points: Vec::new() };
         let baker = Baker { scene, mesh, sources, contact, sun };
         for part in mesh.parts.iter().chain(&mesh.trim) {
+            let around = Around::of(mesh, part);
             for index in part.faces.clone() {
-                field.faces[index] = baker.bake(part, index, &mut field.points);
+                field.faces[index] = baker.bake(part, &around, index, &mut field.points);
             }
         }
         field
@@ -79,16 +83,21 @@ impl Field {
         field
     }
 
-    /// Return the light at a point of a face, interpolated.
+    /// Return the light on a face, interpolated.
+    ///
+    /// # Arguments
+    /// * `place` - column and row of the face's grid.
     #[inline(always)]
-    pub fn at(&self, light: &FaceLight, [x, y, z]: [f32; 3]) -> [f32; 4] {
+    pub fn at(&self, light: &FaceLight, [column, row]: [f32; 2]) -> [f32; 4] {
         let [columns, rows] = light.size;
-        let place = |[a, b, c, d]: [f32; 4], size: u16| {
-            (a * x + b * y + c * z + d).clamp(0.0, f32::from(size - 1) - 1e-3)
+        // The whole number below a place and the rest, by the mantissa of a sum with 1.5 times 2^23:
+        // unlike a conversion it needs no treatment of numbers out of range.
+        let split = |place: f32, size: u16| {
+            let place = place.clamp(0.0, f32::from(size - 1) - 1e-3);
+            let sum = place - 0.5 + 12_582_912.0;
+            (sum.to_bits() & 0xffff, place - (sum - 12_582_912.0))
         };
-        let (s, t) = (place(light.axes[0], columns), place(light.axes[1], rows));
-        let (column, row) = (s as u32, t as u32);
-        let (right, down) = (s - column as f32, t - row as f32);
+        let ((column, right), (row, down)) = (split(column, columns), split(row, rows));
         let at = (light.first + row * u32::from(columns) + column) as usize;
         let upper = &self.points[at..at + 2];
         let lower = &self.points[at + usize::from(columns)..][..2];
@@ -112,7 +121,13 @@ struct Baker<'a> {
 }
 
 impl Baker<'_> {
-    fn bake(&self, part: &PartMesh, index: usize, points: &mut Vec<[f32; 4]>) -> FaceLight {
+    fn bake(
+        &self,
+        part: &PartMesh,
+        around: &Around,
+        index: usize,
+        points: &mut Vec<[f32; 4]>,
+    ) -> FaceLight {
         let face = &self.mesh.faces[index];
         let vertices_m = &self.mesh.vertices_m[part.vertices.clone()];
         let corners = self.mesh.corners_of(face);
@@ -124,7 +139,7 @@ impl Baker<'_> {
             BodyKind::Ceiling => 0.5,
             _ => 0.35,
         };
-        let normals: Vec<Vec3> = corners.iter().map(|&i| self.rounded(part, face, i)).collect();
+        let normals: Vec<Vec3> = corners.iter().map(|&i| self.rounded(around, face, i)).collect();
         let is_round = normals.iter().any(|normal| dot(*normal, face.normal) < 0.999);
         let cells =
             |edge_m: f64| if is_round { 1 } else { ((edge_m / pitch_m) as usize + 1).min(400) };
@@ -149,15 +164,23 @@ impl Baker<'_> {
         if is_round {
             let lights = corners.iter().zip(&normals).map(|(&i, &normal)| {
                 let point_m = vertices_m[i as usize];
-                (point_m, self.light(space, point_m, normal, ahead(point_m)))
+                let smooth = self.sources.on(space, point_m, normal);
+                (point_m, self.light(smooth, point_m, normal, ahead(point_m)))
             });
             points.extend(fitted(lights.collect(), origin_m, axes, size_m));
         } else {
+            let point = |column: usize, row: usize| {
+                at(origin_m, axes, [column as f64 / scale[0], row as f64 / scale[1]])
+            };
+            let step = if kind == BodyKind::Floor { FLOOR_STEP } else { 1 };
+            let smooth = Coarse::of([columns, rows], step, |column, row| {
+                self.sources.on(space, point(column, row), face.normal)
+            });
             for row in 0..rows {
                 for column in 0..columns {
-                    let place = [column as f64 / scale[0], row as f64 / scale[1]];
-                    let point_m = at(origin_m, axes, place);
-                    points.push(self.light(space, point_m, face.normal, ahead(point_m)));
+                    let point_m = point(column, row);
+                    let smooth = smooth.at(column, row);
+                    points.push(self.light(smooth, point_m, face.normal, ahead(point_m)));
                 }
             }
         }
@@ -173,21 +196,18 @@ impl Baker<'_> {
 
     /// Return the normal of a rounded part at a corner of a face: the mean of the faces there that
     /// differ little in direction.
-    fn rounded(&self, part: &PartMesh, face: &Face, corner: u32) -> Vec3 {
-        if part.faces.len() <= 6 {
-            return face.normal;
-        }
-        let near = self.mesh.faces[part.faces.clone()].iter().filter(|other| {
-            dot(other.normal, face.normal) > SMOOTH && self.mesh.corners_of(other).contains(&corner)
-        });
+    fn rounded(&self, around: &Around, face: &Face, corner: u32) -> Vec3 {
+        let near = around.faces(corner).map(|index| &self.mesh.faces[index]);
+        let near = near.filter(|other| dot(other.normal, face.normal) > SMOOTH);
         let sum = near
             .fold([0.0; 3], |sum: Vec3, other| std::array::from_fn(|i| sum[i] + other.normal[i]));
         let length = dot(sum, sum).sqrt();
         if length > 1e-9 { sum.map(|x| x / length) } else { face.normal }
     }
 
-    fn light(&self, space: Option<usize>, point_m: Vec3, normal: Vec3, ahead_m: Vec2) -> [f32; 4] {
-        let [red, green, blue] = self.sources.on(space, point_m, normal);
+    /// Return the light on a point from what lamps and windows give.
+    fn light(&self, smooth: [f32; 3], point_m: Vec3, normal: Vec3, ahead_m: Vec2) -> [f32; 4] {
+        let [red, green, blue] = smooth;
         let height = (point_m[1] / CONTACT_M).clamp(0.0, 1.0) as f32;
         let open = self.contact.openness(ahead_m, height);
         let towards = self.sun.towards.map(f64::from);
@@ -220,8 +240,8 @@ impl Baker<'_> {
                 });
                 let lanes: [[f32; LANES]; 3] =
                     std::array::from_fn(|axis| points_m.map(|point_m| point_m[axis] as f32));
-                for (lane, &reach) in self.sun.reaches(&lanes).iter().enumerate() {
-                    if reach > 0.0 {
+                for (lane, is_met) in self.sun.meets(&lanes).into_iter().enumerate() {
+                    if is_met {
                         let column =
                             (share(first + lane, samples[0]) * (columns - 1) as f64) as usize;
                         let row = (t * (rows - 1) as f64) as usize;
@@ -237,6 +257,30 @@ impl Baker<'_> {
         for (point, is_sunny) in lit.iter_mut().zip(is_sunny) {
             point[3] = if is_sunny { point[3] } else { 0.0 };
         }
+    }
+}
+
+/// The faces around each corner of a rounded part.
+struct Around {
+    /// Corner and face, in order; empty if the part is not rounded.
+    pairs: Vec<(u32, usize)>,
+}
+
+impl Around {
+    fn of(mesh: &SceneMesh, part: &PartMesh) -> Self {
+        let is_rounded = part.faces.len() > 6;
+        let faces = if is_rounded { part.faces.clone() } else { 0..0 };
+        let corners = |index: usize| mesh.corners_of(&mesh.faces[index]).iter();
+        let mut pairs: Vec<_> =
+            faces.flat_map(|index| corners(index).map(move |&corner| (corner, index))).collect();
+        pairs.sort_unstable();
+        Self { pairs }
+    }
+
+    fn faces(&self, corner: u32) -> impl Iterator<Item = usize> {
+        let first = self.pairs.partition_point(|(other, _)| *other < corner);
+        let here = self.pairs[first..].iter().take_while(move |(other, _)| *other == corner);
+        here.map(|(_, index)| *index)
     }
 }
 

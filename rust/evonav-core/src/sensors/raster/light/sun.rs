@@ -27,8 +27,8 @@ pub(in crate::sensors::raster) struct Sun {
     /// Cells `[across, down]` and nearness of a world point: `map . [x, y, z, 1]`.
     map: [[f32; 4]; 3],
     size: [i32; 2],
-    /// Nearness of the first far side of a solid, row-major.
-    nearness: Vec<f32>,
+    /// Nearness of the first far side of a solid; rows are padded to whole blocks.
+    nearness: Vec<[f32; LANES]>,
 }
 
 impl Sun {
@@ -57,19 +57,17 @@ impl Sun {
                 canvas.fill(&scratch.polygon_px, plane, 1);
             }
         }
-        let mut nearness = Vec::with_capacity(width_px * height_px);
-        (0..height_px).for_each(|row| nearness.extend_from_slice(&canvas.row(row)[..width_px]));
         Self {
             towards: towards.map(|x| x as f32),
             map: lens.map_rows(),
             size: [width_px as i32, height_px as i32],
-            nearness,
+            nearness: canvas.nearness,
         }
     }
 
-    /// Return the share of the sun, 0 to 1, that reaches each point.
+    /// Return the cells `[across, down]` and the nearness of points.
     #[inline(always)]
-    pub fn reaches(&self, points_m: &[[f32; LANES]; 3]) -> [f32; LANES] {
+    fn cells(&self, points_m: &[[f32; LANES]; 3]) -> [[f32; LANES]; 3] {
         let [x, y, z] = points_m;
         let mut cells = [[0.0; LANES]; 3];
         for (cells, [a, b, c, d]) in cells.iter_mut().zip(self.map) {
@@ -77,7 +75,32 @@ impl Sun {
                 cells[lane] = a * x[lane] + b * y[lane] + c * z[lane] + d;
             }
         }
-        let [u, v, own] = cells;
+        cells
+    }
+
+    /// Return whether the sun reaches each point, by the nearest cell alone.
+    #[inline(always)]
+    pub fn meets(&self, points_m: &[[f32; LANES]; 3]) -> [bool; LANES] {
+        let [width, height] = self.size;
+        let [u, v, own] = self.cells(points_m);
+        let nearness = self.nearness.as_flattened();
+        std::array::from_fn(|lane| {
+            let column = u[lane].clamp(0.0, (width - 1) as f32) as usize;
+            let row = v[lane].clamp(0.0, (height - 1) as f32) as usize;
+            own[lane] + BIAS_M >= nearness[row * self.stride() + column]
+        })
+    }
+
+    /// Return the number of cells in a padded row.
+    #[inline(always)]
+    fn stride(&self) -> usize {
+        (self.size[0] as usize).next_multiple_of(LANES)
+    }
+
+    /// Return the share of the sun, 0 to 1, that reaches each point.
+    #[inline(always)]
+    pub fn reaches(&self, points_m: &[[f32; LANES]; 3]) -> [f32; LANES] {
+        let [u, v, own] = self.cells(points_m);
         let mut reach = [0.0; LANES];
         for lane in 0..LANES {
             reach[lane] = self.share(u[lane] - 0.5, v[lane] - 0.5, own[lane] + BIAS_M);
@@ -95,8 +118,8 @@ impl Sun {
         let (column, row) = ((u + 0.5) as i32, (v + 0.5) as i32);
         let (right, down) = (u + 0.5 - column as f32, v + 0.5 - row as f32);
         let line = |row: i32| -> f32 {
-            let at = (row * width + column - 1) as usize;
-            let cells = &self.nearness[at..at + 3];
+            let at = row as usize * self.stride() + column as usize - 1;
+            let cells = &self.nearness.as_flattened()[at..at + 3];
             let seen = |i: usize| f32::from(u8::from(own >= cells[i]));
             0.5 * ((1.0 - right) * seen(0) + seen(1) + right * seen(2))
         };

@@ -17,9 +17,6 @@ pub(super) struct Shades {
     pub corner: f32,
     /// Darkness of lines around silhouettes, if there are lines.
     pub line: Option<f32>,
-    /// Whether rows and columns count apart, so that the darkness around a thing that stands close
-    /// to a wall is even.
-    pub is_even: bool,
 }
 
 /// The light that corners and silhouettes leave in one row, and the row continued at both ends.
@@ -32,7 +29,7 @@ pub(super) struct Bends {
 impl Bends {
     /// Set `light` for a row.
     pub fn darken(&mut self, canvas: &Canvas, row: usize, optics: Optics, shades: Shades) {
-        let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
+        let corner_px = corner_reach_px(canvas);
         self.light.clear();
         self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
         self.pad(canvas.row(row), canvas.width_px, corner_px);
@@ -45,21 +42,9 @@ impl Bends {
             [Some((corner_px, false, shades.corner)), line].into_iter().flatten()
         {
             let scale = scale_px / reach_px as f32;
-            let centre = canvas.row(row);
-            let has_both = row >= reach_px && row + reach_px < canvas.height_px;
-            let (above, below) = match has_both {
-                true => (canvas.row(row - reach_px), canvas.row(row + reach_px)),
-                false => (centre, centre),
-            };
-            let left = &self.padded[corner_px - reach_px..];
-            let right = &self.padded[corner_px + reach_px..];
             let width = canvas.width_px;
-            let neighbours = [left, right, above, below].map(|row| &row[..width]);
-            let (light, centre) = (&mut self.light[..width], &centre[..width]);
-            if shades.is_even && !is_line {
-                darken_evenly(light, centre, neighbours, [scale, most], is_orthographic);
-                continue;
-            }
+            let neighbours = neighbours(&self.padded, canvas, row, [corner_px, reach_px]);
+            let (light, centre) = (&mut self.light[..width], &canvas.row(row)[..width]);
             // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
             let in_perspective = |nearness: f32| nearness + 1e-6;
             let orthographic = |_: f32| 1.0;
@@ -86,6 +71,33 @@ impl Bends {
                 }
             }
         }
+    }
+
+    /// Compute what is left of the light in corners in one row, [`u16::MAX`] times.
+    ///
+    /// Rows and columns count apart, unlike in [`Self::darken`], so that the darkness around a thing
+    /// that stands close to a wall is even.
+    ///
+    /// # Arguments
+    /// * `depth_m` - of the row's pixels in perspective views, 1 in orthographic ones.
+    /// * `corner` - darkness in concave corners, 0 to 1.
+    pub fn open(
+        &mut self,
+        canvas: &Canvas,
+        row: usize,
+        optics: Optics,
+        depth_m: &[f32],
+        corner: f32,
+        open: &mut [u16],
+    ) {
+        let (Optics::Perspective { focal_px: scale_px }
+        | Optics::Orthographic { pixels_per_m: scale_px }) = optics;
+        let (width, reach_px) = (canvas.width_px, corner_reach_px(canvas));
+        self.pad(canvas.row(row), width, reach_px);
+        let neighbours = neighbours(&self.padded, canvas, row, [reach_px; 2]);
+        let centre = &canvas.row(row)[..width];
+        let unit = 0.5 * scale_px as f32 / reach_px as f32;
+        open_row(&mut open[..width], centre, neighbours, &depth_m[..width], [unit, corner]);
     }
 
     /// Copy a row and continue it on both sides linearly, as the planes there continue.
@@ -121,22 +133,56 @@ fn darken_row(
     }
 }
 
-/// Darken `light` by the greater bend of each pixel's row and column, as [`darken_row`] does by
-/// their mean.
+/// Set `open` by the greater bend of each pixel's row and column.
 #[inline(always)]
-fn darken_evenly(
-    light: &mut [f32],
+fn open_row(
+    open: &mut [u16],
     centre: &[f32],
     [left, right, above, below]: [&[f32]; 4],
-    [scale, most]: [f32; 2],
-    is_orthographic: bool,
+    depth_m: &[f32],
+    [unit, corner]: [f32; 2],
 ) {
-    for i in 0..light.len() {
-        let unit = if is_orthographic { 1.0 } else { centre[i] + 1e-6 };
-        let bend = |sum: f32| (0.5 * sum - centre[i]) * scale / unit;
-        let shade = |sum: f32| corner_shade(0.5 * bend(sum), most);
-        light[i] *= 1.0 - shade(left[i] + right[i]).max(shade(above[i] + below[i]));
+    const WHOLE: f32 = 32767.0;
+    let lesser = |a: f32, b: f32| if a < b { a } else { b };
+    // The product of [`corner_shade`], one of whose factors is always 1.
+    let share = |bend: f32| lesser(lesser(bend * (1.0 / FULL_BEND), 1.0), 1.8 - bend);
+    for i in 0..open.len() {
+        // The bend is relative to depth, as a pixel's width grows with it.
+        let bend = |sum: f32| (0.5 * sum - centre[i]) * (unit * depth_m[i]);
+        let (level, upright) = (share(bend(left[i] + right[i])), share(bend(above[i] + below[i])));
+        let most = if level > upright { level } else { upright };
+        let most = if most > 0.0 { most } else { 0.0 };
+        // The whole number nearest to one of 15 bits, by the mantissa of a sum with 2^23. Unlike a
+        // conversion it needs no treatment of numbers out of range.
+        let whole = (WHOLE - corner * WHOLE * most + 8_388_608.0).to_bits() & 0x7fff;
+        open[i] = (whole as u16) << 1;
     }
+}
+
+/// Return the distance up to which a corner is dark.
+fn corner_reach_px(canvas: &Canvas) -> usize {
+    ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2)
+}
+
+/// Return what lies to the left and right of, above and below each pixel of a row. Above the image
+/// and below it, planes go on.
+///
+/// # Arguments
+/// * `padded` - the row, continued by the first of the numbers.
+/// * `reach_px` - how far away the neighbours are.
+fn neighbours<'a>(
+    padded: &'a [f32],
+    canvas: &'a Canvas,
+    row: usize,
+    [padding_px, reach_px]: [usize; 2],
+) -> [&'a [f32]; 4] {
+    let has_both = row >= reach_px && row + reach_px < canvas.height_px;
+    let (above, below) = match has_both {
+        true => (canvas.row(row - reach_px), canvas.row(row + reach_px)),
+        false => (canvas.row(row), canvas.row(row)),
+    };
+    let (left, right) = (&padded[padding_px - reach_px..], &padded[padding_px + reach_px..]);
+    [left, right, above, below].map(|row| &row[..canvas.width_px])
 }
 
 /// Return the darkness in a corner, `most` or less. A large bend is not a corner but a surface far behind an edge.

@@ -5,7 +5,10 @@
 
 use std::ops::Range;
 
-use crate::sensors::raster::canvas::{Canvas, LANES};
+use crate::sensors::raster::{
+    canvas::{Canvas, LANES},
+    shader::runs::{Runs, spans},
+};
 
 /// Change of one pixel's colour.
 type Change = (u32, [i16; 3]);
@@ -14,8 +17,11 @@ type Change = (u32, [i16; 3]);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Edges {
     changes: Vec<Change>,
-    /// Row in which the current run of each border between two columns began, plus 1; 0 for none.
-    began: Vec<[u32; LANES]>,
+    /// The columns before which the row has a border, and those of the row above.
+    columns: Vec<u32>,
+    above: Vec<u32>,
+    /// Row in which the border before each of these columns began.
+    began: Vec<u32>,
 }
 
 /// Steps of the indices of tags, whose rows are padded, and of pixels.
@@ -46,7 +52,7 @@ struct Border {
 
 impl Edges {
     /// Blend the colours at the borders between faces.
-    pub fn smooth(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
+    pub fn smooth(&mut self, canvas: &Canvas, runs: &Runs, rgb: &mut [u8]) {
         self.changes.clear();
         let picture = Picture {
             tags: canvas.tags.as_flattened(),
@@ -54,8 +60,8 @@ impl Edges {
             right: Place { tag: 1, pixel: 1 },
             down: Place { tag: canvas.blocks_per_row() * LANES, pixel: canvas.width_px },
         };
-        self.level(canvas, &picture);
-        self.upright(canvas, &picture);
+        self.level(canvas, runs, &picture);
+        self.upright(canvas, runs, &picture);
         for &(pixel, change) in &self.changes {
             let colour = &mut rgb[3 * pixel as usize..][..3];
             for (channel, change) in colour.iter_mut().zip(change) {
@@ -65,22 +71,18 @@ impl Edges {
     }
 
     /// Find the runs of the borders between two rows.
-    fn level(&mut self, canvas: &Canvas, picture: &Picture<'_>) {
+    fn level(&mut self, canvas: &Canvas, runs: &Runs, picture: &Picture<'_>) {
         let width = canvas.width_px;
         for row in 1..canvas.height_px {
-            let (first, second) = (canvas.row_blocks(row - 1), canvas.row_blocks(row));
-            let blocks = canvas.tags[first].iter().zip(&canvas.tags[second]);
             let origin = Place { tag: 0, pixel: 0 }.plus(row - 1, picture.down);
             let (along, across) = (picture.right, picture.down);
             let border = Border { origin, along, across, length: width };
-            let mut began = None;
-            for (block, (above, below)) in blocks.enumerate() {
-                if began.is_none() && is_same(above, below) {
-                    continue;
-                }
-                for lane in 0..LANES.min(width - block * LANES) {
-                    let column = block * LANES + lane;
-                    match (began, above[lane] != below[lane]) {
+            let mut below = spans(runs.of_row(row), width).peekable();
+            let (mut column, mut began) = (0, None);
+            for (run, tag) in spans(runs.of_row(row - 1), width) {
+                while column < run.end {
+                    let Some((other, other_tag)) = below.peek() else { break };
+                    match (began, tag != *other_tag) {
                         (None, true) => began = Some(column),
                         (Some(start), false) => {
                             began = None;
@@ -88,6 +90,8 @@ impl Edges {
                         }
                         _ => {}
                     }
+                    column = run.end.min(other.end);
+                    below.next_if(|(other, _)| other.end == column);
                 }
             }
             if let Some(start) = began {
@@ -97,50 +101,35 @@ impl Edges {
     }
 
     /// Find the runs of the borders between two columns.
-    fn upright(&mut self, canvas: &Canvas, picture: &Picture<'_>) {
-        let (width, height) = (canvas.width_px, canvas.height_px);
-        self.began.clear();
-        self.began.resize(canvas.blocks_per_row(), [0; LANES]);
-        let border = |column: usize| Border {
-            origin: Place { tag: column - 1, pixel: column - 1 },
+    fn upright(&mut self, canvas: &Canvas, runs: &Runs, picture: &Picture<'_>) {
+        let height = canvas.height_px;
+        self.began.resize(canvas.width_px, 0);
+        self.above.clear();
+        let border = |column: u32| Border {
+            origin: Place { tag: column as usize - 1, pixel: column as usize - 1 },
             along: picture.down,
             across: picture.right,
             length: height,
         };
-        for row in 0..height {
-            let mut before = canvas.tags[canvas.row_blocks(row).start][0];
-            let blocks = canvas.tags[canvas.row_blocks(row)].iter().zip(&mut self.began);
-            for (block, (tags, began)) in blocks.enumerate() {
-                let mut shifted = [before; LANES];
-                shifted[1..].copy_from_slice(&tags[..LANES - 1]);
-                before = tags[LANES - 1];
-                if is_same(tags, &shifted) && *began == [0; LANES] {
-                    continue;
+        for row in 0..=height {
+            // No border goes on below the last row.
+            let starts = if row < height { &runs.of_row(row)[1..] } else { &[] };
+            self.columns.clear();
+            self.columns.extend(starts.iter().map(|run| run.start));
+            let mut here = self.columns.iter().peekable();
+            for &column in &self.above {
+                while let Some(&new) = here.next_if(|new| **new < column) {
+                    self.began[new as usize] = row as u32;
                 }
-                for lane in 0..LANES.min(width - block * LANES) {
-                    match (began[lane], tags[lane] != shifted[lane]) {
-                        (0, true) => began[lane] = row as u32 + 1,
-                        (0, false) | (_, true) => {}
-                        (start, false) => {
-                            began[lane] = 0;
-                            let border = border(block * LANES + lane);
-                            picture.run(&border, start as usize - 1..row, &mut self.changes);
-                        }
-                    }
+                if here.next_if(|same| **same == column).is_none() {
+                    let start = self.began[column as usize] as usize;
+                    picture.run(&border(column), start..row, &mut self.changes);
                 }
             }
-        }
-        for (column, &start) in self.began.as_flattened().iter().enumerate() {
-            if start > 0 {
-                picture.run(&border(column), start as usize - 1..height, &mut self.changes);
-            }
+            here.for_each(|&new| self.began[new as usize] = row as u32);
+            std::mem::swap(&mut self.columns, &mut self.above);
         }
     }
-}
-
-/// Compare blocks without a branch a lane.
-fn is_same(a: &[u32; LANES], b: &[u32; LANES]) -> bool {
-    (0..LANES).fold(0, |different, lane| different | (a[lane] ^ b[lane])) == 0
 }
 
 struct Picture<'a> {

@@ -85,8 +85,7 @@ impl Flat {
 
     /// Fill `rgb` from a drawn canvas.
     pub fn shade(&mut self, canvas: &Canvas, optics: Optics, has_lines: bool, rgb: &mut [u8]) {
-        let shades =
-            Shades { corner: CORNER_SHADE, line: has_lines.then_some(LINE_SHADE), is_even: false };
+        let shades = Shades { corner: CORNER_SHADE, line: has_lines.then_some(LINE_SHADE) };
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             self.bends.darken(canvas, row, optics, shades);
             if let Optics::Orthographic { .. } = optics {

@@ -11,11 +11,14 @@ use crate::{
         lens::{Lens, Rays},
         light::Light,
         shader::{
-            bends::{Bends, Shades},
+            bends::Bends,
             edges::Edges,
-            surface::{Pair, Surface, Wide, products, wide},
+            response::{pack, respond},
+            runs::{Runs, spans},
+            surface::Surface,
         },
     },
+    textures::Texture,
     world::mesh::SceneMesh,
 };
 
@@ -25,42 +28,38 @@ const SKY: [u8; 3] = [204, 222, 236];
 const GROUND: [u8; 3] = [46, 44, 42];
 
 /// Darkness of corners, most of which is in the light.
-const SHADES: Shades = Shades { corner: 0.20, line: None, is_even: true };
-/// Light in views without a house around them.
+const CORNER_SHADE: f32 = 0.20;
+/// The root of the light in views without a house around them.
 const EVEN: f32 = 0.85;
-/// The response `x (a + b x - c x^2)` to brightness `x`: more contrast in the middle than at both ends.
-const RESPONSE: [f32; 3] = [0.80, 0.55, 0.40];
-/// Brightness at which the response is greatest.
-const BRIGHTEST: f32 = 1.39;
-/// Exposure: brightness of a white surface in light of 1.
-const EXPOSURE: f32 = 0.88;
-
-/// Light of 1 as a number of 16 bits; light is below 8.
-const LIGHT: f32 = 8192.0;
-/// Brightness as a number of 16 bits, a grey level.
-const BRIGHT: f32 = 32.0;
 
 /// Surfaces that were seen, and working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Lit {
     bends: Bends,
     edges: Edges,
+    runs: Runs,
     /// Surfaces by face, and the number of the picture for which they were prepared.
     surfaces: Vec<(u64, Surface)>,
     picture: u64,
-    /// Depth of a row's pixels, and what is left of their light in corners, [`u16::MAX`] times.
-    depth_m: Vec<f32>,
+    /// Depths of a row's pixels and of a block after them; 1 in orthographic views.
+    scale: Vec<f32>,
+    /// Results of [`Bends::open`].
     open: Vec<u16>,
-    /// Colours of a row, and of the block after it.
-    colours: Vec<u8>,
+    /// Their brightness, then grey levels, by channel, and their textures' colours.
+    bright: [Vec<u16>; 3],
+    sums: [Vec<u16>; 3],
+    packed: Vec<u32>,
+    /// The runs of the row in which nothing is.
+    empty: Vec<Range<usize>>,
 }
 
-/// The parts of a view that all runs share.
+/// Common to all runs of a row.
 struct Shot<'a> {
     light: Option<&'a Light>,
-    rays: Rays,
-    depth_m: &'a [f32],
-    open: &'a [u16],
+    rays: &'a Rays,
+    row: usize,
+    nearness: &'a [f32],
+    scale: &'a [f32],
 }
 
 impl Lit {
@@ -74,185 +73,215 @@ impl Lit {
     ) {
         let rays = lens.rays();
         self.picture += 1;
+        self.runs.find(canvas);
         self.surfaces.resize(mesh.faces.len(), Default::default());
-        for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            self.bends.darken(canvas, row, lens.optics, SHADES);
-            self.prepare(canvas, row, rays.horizon_m);
-            let Self { surfaces, depth_m, open, colours, .. } = self;
-            let shot = Shot { light, rays: lens.rays(), depth_m, open };
-            let tags = &canvas.tags[canvas.row_blocks(row)].as_flattened()[..canvas.width_px];
-            let mut start = 0;
-            while start < tags.len() {
-                let tag = tags[start];
-                let end = start + run_length(&tags[start..]);
-                if let Some(index) = (tag as usize).checked_sub(1) {
-                    let (picture, surface) = &mut surfaces[index];
-                    if *picture != self.picture {
-                        (*picture, *surface) =
-                            (self.picture, Surface::of(mesh, index, lens, shot.rays.pixel));
-                    }
-                    shot.run(index, surface, row, start..end, colours);
-                } else {
-                    // The ends of a run lie on one side of the horizon in level pictures.
-                    let is_below = shot.rays.is_below_horizon([start, row]);
-                    let colour = if is_below { GROUND } else { SKY };
-                    colours[3 * start..3 * end].as_chunks_mut().0.fill(colour);
-                }
-                start = end;
-            }
-            pixels.copy_from_slice(&colours[..3 * canvas.width_px]);
-        }
-        self.edges.smooth(canvas, rgb);
-    }
-
-    /// Set the depth and the openness of a row; lanes after its end have any.
-    fn prepare(&mut self, canvas: &Canvas, row: usize, horizon_m: Option<f32>) {
-        let nearness = canvas.row(row);
-        let length = nearness.len() + LANES;
-        self.depth_m.resize(length, 1.0);
+        let length = canvas.blocks_per_row() * LANES + 2 * LANES;
+        self.scale.clear();
+        self.scale.resize(length, 1.0);
         self.open.resize(length, u16::MAX);
-        self.colours.resize(3 * length + 1, 0);
-        match horizon_m {
-            None => {
-                for (depth_m, w) in self.depth_m.iter_mut().zip(nearness) {
-                    *depth_m = 1.0 / w;
+        let Self { bright, sums, .. } = self;
+        bright.iter_mut().chain(sums).for_each(|channel| channel.resize(length, 0));
+        self.packed.resize(length, 0);
+        for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
+            let nearness = canvas.row(row);
+            if rays.horizon_m.is_none() {
+                for (scale, w) in self.scale.iter_mut().zip(nearness) {
+                    *scale = 1.0 / w;
                 }
             }
-            Some(horizon_m) => {
-                for (depth_m, w) in self.depth_m.iter_mut().zip(nearness) {
-                    *depth_m = horizon_m - w;
-                }
+            let Self { bends, open, scale, .. } = self;
+            bends.open(canvas, row, lens.optics, scale, CORNER_SHADE, open);
+            self.light(mesh, light, lens, &rays, canvas, row);
+            self.bright.iter_mut().for_each(|channel| respond(channel, &self.open));
+            pack(&self.bright, &mut self.packed, pixels);
+            for run in &self.empty {
+                // The ends of a run lie on one side of the horizon in level pictures.
+                let colour = if rays.is_below_horizon([run.start, row]) { GROUND } else { SKY };
+                pixels[3 * run.start..3 * run.end].as_chunks_mut().0.fill(colour);
             }
         }
-        for (open, light) in self.open.iter_mut().zip(&self.bends.light) {
-            *open = whole(light * 65535.0);
-        }
+        self.edges.smooth(canvas, &self.runs, rgb);
     }
-}
 
-/// Return the number of equal tags at the start.
-#[inline(always)]
-fn run_length(tags: &[u32]) -> usize {
-    let (blocks, _) = tags.as_chunks::<LANES>();
-    let is_equal = |block: &&[u32; LANES]| {
-        block.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0
-    };
-    let whole = blocks.iter().take_while(is_equal).count() * LANES;
-    whole + tags[whole..].iter().take_while(|&&tag| tag == tags[0]).count()
-}
-
-/// Return the whole number nearest to one from 0 to 65535. The mantissa of a sum with 2^23 is used,
-/// which unlike a conversion needs no treatment of numbers out of range.
-#[inline(always)]
-fn whole(value: f32) -> u16 {
-    (value + 8_388_608.0).to_bits() as u16
-}
-
-impl Shot<'_> {
-    /// Compute the colours of a run of pixels of one face, and some after it.
-    fn run(
-        &self,
-        index: usize,
-        surface: &Surface,
+    /// Set the brightness of a row, and its empty runs.
+    fn light(
+        &mut self,
+        mesh: &SceneMesh,
+        light: Option<&Light>,
+        lens: &Lens,
+        rays: &Rays,
+        canvas: &Canvas,
         row: usize,
-        run: Range<usize>,
-        colours: &mut [u8],
     ) {
-        let mut start = End::of(self.light_at(index, [run.start, row]));
-        for first in run.clone().step_by(LANES) {
-            let last = (first + LANES).min(run.end - 1);
-            let end = match last == first {
-                true => start,
-                false => End::of(self.light_at(index, [last, row])),
+        let Self { runs, surfaces, scale, bright, sums, empty, .. } = self;
+        let shot = Shot { light, rays, row, nearness: canvas.row(row), scale };
+        empty.clear();
+        for (run, tag) in spans(runs.of_row(row), canvas.width_px) {
+            let Some(index) = (tag as usize).checked_sub(1) else {
+                empty.push(run);
+                continue;
             };
-            let share = SHARES[last - first];
-            let light = self.light_between([first, row], [&start, &end], share);
-            let surface = surface
-                .plain()
-                .unwrap_or_else(|| self.textured(surface, [first, row], (last - first) / 2));
-            let found = respond(&surface, &light, lanes(self.open, first));
-            let colours = &mut colours[3 * first..][..3 * LANES + 1];
-            for (lane, found) in found.as_chunks::<4>().0.iter().enumerate() {
-                // The fourth byte is overwritten by the next pixel.
-                let [red, green, blue, rest] = &mut colours[3 * lane..][..4] else {
-                    unreachable!()
-                };
-                [*red, *green, *blue, *rest] = *found;
+            let (picture, surface) = &mut surfaces[index];
+            if *picture != self.picture {
+                (*picture, *surface) =
+                    (self.picture, Surface::of(mesh, light, index, lens, rays.pixel));
             }
-            start = end;
+            shot.run(index, surface, run.clone(), bright);
+            if let Some(texture) = surface.texture {
+                shot.colour(surface, texture, run, sums, bright);
+            }
         }
-    }
-
-    /// Return the colours of a block before they are lit; the face is seen around `middle`.
-    #[inline(always)]
-    fn textured(&self, surface: &Surface, [first, row]: [usize; 2], middle: usize) -> Wide {
-        let depth_m = lanes(self.depth_m, first);
-        let scale = if self.rays.horizon_m.is_some() { &[1.0; LANES] } else { depth_m };
-        let length2 = self.rays.length2([first + middle, row]);
-        surface.colours([first, row], scale, scale[middle], length2)
-    }
-
-    /// Return the light on a pixel of a face without the sun, by channel, and the share of
-    /// sunlight that the surface's slope takes up.
-    #[inline(always)]
-    fn light_at(&self, index: usize, [column, row]: [usize; 2]) -> [f32; 4] {
-        let Some(light) = self.light else { return [EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0] };
-        let point_m = self.rays.point([column, row], self.depth_m[column]);
-        light.field.at(&light.field.faces[index], point_m)
-    }
-
-    /// Return the light on a block, interpolated between two places: the square root of its
-    /// strength, since colours are too.
-    ///
-    /// # Arguments
-    /// * `share` - one over the number of pixels between the places.
-    #[inline(always)]
-    fn light_between(&self, pixel: [usize; 2], ends: [&End; 2], share: f32) -> Wide {
-        let smooth = ramp(ends.map(|end| end.rooted), share);
-        let slopes = ends.map(|end| end.light[3]);
-        let Some(light) = self.light.filter(|_| slopes[0] + slopes[1] > 0.0) else {
-            return smooth;
-        };
-        let points_m = self.rays.points(pixel, lanes(self.depth_m, pixel[0]));
-        let reach = light.sun.reaches(&points_m);
-        if reach == [0.0; LANES] {
-            return smooth;
-        }
-        let sunny = ends
-            .map(|end| rooted(&end.light, light.sunlight.map(|channel| channel * end.light[3])));
-        let sunny = ramp(sunny, share);
-        if reach == [1.0; LANES] {
-            return sunny;
-        }
-        let reach = reach.map(|share| whole(share * 65535.0));
-        let (smooth, sunny) = (smooth.as_chunks::<8>().0, sunny.as_chunks::<8>().0);
-        wide(|pair| {
-            let (smooth, sunny) = (smooth[pair], sunny[pair]);
-            let more = std::array::from_fn(|i| sunny[i].saturating_sub(smooth[i]));
-            let more = products(&more, &doubled(&reach, pair));
-            std::array::from_fn(|i| smooth[i] + more[i])
-        })
     }
 }
 
-/// The light at an end of a block, as from [`Shot::light_at`], and the result of [`rooted`] without
-/// the sun.
+/// One over the number of pixels between two places; 0 if they are the same.
+const SHARES: [f32; 2 * LANES + 1] = {
+    let mut shares = [0.0; 2 * LANES + 1];
+    let mut num = 1;
+    while num < shares.len() {
+        shares[num] = 1.0 / num as f32;
+        num += 1;
+    }
+    shares
+};
+
+/// Light: without the sun, by channel, and the share of sunlight that the surface's slope takes up.
+type Light4 = [f32; 4];
+
+/// The light at a place, and its root as the surface takes it.
 #[derive(Clone, Copy)]
 struct End {
-    light: [f32; 4],
+    light: Light4,
     rooted: [f32; 4],
 }
 
 impl End {
     #[inline(always)]
-    fn of(light: [f32; 4]) -> Self {
-        Self { light, rooted: rooted(&light, [0.0; 4]) }
+    fn of(light: Light4, surface: &Surface) -> Self {
+        Self { light, rooted: rooted(&light, surface) }
     }
 }
 
-/// One over the number of pixels between two places; 0 if they are the same.
-const SHARES: [f32; LANES + 1] =
-    [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 0.25, 0.2, 1.0 / 6.0, 1.0 / 7.0, 0.125];
+impl Shot<'_> {
+    /// Compute the light on a run of pixels of one face, and on some after it.
+    #[inline(always)]
+    fn run(&self, index: usize, surface: &Surface, run: Range<usize>, bright: &mut [Vec<u16>; 3]) {
+        let row = self.row as f32 + 0.5;
+        let places = surface.places.map(|[du, dv, at]| [du, dv * row + at]);
+        let place = |column: usize| {
+            let u = column as f32 + 0.5;
+            places.map(|[du, at]| (du * u + at) * self.scale[column])
+        };
+        let face = self.light.map(|light| (&light.field, &light.field.faces[index]));
+        let end = |place: [f32; 2]| match face {
+            Some((field, face)) => End::of(field.at(face, place), surface),
+            None => End::of([EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0], surface),
+        };
+        let (mut first, mut from) = (run.start, place(run.start));
+        let mut start = end(from);
+        while first < run.end {
+            let (mut step, mut last) = (2 * LANES, (first + 2 * LANES).min(run.end - 1));
+            let mut to = place(last);
+            // Within a cell of the grid, light is even enough for longer steps.
+            let is_far = |axis: usize| (to[axis] - from[axis]).abs() > 1.0;
+            if last > first + LANES && (is_far(0) || is_far(1)) {
+                (step, last) = (LANES, first + LANES);
+                to = place(last);
+            }
+            let stop = end(to);
+            let columns = first..(first + step).min(run.end);
+            self.between(surface, columns, [&start, &stop], SHARES[last - first], bright);
+            (first, from, start) = (first + step, to, stop);
+        }
+    }
+
+    /// Interpolate the light on some pixels.
+    ///
+    /// # Arguments
+    /// * `ends` - the light at the first pixel and further on.
+    /// * `share` - one over the number of pixels between the ends.
+    #[inline(always)]
+    fn between(
+        &self,
+        surface: &Surface,
+        columns: Range<usize>,
+        ends: [&End; 2],
+        share: f32,
+        bright: &mut [Vec<u16>; 3],
+    ) {
+        for (channel, bright) in bright.iter_mut().enumerate() {
+            let ends = ends.map(|end| end.rooted[channel]);
+            let block = bright[columns.start..].first_chunk_mut().expect("rows are padded");
+            ramp(block, ends, share);
+        }
+        if ends[0].light[3] + ends[1].light[3] > 0.0 {
+            self.add_sun(surface, columns, ends, share, bright);
+        }
+    }
+
+    /// Multiply the light on a run of pixels by a texture.
+    #[inline(never)]
+    fn colour(
+        &self,
+        surface: &Surface,
+        texture: &Texture,
+        run: Range<usize>,
+        sums: &mut [Vec<u16>; 3],
+        bright: &mut [Vec<u16>; 3],
+    ) {
+        for first in run.clone().step_by(LANES) {
+            let scale = lanes(self.scale, first);
+            let middle = ((first + LANES).min(run.end - 1) - first) / 2;
+            let length2 = self.rays.length2([first + middle, self.row]);
+            let found = surface.sample(texture, [first, self.row], scale, scale[middle], length2);
+            for (sums, found) in sums.iter_mut().zip(&found) {
+                sums[first..first + LANES].copy_from_slice(found);
+            }
+        }
+        for channel in 0..3 {
+            surface.colour(channel, &sums[channel][run.clone()], &mut bright[channel][run.clone()]);
+        }
+    }
+
+    /// Add the sun to pixels that it may reach; arguments as of [`Self::between`].
+    #[inline(never)]
+    fn add_sun(
+        &self,
+        surface: &Surface,
+        columns: Range<usize>,
+        ends: [&End; 2],
+        share: f32,
+        bright: &mut [Vec<u16>; 3],
+    ) {
+        let Some(light) = self.light else { return };
+        let sunny = ends.map(|end| {
+            let sun = end.light[3];
+            rooted(&std::array::from_fn(|i| end.light[i] + light.sunlight[i] * sun), surface)
+        });
+        for first in columns.clone().step_by(LANES) {
+            let depth_m = match self.rays.horizon_m {
+                None => *lanes(self.scale, first),
+                // Rows of the canvas have no block after their end.
+                Some(horizon_m) => std::array::from_fn(|lane| {
+                    self.nearness.get(first + lane).map_or(0.0, |w| horizon_m - w)
+                }),
+            };
+            let reach = light.sun.reaches(&self.rays.points([first, self.row], &depth_m));
+            if reach == [0.0; LANES] {
+                continue;
+            }
+            for (channel, smooth) in bright.iter_mut().enumerate() {
+                let [start, stop] = sunny.map(|end| end[channel]);
+                let mut full = [0; 2 * LANES];
+                ramp(&mut full, [start, stop], share);
+                let full = lanes(&full, first - columns.start);
+                for ((smooth, full), reach) in smooth[first..].iter_mut().zip(full).zip(&reach) {
+                    *smooth += (f32::from(full.saturating_sub(*smooth)) * reach) as u16;
+                }
+            }
+        }
+    }
+}
 
 /// Return a block of a row, from any pixel on.
 #[inline(always)]
@@ -260,75 +289,32 @@ fn lanes<T>(row: &[T], first: usize) -> &[T; LANES] {
     row[first..].first_chunk().expect("rows are padded by a block")
 }
 
-/// Return the square root of light and sunlight, times the exposure, as numbers of 16 bits.
+/// Return the square root of light times the surface's scale, since colours are roots, too.
 #[inline(always)]
-fn rooted(light: &[f32; 4], sun: [f32; 4]) -> [f32; 4] {
+fn rooted(light: &Light4, surface: &Surface) -> [f32; 4] {
     let mut rooted = [0.0; 4];
     for i in 0..4 {
-        let root = (light[i] + sun[i]).max(0.0).sqrt();
-        rooted[i] = (root * (EXPOSURE * LIGHT)).min(65535.0);
+        let root = light[i].sqrt() * surface.scale[i];
+        rooted[i] = if root < surface.most { root } else { surface.most };
     }
     rooted
 }
 
-/// Interpolate between two places.
-#[inline(always)]
-fn ramp([start, end]: [[f32; 4]; 2], share: f32) -> Wide {
-    let (mut first, mut step) = ([0_u16; 4], [0_u16; 4]);
-    for i in 0..4 {
-        first[i] = whole(start[i]);
-        // A negative step is one modulo 2^16.
-        step[i] = ((end[i] - start[i]) * share + 12_582_912.0).to_bits() as u16;
-    }
-    let next: [u16; 4] = std::array::from_fn(|i| first[i].wrapping_add(step[i]));
-    let first = beside(first, next);
-    let twice = beside(step, step).map(|step| step.wrapping_mul(2));
-    wide(|pair| {
-        let num = pair as u16;
-        std::array::from_fn(|i| first[i].wrapping_add(twice[i].wrapping_mul(num)))
-    })
-}
-
-/// Return the channels of two pixels.
-#[inline(always)]
-fn beside([a, b, c, d]: [u16; 4], [e, f, g, h]: [u16; 4]) -> Pair {
-    [a, b, c, d, e, f, g, h]
-}
-
-/// Return the numbers of a pair of pixels, for each of their channels.
-#[inline(always)]
-fn doubled(of_pixels: &[u16; LANES], pair: usize) -> Pair {
-    let (left, right) = (of_pixels[2 * pair], of_pixels[2 * pair + 1]);
-    beside([left; 4], [right; 4])
-}
-
-/// Return the colours of a lit surface as a camera responds to them.
+/// Interpolate between two numbers from 0 to 65535. Values after the second may be wrong.
 ///
-/// It is not inlined: compilers would take the blocks, which come from several branches, apart into
-/// single numbers.
-#[inline(never)]
-fn respond(surface: &Wide, light: &Wide, open: &[u16; LANES]) -> [u8; 4 * LANES] {
-    const MOST: u16 = (BRIGHTEST * 255.0 * BRIGHT) as u16;
-    const WHITE: u16 = (255.0 * BRIGHT) as u16;
-    /// The response to brightness of 1 as a number of 16 bits, and factors that make brightness
-    /// and the result of squaring it such a number.
-    const ONE: f32 = 8192.0;
-    const LINEAR: u16 = (RESPONSE[1] * ONE / (255.0 * BRIGHT) * 65536.0) as u16;
-    const SQUARE: u16 =
-        (RESPONSE[2] * ONE * 4096.0 / (255.0 * BRIGHT * 255.0 * BRIGHT) * 65536.0) as u16;
-    let (surface, light) = (surface.as_chunks().0, light.as_chunks().0);
-    let levels = wide(|pair| {
-        let surface: &Pair = &surface[pair];
-        let light = products(&light[pair], &doubled(open, pair));
-        let bright = products(&surface.map(|colour| 2 * colour), &light);
-        let bright = bright.map(|bright| bright.min(MOST));
-        let fourfold = bright.map(|bright| 4 * bright);
-        let square = products(&products(&fourfold, &fourfold), &[SQUARE; 8]);
-        let linear = products(&bright, &[LINEAR; 8]);
-        let response: Pair =
-            std::array::from_fn(|i| 2 * ((RESPONSE[0] * ONE) as u16 + linear[i] - square[i]));
-        let level = products(&fourfold, &response);
-        level.map(|level| (level.min(WHITE) + 16) >> 5)
-    });
-    levels.map(|level| level as u8)
+/// Four numbers at a time are those of 16 bits in a sum of products.
+#[inline(always)]
+fn ramp(block: &mut [u16; 2 * LANES], [start, end]: [f32; 2], share: f32) {
+    const ROUND: f32 = 12_582_912.0;
+    // Whole numbers by the mantissa of a sum, which unlike a conversion needs no treatment of
+    // numbers out of range.
+    let whole = |value: f32| i64::from((value + ROUND).to_bits() as i32 - ROUND.to_bits() as i32);
+    let (first, step) = (whole(start), whole((end - start) * share));
+    let times = |value: i64, factors: i64| value.wrapping_mul(factors);
+    let mut four = times(first, 0x1_0001_0001_0001).wrapping_add(times(step, 0x3_0002_0001_0000));
+    let next = times(step, 0x4_0004_0004_0004);
+    for values in block.as_chunks_mut::<4>().0 {
+        *values = std::array::from_fn(|lane| (four >> (16 * lane)) as u16);
+        four = four.wrapping_add(next);
+    }
 }

@@ -4,6 +4,8 @@ mod bends;
 mod edges;
 mod flat;
 mod lit;
+mod response;
+mod runs;
 mod surface;
 
 use crate::{

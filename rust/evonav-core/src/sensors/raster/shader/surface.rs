@@ -1,7 +1,15 @@
-//! The colour of surfaces before they are lit, and how it is lit, in numbers of 16 bits.
+//! Faces, prepared for one view: how they are lit, and their textures.
 
 use crate::{
-    sensors::raster::{canvas::LANES, lens::Lens, shader::flat::BLACK},
+    sensors::raster::{
+        canvas::LANES,
+        lens::Lens,
+        light::Light,
+        shader::{
+            flat::BLACK,
+            response::{FINE, MOST, product},
+        },
+    },
     textures::{NEUTRAL, Texture, texture_of},
     world::mesh::SceneMesh,
 };
@@ -9,20 +17,17 @@ use crate::{
 /// Share of a pixel's longer side on the surface that is averaged. A surface seen from the side
 /// would lose all detail if it were 1, and shimmer if it were small.
 const AVERAGED: f64 = 0.5;
-/// Colours before they are lit, a grey level.
-const FINE: f32 = 128.0;
 /// Share of the range of colours that lies above the brightness of black surfaces.
 const RAISED: f32 = 1.0 - BLACK / 255.0;
+/// Exposure: brightness of a white surface in light of 1.
+const EXPOSURE: f32 = 0.88;
+/// The root of light of 1 on a textured surface as a number of 16 bits; it is below 8.
+const ROOT: f32 = 8192.0;
 
-/// Red, green, blue and a number that is not used, for each pixel of a block.
-pub(super) type Wide = [u16; 4 * LANES];
-/// The same for two pixels: what one register of the plainest processors holds.
-pub(super) type Pair = [u16; 8];
-
-/// The surface of a face, prepared for one view.
+/// A face, prepared for one view.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Surface {
-    texture: Option<&'static Texture>,
+    pub texture: Option<&'static Texture>,
     /// The results of [`Lens::on_plane`] for the texture's coordinates.
     coordinates: [[f32; 3]; 2],
     /// Square of the texels in the width of a pixel at depth 1.
@@ -30,23 +35,41 @@ pub(super) struct Surface {
     /// Square of the ratio of a pixel's longer side on the surface to its width, at depth 1.
     slant: f32,
     /// Factors of a texture's channels.
-    factor: Pair,
-    /// Colours without a texture.
-    plain: Pair,
+    factor: [u16; 3],
+    /// The results of [`Lens::on_plane`] for the column and row in the face's grid of light.
+    pub places: [[f32; 3]; 2],
+    /// Factors of the root of light, by channel, and the greatest product. It is the brightness,
+    /// [`FINE`] times, if the surface has no texture; else a number of 16 bits.
+    pub scale: [f32; 4],
+    pub most: f32,
 }
 
 impl Surface {
-    pub fn of(mesh: &SceneMesh, index: usize, lens: &Lens, pixel: f32) -> Self {
+    /// Prepare a face.
+    ///
+    /// # Arguments
+    /// * `pixel` - width of a pixel at depth 1.
+    pub fn of(
+        mesh: &SceneMesh,
+        light: Option<&Light>,
+        index: usize,
+        lens: &Lens,
+        pixel: f32,
+    ) -> Self {
         let (face, skin) = (&mesh.faces[index], &mesh.skins[index]);
+        let Some((plane, facing)) = lens.nearness_plane(face) else { return Self::default() };
+        let places = match light {
+            Some(light) => light.field.faces[index].axes.map(|[x, y, z, offset]| {
+                lens.on_plane(plane, [x, y, z].map(f64::from), f64::from(offset))
+            }),
+            None => [[0.0; 3]; 2],
+        };
         let texture = if skin.is_plain() { None } else { texture_of(skin.material) };
-        let factor = |own: f32| (own * 256.0 * RAISED) as u16;
-        let [red, green, blue] = face.colour.map(|channel| factor(f32::from(channel)));
-        let factors = [red, green, blue, 0, red, green, blue, 0];
-        let neutral = [(NEUTRAL * 256.0) as u16; 8];
-        let plain =
-            Self { factor: factors, plain: coloured(&neutral, &factors), ..Self::default() };
-        let (Some(texture), Some((plane, facing))) = (texture, lens.nearness_plane(face)) else {
-            return plain;
+        let [red, green, blue] = face.colour.map(f32::from);
+        let Some(texture) = texture else {
+            let scale = |own: f32| EXPOSURE * FINE * (BLACK + own * RAISED);
+            let scale = [scale(red), scale(green), scale(blue), 0.0];
+            return Self { places, scale, most: f32::from(MOST), ..Self::default() };
         };
         let coordinates = std::array::from_fn(|i| {
             let (along, origin) = (skin.axes[i].map(f64::from), f64::from(skin.origin[i]));
@@ -56,38 +79,35 @@ impl Surface {
         });
         let per_m2 = skin.axes.map(|axis| axis.iter().map(|a| a * a).sum::<f32>());
         let texels = texture.size() as f32 * pixel;
-        let factor = if skin.material.kind.is_picture() { [factor(NEUTRAL); 8] } else { factors };
+        let own = if skin.material.kind.is_picture() { [NEUTRAL; 3] } else { [red, green, blue] };
         Self {
             texture: Some(texture),
             coordinates,
             detail: per_m2[0].max(per_m2[1]) * texels * texels,
             slant: (AVERAGED * AVERAGED / (facing * facing + 1e-9)) as f32,
-            factor,
-            plain: plain.plain,
+            factor: own.map(|own| (own * 256.0 * RAISED) as u16),
+            places,
+            scale: [EXPOSURE * ROOT; 4],
+            most: f32::from(u16::MAX),
         }
     }
 
-    /// Return the colours of a run of pixels of a surface without a texture, [`FINE`] times.
-    #[inline(always)]
-    pub fn plain(&self) -> Option<Wide> {
-        self.texture.is_none().then(|| wide(|_| self.plain))
-    }
-
-    /// Return the colours of a run of pixels that starts at `[column, row]`, [`FINE`] times.
+    /// Return the texture's colours, by channel, of a block of pixels that starts at
+    /// `[column, row]`: 256 times factors of [`NEUTRAL`].
     ///
     /// # Arguments
     /// * `scale` - depths; 1 in orthographic views.
     /// * `middle`, `length2` - the scale in the middle of the pixels that show the face, and the
     ///   result of [`Rays::length2`](crate::sensors::raster::lens::Rays::length2) there.
     #[inline(always)]
-    pub fn colours(
+    pub fn sample(
         &self,
+        texture: &Texture,
         [column, row]: [usize; 2],
         scale: &[f32; LANES],
         middle: f32,
         length2: f32,
-    ) -> Wide {
-        let Some(texture) = self.texture else { return wide(|_| self.plain) };
+    ) -> [[u16; LANES]; 3] {
         let (first, row) = (column as f32 + 0.5, row as f32 + 0.5);
         let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
         let [[du, u_down, u_at], [dv, v_down, v_at]] = self.coordinates;
@@ -99,38 +119,21 @@ impl Surface {
         }
         let middle2 = middle * middle;
         let width2 = self.detail * middle2 * (self.slant * middle2 * length2).max(1.0);
-        let sums = texture.sample(&u, &v, width2);
-        wide(|pair| coloured(&sums.as_chunks().0[pair], &self.factor))
+        texture.sample(&u, &v, width2)
     }
-}
 
-/// Return the colours of a surface with 256 times these factors of its own colour.
-#[inline(always)]
-fn coloured(sums: &Pair, factor: &Pair) -> Pair {
-    const MOST: u16 = (255.0 * RAISED * FINE) as u16;
-    const LEAST: u16 = (BLACK * FINE) as u16;
-    products(sums, factor).map(|colour| colour.min(MOST) + LEAST)
-}
-
-/// Make a block of its pairs of pixels.
-///
-/// Compilers turn steps over pairs into one instruction each. Loops over whole blocks in which
-/// channels or pixels repeat they leave as they are, which takes three times as long.
-#[inline(always)]
-pub(super) fn wide(pair: impl Fn(usize) -> Pair) -> Wide {
-    let mut block = [0; 4 * LANES];
-    for (index, channels) in block.as_chunks_mut().0.iter_mut().enumerate() {
-        *channels = pair(index);
+    /// Turn the root of the light on pixels into brightness.
+    ///
+    /// # Arguments
+    /// * `sums` - the results of [`Self::sample`] for a channel.
+    #[inline(always)]
+    pub fn colour(&self, channel: usize, sums: &[u16], bright: &mut [u16]) {
+        const WHITE: u16 = (255.0 * RAISED * FINE) as u16;
+        const LEAST: u16 = (BLACK * FINE) as u16;
+        let factor = self.factor[channel];
+        for (bright, sum) in bright.iter_mut().zip(sums) {
+            let own = product(*sum, factor).min(WHITE) + LEAST;
+            *bright = product(2 * own, *bright).min(MOST / 4) * 4;
+        }
     }
-    block
-}
-
-/// Return the products over 2^16.
-#[inline(always)]
-pub(super) fn products(a: &Pair, b: &Pair) -> Pair {
-    let mut products = [0; 8];
-    for (i, product) in products.iter_mut().enumerate() {
-        *product = ((u32::from(a[i]) * u32::from(b[i])) >> 16) as u16;
-    }
-    products
 }
