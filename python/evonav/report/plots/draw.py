@@ -34,6 +34,10 @@ SMALL, LARGE = 8, 10
 MAX_NAME, MAX_TICKS, MAX_LETTERS = 22, 12, 44
 REFERENCE_LABEL = "the paper"
 CELL_IN, ROW_IN = 0.46, 0.23
+_COUNTS = (0, 1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
+"""Ticks of an axis of counts, which is logarithmic from 1 on."""
+_NAME_HEIGHT = 0.062
+"""Distance of two names beside dots, as a share of the axes' height."""
 
 
 def size_in(plot: Plot) -> tuple[float, float]:
@@ -83,7 +87,9 @@ def draw(panel: "SubFigure", plot: Plot) -> None:
         handles, names = [handles[i] for i in order], [names[i] for i in order]
     if len(names) > 1 or isinstance(plot, GroupPlot):
         # What a square plot compares has long names: a row each.
-        columns = 1 if isinstance(plot, CurvePlot) and plot.is_square else max(1, len(names))
+        is_square = isinstance(plot, CurvePlot) and plot.is_square
+        longest_in = max(LETTER_IN * len(name) + 0.5 for name in (*names, ""))
+        columns = 1 if is_square else max(1, min(len(names), int(width_in / longest_in)))
         panel.legend(handles, names, loc="outside lower left", ncols=columns, fontsize=SMALL, columnspacing=1.2)
 
 
@@ -179,7 +185,8 @@ def _draw_curves(axes: "Axes", plot: CurvePlot) -> None:
     if plot.has_diagonal:
         axes.plot((low, high), (low, high), color=SOFT, linewidth=0.8, linestyle=(0, (4, 4)))
     for k, line in enumerate(plot.lines):
-        shift = 0.0 if plot.is_square else (high - low) * _shift(k, len(plot.lines), 0.01 * len(plot.lines))
+        # Intervals of lines with the same places would lie on each other.
+        shift = (high - low) * _shift(k, len(plot.lines), 0.01 * len(plot.lines)) if line.intervals else 0.0
         _draw_line(axes, line, COLOURS[k % len(COLOURS)], shift, is_dashed=k >= len(COLOURS))
     if plot.x_names:
         axes.set_xticks(range(len(plot.x_names)), list(map(clean, plot.x_names)))
@@ -208,7 +215,7 @@ def _draw_line(axes: "Axes", line: Line, colour: str, shift: float, *, is_dashed
 
 def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
     ends = [dot.y if dot.y_interval is None else dot.y_interval[1] for dot in plot.dots if dot.y is not None]
-    top = 1.15 * max([1.0, *(end for end in ends if end is not None and math.isfinite(end))])
+    top = 1.5 * max([1.0, *(end for end in ends if end is not None and math.isfinite(end))])
     largest = max([0.0, *(dot.size or 0.0 for dot in plot.dots)])
     axes.set_xscale("log")
     axes.margins(x=0.15)
@@ -216,7 +223,7 @@ def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
         axis(lambda value, _: f"{value:g}")
     for k, dot in enumerate(sorted(plot.dots, key=lambda dot: -(dot.size or 0.0))):
         colour, y = COLOURS[k % len(COLOURS)], top if dot.y is None else dot.y
-        area = 20 + (600 * (dot.size or 0.0) / largest if largest else 0.0)
+        area = 20 + (200 * (dot.size or 0.0) / largest if largest else 0.0)
         if dot.x_interval is not None:
             axes.plot(dot.x_interval, (y, y), color=colour, alpha=0.5)
         if dot.y is not None and dot.y_interval is not None:
@@ -226,9 +233,10 @@ def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
         text = f"{dot.name}: {_short_number(dot.x)}, {reached}{', ' if dot.size_text else ''}{dot.size_text}"
         look: dict[str, Any] = {"facecolors": "none" if dot.y is None else colour, "edgecolors": colour, "alpha": 0.75}
         axes.scatter([dot.x], [y], s=area, clip_on=False, gid=TOOLTIP + clean(text), **look)
-    places = [(dot.x, top if dot.y is None else dot.y, dot.name) for dot in plot.dots]
-    _name_dots(axes, places, top, gap_pt=4 + 14 * (largest > 0))
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_yticks([tick for tick in _COUNTS if tick <= top], [f"{tick:g}" for tick in _COUNTS if tick <= top])
     axes.set_ylim(bottom=0, top=top)
+    _name_dots(axes, [(dot.x, top if dot.y is None else dot.y, dot.name) for dot in plot.dots])
     axes.grid(axis="y")
     axes.set_xlabel(clean(plot.x_label))
     axes.set_ylabel(clean(plot.y_label))
@@ -237,16 +245,26 @@ def _draw_dots(axes: "Axes", plot: ScatterPlot) -> None:
         axes.annotate(clean(f"open: {plot.beyond}"), (0.0, 1.06), **look)
 
 
-def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]], top: float, gap_pt: float) -> None:
-    """Write names right of dots, each below the one before where they would lie on each other."""
-    taken: list[tuple[float, float]] = []
-    for x, y, name in sorted(places, key=lambda place: -place[1]):
-        height = y
-        while any(abs(math.log10(x / other_x)) < 0.35 and abs(height - other) < 0.05 * top for other_x, other in taken):
-            height -= 0.05 * top
-        taken.append((x, height))
-        place: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": SMALL, "color": INK}
-        axes.annotate(clean(name), (x, height), xytext=(gap_pt, 0), **place)
+def _name_dots(axes: "Axes", places: Sequence[tuple[float, float, str]]) -> None:
+    """Write the names in a column right of the axes, by height, each with a line from its dot."""
+    ordered = sorted(places, key=lambda place: (-place[1], -place[0]))
+    to_axes = axes.transData + axes.transAxes.inverted()
+    heights = [float(to_axes.transform((x, y))[1]) for x, y, _ in ordered]
+    for order, is_below in ((range(1, len(heights)), True), (range(len(heights) - 2, -1, -1), False)):
+        for i in order:  # from the top down, and then, what was pushed below the axes, up again
+            limit = heights[i - 1] - _NAME_HEIGHT if is_below else max(heights[i + 1], 0.0) + _NAME_HEIGHT
+            heights[i] = min(heights[i], limit) if is_below else max(heights[i], limit)
+    for (x, y, name), height in zip(ordered, heights, strict=True):
+        axes.annotate(
+            clean(name),
+            (x, y),
+            xytext=(1.04, max(height, 0.0)),
+            textcoords="axes fraction",
+            va="center",
+            fontsize=SMALL,
+            color=INK,
+            arrowprops={"arrowstyle": "-", "color": SOFT, "linewidth": 0.5, "shrinkA": 2, "shrinkB": 0},
+        )
 
 
 def _draw_confusions(axes: "Axes", plot: ConfusionPlot) -> None:

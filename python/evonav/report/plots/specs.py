@@ -160,7 +160,7 @@ class Dot:
 
 @dataclass(frozen=True, slots=True)
 class ScatterPlot:
-    """Dots by two numbers, with their names beside them; x is logarithmic."""
+    """Dots by two numbers, with their names in a column; x is logarithmic, and y from 1 on."""
 
     title: str
     dots: tuple[Dot, ...]
