@@ -255,7 +255,7 @@ def test_a_row_that_is_no_record_is_an_error_that_names_the_run(write_run: Write
 
 def test_places_off_the_planet_do_not_stop_a_report(tmp_path: Path) -> None:
     record = stage_record("fu", "t", 1, EndState.FAILURE)
-    target = record.target.model_copy(update={"position_m": (1e308, 0.0, -1e308)})
+    target = record.target.model_copy(update={"position_m": (1e9, 0.0, -1e9)})
     run_dir = record_run(tmp_path, [record.model_copy(update={"target": target})], {"t": 1}, ["fu"])
     Page(write_report(run_dir))
 
