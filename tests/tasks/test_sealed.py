@@ -120,7 +120,7 @@ def test_another_key_opens_nothing(sealed: Path, tmp_path: Path) -> None:
     (copy / INDEX_NAME).write_text(json.dumps(index))
     with pytest.raises(TaskError, match="cannot be opened"):
         unseal(copy, other, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+    assert not list((tmp_path / "out").glob("*/*"))
 
 
 def test_a_changed_file_is_named(sealed: Path, key: Path, tmp_path: Path) -> None:

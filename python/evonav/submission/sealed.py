@@ -95,7 +95,7 @@ def seal(tasks: Sequence[TaskFile], public_key: Path, out: Path) -> SealedSet:
             name = f"{secrets.token_hex(8)}{SUFFIX}"
             write_atomically(out / name, data)
             files[name] = sha256_of(data)
-    # By name, which is random: the order of the tasks is no matter of the index.
+    # By name, which is random: the index does not tell the order of the tasks.
     index = SealedSet(key.hex(), len(tasks), sum(task.num_stages for task in tasks), dict(sorted(files.items())))
     content = {"format": FORMAT, "version": VERSION, "evonav": __version__}
     content |= {name: getattr(index, name) for name in ("public_key", "num_tasks", "num_stages", "files")}
@@ -122,6 +122,8 @@ def unseal(folder: Path, private_key: Path, out: Path) -> None:
     if bytes(private.public_key).hex() != index.public_key:
         raise TaskError(f"{folder}: is sealed for another key than {private_key}: {index.public_key[:16]}...")
     box = nacl.public.SealedBox(private)
+    # First, so that even a part of a set is known as sealed.
+    write_atomically(out / UNSEALED_NAME, json.dumps({"public_key": index.public_key}) + "\n")
     for name, digest in index.files.items():
         path = folder / name
         try:
@@ -133,7 +135,6 @@ def unseal(folder: Path, private_key: Path, out: Path) -> None:
             raise TaskError(f"{path}: cannot be read: {error.strerror or error}") from error
         except (nacl.exceptions.CryptoError, zipfile.BadZipFile) as error:
             raise TaskError(f"{path}: cannot be opened: {error}") from error
-    write_atomically(out / UNSEALED_NAME, json.dumps({"public_key": index.public_key}) + "\n")
 
 
 def is_sealed(folder: Path) -> bool:
