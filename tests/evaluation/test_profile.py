@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import StoreError
 from evonav.evaluation.records.store import RunStore
+from evonav.parallel import profiling
+from evonav.parallel.local import EndedError
 from evonav.parallel.profiling import IS_SUPPORTED, VARIABLE, Samples, read_samples, rename, sampled
 
 pytestmark = pytest.mark.skipif(not IS_SUPPORTED, reason="needs interval timers")
@@ -113,3 +115,19 @@ def test_a_run_that_cannot_be_sampled_says_why(tmp_path: Path, options: tuple[st
     done = CliRunner().invoke(app, words, env={"COLUMNS": "200"})
     assert done.exit_code == 2
     assert message in done.output
+
+
+def test_a_signal_to_end_does_not_cost_the_samples(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A driver closes a worker's connection, and ends it at once by a signal."""
+    written = profiling.write_atomically
+    is_first = iter([True])
+
+    def interrupted(path: Path, text: str) -> Path:
+        if next(is_first, False):
+            raise EndedError(143)
+        return written(path, text)
+
+    monkeypatch.setattr(profiling, "write_atomically", interrupted)
+    with pytest.raises(EndedError), sampled("a"):
+        spin(0.05)
+    assert only(folder).total_s > 0.0

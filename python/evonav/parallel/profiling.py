@@ -104,6 +104,13 @@ class _Sampler:
 
     def stop(self) -> None:
         """Write the samples."""
+        try:
+            self._stop()
+        except SystemExit:  # the parent's signal came in the middle of it
+            self._stop()
+            raise
+
+    def _stop(self) -> None:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, self._before)
         self._write()
