@@ -89,6 +89,12 @@ def rename(name: str) -> None:
         _own.name = name
 
 
+def save() -> None:
+    """Write the samples of this process so far, if it is sampled."""
+    if _own is not None:
+        _own.save()
+
+
 class _Sampler:
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name
@@ -113,7 +119,7 @@ class _Sampler:
     def _stop(self) -> None:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, self._before)
-        self._write()
+        self.save()
 
     def _take(self, _: int, frame: FrameType | None) -> None:
         codes = []
@@ -124,14 +130,17 @@ class _Sampler:
         self._cpu_s[tuple(reversed(codes))] += now_s - self._last_s
         self._last_s = now_s
         if time.monotonic() - self._written_s >= WRITE_EVERY_S:
-            self._write()
-            self._written_s, self._last_s = time.monotonic(), time.process_time()
+            self._written_s = time.monotonic()  # first: while samples are written, others come
+            self.save()
+            self._last_s = time.process_time()
 
-    def _write(self) -> None:
+    def save(self) -> None:
+        """Write the samples so far."""
+        self._written_s = time.monotonic()
         frames: dict[CodeType, int] = {}
         stacks = [
             {"frames": [frames.setdefault(code, len(frames)) for code in stack], "cpu_s": seconds}
-            for stack, seconds in self._cpu_s.items()
+            for stack, seconds in list(self._cpu_s.items())  # which a signal may add to
         ]
         functions = [[_name_of(code), code.co_filename, code.co_firstlineno] for code in frames]
         content = {"name": self.name, "functions": functions, "stacks": stacks}

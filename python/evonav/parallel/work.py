@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 
 from evonav.component import import_callable
-from evonav.parallel.profiling import sampled
+from evonav.parallel import profiling
 
 Work = Callable[[str], str | Generator[str, None, str]]
 """Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
@@ -78,9 +78,11 @@ def serve(work_name: str, settings: str, jobs: Iterator[str], send: Callable[[st
         return
     try:
         send("ready", "")
-        with sampled("workers"):
+        with profiling.sampled("workers"):
             for text in jobs:
                 for kind, message in steps(work, text):
+                    if kind != "progress":
+                        profiling.save()  # after its last job, a worker is ended at once
                     send(kind, message)
     finally:
         try:
