@@ -130,13 +130,12 @@ class _Sampler:
         self._cpu_s[tuple(reversed(codes))] += now_s - self._last_s
         self._last_s = now_s
         if time.monotonic() - self._written_s >= WRITE_EVERY_S:
-            self._written_s = time.monotonic()  # first: while samples are written, others come
             self.save()
             self._last_s = time.process_time()
 
     def save(self) -> None:
         """Write the samples so far."""
-        self._written_s = time.monotonic()
+        self._written_s = time.monotonic()  # first: while samples are written, others come
         frames: dict[CodeType, int] = {}
         stacks = [
             {"frames": [frames.setdefault(code, len(frames)) for code in stack], "cpu_s": seconds}
