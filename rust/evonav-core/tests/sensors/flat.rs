@@ -1,8 +1,6 @@
 //! Colours of the styles `plain` and `outlined` against a picture that is computed pixel by pixel.
 
 use evonav_core::{
-    assets::part::{Part, Primitive},
-    geometry::{Vec3, euler_rotation_deg, sub},
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Style, Want, render_view},
@@ -12,8 +10,8 @@ use evonav_core::{
 use proptest::{collection::vec, prelude::*, test_runner::Config};
 
 use crate::{
-    raster::{intersect, look_through, scene_of},
-    scenes::{cross, dot},
+    scenes::dot,
+    tracer::{cuboid_ahead, first_met, look_through, scene_of},
 };
 
 /// A view's nearness, which is straight on planes: what bends are measured in.
@@ -70,18 +68,10 @@ impl Bent<'_> {
 
 /// The colour of the first surface along a look, before corners are dark.
 fn colour(triangles: &[Triangle], view: &View, pixel: [i64; 2]) -> [f64; 3] {
-    let (origin_m, ray) = look_through(view, pixel.map(|at| at as f64 + 0.5));
-    let hits = triangles.iter().filter_map(|triangle| {
-        let (distance, inside) = intersect(triangle, origin_m, ray)?;
-        let is_met = inside >= 0.0 && (view.clip_m[0]..view.clip_m[1]).contains(&distance);
-        is_met.then_some((distance, triangle))
-    });
-    let Some((_, triangle)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+    let Some((triangle, normal)) = first_met(triangles, view, pixel) else {
         return [204.0, 222.0, 236.0];
     };
-    let [a, b, c] = triangle.vertices_m;
-    let normal: Vec3 = cross(sub(b, a), sub(c, a));
-    let normal = normal.map(|x| x / dot(normal, normal).sqrt());
+    let (_, ray) = look_through(view, pixel.map(|at| at as f64 + 0.5));
     let facing = -dot(normal, ray) / dot(ray, ray).sqrt();
     let light = 0.80 + 0.11 * (1.0 + normal[1]) + 0.09 * dot(normal, [0.64, 0.0, 0.77]);
     triangle.colour.map(|own| {
@@ -90,27 +80,12 @@ fn colour(triangles: &[Triangle], view: &View, pixel: [i64; 2]) -> [f64; 3] {
     })
 }
 
-fn part() -> impl Strategy<Value = Part> {
-    let half_m = [0.1..0.8_f64, 0.1..0.8_f64, 0.1..0.8_f64];
-    let place = [-1.5..1.5_f64, -1.0..1.5_f64, 1.5..4.0_f64];
-    let angles = [0.0..360.0_f64, 0.0..360.0_f64, 0.0..360.0_f64];
-    (half_m, place, angles, any::<[u8; 3]>()).prop_map(|(half_m, centre_m, angles_deg, colour)| {
-        Part {
-            primitive: Primitive::Cuboid { half_m },
-            centre_m,
-            rotation: euler_rotation_deg(angles_deg),
-            colour,
-            material: Default::default(),
-        }
-    })
-}
-
 proptest! {
     #![proptest_config(Config { cases: 100, ..Config::default() })]
 
     #[test]
     fn flat_pictures_agree_with_pixels_that_are_lit_one_by_one(
-        parts in vec(part(), 1..7),
+        parts in vec(cuboid_ahead(), 1..7),
         width_px in 3..60_usize,
         height_px in 3..45_usize,
         vertical_fov_rad in 0.8..1.6_f64,

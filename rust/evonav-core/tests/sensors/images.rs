@@ -10,7 +10,7 @@ use evonav_core::{
     world::{mesh::SceneMesh, scene::BodyKind},
 };
 
-use crate::raster::scene_of;
+use crate::tracer::scene_of;
 
 fn red_cuboid(half_m: Vec3, centre_m: Vec3) -> Part {
     Part {

@@ -2,8 +2,6 @@
 //! light, dark corners and smooth edges.
 
 use evonav_core::{
-    assets::part::{Part, Primitive},
-    geometry::{Vec3, euler_rotation_deg, sub},
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Style, Want, render},
@@ -12,10 +10,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*, test_runner::Config};
 
-use crate::{
-    raster::{intersect, look_through, scene_of},
-    scenes::{cross, dot},
-};
+use crate::tracer::{cuboid_ahead, first_met, look_through, scene_of};
 
 /// A face: its body and its normal in steps of 0.0001. `None`: nothing is there.
 type Face = Option<(u32, [i32; 3])>;
@@ -129,33 +124,9 @@ fn lit(colour: [u8; 3], open: f64) -> [f64; 3] {
 }
 
 /// The first face along the look through a pixel.
-fn face_at(triangles: &[Triangle], view: &View, [column, row]: [i64; 2]) -> Face {
-    let (origin_m, ray) = look_through(view, [column as f64 + 0.5, row as f64 + 0.5]);
-    let hits = triangles.iter().filter_map(|triangle| {
-        let (distance, inside) = intersect(triangle, origin_m, ray)?;
-        let is_met = inside >= 0.0 && (CLIP_M[0]..CLIP_M[1]).contains(&distance);
-        is_met.then_some((distance, triangle))
-    });
-    let (_, triangle) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let [a, b, c] = triangle.vertices_m;
-    let normal: Vec3 = cross(sub(b, a), sub(c, a));
-    let length = dot(normal, normal).sqrt();
-    Some((triangle.body, normal.map(|x| (1e4 * x / length).round() as i32)))
-}
-
-fn part() -> impl Strategy<Value = Part> {
-    let half_m = [0.1..0.8_f64, 0.1..0.8_f64, 0.1..0.8_f64];
-    let place = [-1.5..1.5_f64, -1.0..1.5_f64, 1.5..4.0_f64];
-    let angles = [0.0..360.0_f64, 0.0..360.0_f64, 0.0..360.0_f64];
-    (half_m, place, angles, any::<[u8; 3]>()).prop_map(|(half_m, centre_m, angles_deg, colour)| {
-        Part {
-            primitive: Primitive::Cuboid { half_m },
-            centre_m,
-            rotation: euler_rotation_deg(angles_deg),
-            colour,
-            material: Default::default(),
-        }
-    })
+fn face_at(triangles: &[Triangle], view: &View, pixel: [i64; 2]) -> Face {
+    let (triangle, normal) = first_met(triangles, view, pixel)?;
+    Some((triangle.body, normal.map(|x| (1e4 * x).round() as i32)))
 }
 
 proptest! {
@@ -163,7 +134,7 @@ proptest! {
 
     #[test]
     fn pictures_agree_with_pixels_that_are_lit_and_blended_one_by_one(
-        parts in vec(part(), 1..7),
+        parts in vec(cuboid_ahead(), 1..7),
         width_px in 3..60_usize,
         height_px in 3..45_usize,
         vertical_fov_rad in 0.8..1.6_f64,

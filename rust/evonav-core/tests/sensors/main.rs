@@ -12,5 +12,6 @@ mod png;
 mod raster;
 mod shading;
 mod textures;
+mod tracer;
 mod visible_bodies;
 mod visible_px;

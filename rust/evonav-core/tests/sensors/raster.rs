@@ -10,37 +10,14 @@ use evonav_core::{
         ray_caster::RayCaster,
         visible_bodies::{visibility_points, visible_bodies},
     },
-    world::{
-        mesh::{SceneMesh, Triangle},
-        scene::Scene,
-    },
+    world::mesh::{SceneMesh, Triangle},
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::scenes::{self, cross, dot};
-
-/// A scene with a body for each part.
-pub fn scene_of(parts: &[Part]) -> Scene {
-    scenes::scene_of(&parts.iter().map(|part| vec![*part]).collect::<Vec<_>>())
-}
-
-/// Moeller & Trumbore 1997, front side only. Returns the distance and how deep inside the
-/// triangle the ray passes (smallest barycentric coordinate).
-pub fn intersect(triangle: &Triangle, origin_m: Vec3, direction: Vec3) -> Option<(f64, f64)> {
-    let [a, b, c] = triangle.vertices_m;
-    let (ab, ac, to_origin) = (sub(b, a), sub(c, a), sub(origin_m, a));
-    let normal = cross(ab, ac);
-    let facing = dot(normal, direction);
-    if facing >= 0.0 {
-        return None;
-    }
-    let distance = -dot(normal, to_origin) / facing;
-    let turn = cross(direction, to_origin);
-    let beta = dot(ac, turn) / facing;
-    let gamma = -dot(ab, turn) / facing;
-    let depth_inside = beta.min(gamma).min(1.0 - beta - gamma);
-    Some((distance, depth_inside))
-}
+use crate::{
+    scenes::{cross, dot},
+    tracer::{intersect, look_through, scene_of},
+};
 
 /// Nearest front face along a ray from `least` on: `(distance, body)`. Triangles grown (or, negative, shrunk) by
 /// `margin` of their size.
@@ -119,23 +96,6 @@ fn view() -> impl Strategy<Value = View> {
             half_height_m,
         })
     })
-}
-
-/// Origin and direction of the look through a pixel: lengths along it are planar depths.
-pub fn look_through(view: &View, image_px: [f64; 2]) -> (Vec3, Vec3) {
-    let Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad } =
-        view.camera;
-    let half_m = view.half_height_m.unwrap_or((vertical_fov_rad / 2.0).tan());
-    let metres =
-        |px: f64, size_px: usize| (px - size_px as f64 / 2.0) * half_m / (height_px as f64 / 2.0);
-    let (right, up) = (metres(image_px[0], width_px), -metres(image_px[1], height_px));
-    // Unity's rotation takes the camera's own right, up and forward to the world.
-    let angles_deg = [horizon_rad, yaw_rad, view.roll_rad].map(f64::to_degrees);
-    let to_world = |v: Vec3| rotate(&euler_rotation_deg(angles_deg), v);
-    match view.half_height_m {
-        Some(_) => (add(position_m, to_world([right, up, 0.0])), to_world([0.0, 0.0, 1.0])),
-        None => (position_m, to_world([right, up, 1.0])),
-    }
 }
 
 proptest! {

@@ -15,7 +15,7 @@ use evonav_core::{
 };
 use proptest::{prelude::*, test_runner::Config};
 
-use crate::{raster::look_through, scenes::scene_of};
+use crate::{scenes::scene_of, tracer::look_through};
 
 fn textures() -> impl Iterator<Item = (MaterialKind, &'static Texture)> {
     let variants = |&kind: &MaterialKind| {
