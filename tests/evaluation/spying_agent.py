@@ -17,6 +17,7 @@ from evonav.world.simulator import Action
 PROJECT = Path(__file__).parent
 LIBC = ctypes.CDLL(None, use_errno=True)
 CANARY = "canary-of-the-evaluator"
+THE_USERS_HOME = "filled in by the test, as HOME is another folder in a sandbox"
 
 
 def readable(root):
@@ -95,7 +96,7 @@ def package_data():
 ATTEMPTS = {
     "files beside": lambda: readable(PROJECT),
     "package": package_data,
-    "home": lambda: [*readable("/root/.ssh"), os.environ["HOME"]],
+    "home": lambda: [*readable(Path(THE_USERS_HOME) / ".ssh"), os.environ["HOME"]],
     "passwords": lambda: Path("/etc/passwd").read_text(),
     "parent": others_processes,
     "own environment": lambda: Path("/proc/self/environ").read_text(),

@@ -4,12 +4,8 @@ import hashlib
 import json
 import os
 import shutil
-import signal
-import subprocess
 import sys
-import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -240,52 +236,6 @@ def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_wo
     assert all(r.state is EndState.NOT_RUN for (task, k), r in states.items() if task == both[0].task_id and k > 1)
     assert all(r.is_scored for (task, _), r in states.items() if task == both[1].task_id)
     assert "cannot be read" in write_report(tmp_path / "run").read_text()
-
-
-ENDED = """
-import sys
-from pathlib import Path
-from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
-from evonav.tasks.listing import task_files
-from evonav.component import Component
-from evonav.evaluation.run.components import Backend
-
-if __name__ == "__main__":
-    root = Path(sys.argv[1])
-    backend = Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator"))
-    config = RunConfig(backend=backend)
-    evaluate(["unruly_agents:Announcing"], task_files(Path(sys.argv[2])), root / "run", config=config, num_workers=1)
-"""
-
-
-@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
-def test_nothing_of_an_agent_outlives_the_run(tasks, tmp_path, kill):
-    script, pids = tmp_path / "script.py", tmp_path / "pids"
-    script.write_text(ENDED)
-    child = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path), str(tasks[0].path.parent)],
-        stderr=subprocess.DEVNULL,
-        env={"PYTHONPATH": os.pathsep.join(sys.path), "PATH": "", "TOY_PIDS": str(pids)},
-    )
-    while not pids.exists():
-        assert child.poll() is None
-        time.sleep(0.05)
-    alive = [int(pid) for pid in pids.read_text().split()]
-    child.send_signal(kill)
-    child.wait(timeout=30)
-    until_s = time.monotonic() + 20.0
-    while alive and time.monotonic() < until_s:
-        alive = [pid for pid in alive if is_running(pid)]
-        time.sleep(0.05)
-    assert not alive
-
-
-def is_running(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def view(rng, side_px, *, features=None, rgb=True):

@@ -1,14 +1,13 @@
 """An agent in a sandbox reads no file of the run or the tasks, reaches nobody, and leaves nothing behind."""
 
 import os
-import shutil
-import time
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from short_tasks import short_tasks
-from test_agent_process import is_running
+from test_agent_end import have_ended
 from test_engine import TOY, records, texts
 from toy_house import write_tasks
 
@@ -36,7 +35,9 @@ def spied(folder, monkeypatch, *, is_sandboxed):
     """Evaluate the spy from a folder that holds its file, notes, the tasks and the run, and return what it reached."""
     project = folder / "project"
     project.mkdir()
-    shutil.copy(Path(__file__).with_name("spying_agent.py"), project / f"spy_{is_sandboxed}.py")
+    text = Path(__file__).with_name("spying_agent.py").read_text()
+    filled = re.sub(r"(?m)^THE_USERS_HOME = .*$", lambda _: f"THE_USERS_HOME = {str(Path.home())!r}", text)
+    (project / f"spy_{is_sandboxed}.py").write_text(filled)
     (project / "notes.txt").write_text("the agent's own")
     write_tasks(project / "tasks")
     (project / "shortcut").symlink_to(project / "tasks")
@@ -73,10 +74,7 @@ def test_a_spy_in_a_sandbox_reaches_nothing(tmp_path, monkeypatch):
     assert found["open files"] == sandbox.MAX_OPEN_FILES
     assert not (project / "written").exists()
     assert not Path(found["home"][-1]).exists()
-    until_s = time.monotonic() + 10.0
-    while is_running(found["left child"]) and time.monotonic() < until_s:
-        time.sleep(0.05)
-    assert not is_running(found["left child"])
+    assert have_ended([found["left child"]])
 
 
 def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -117,14 +117,23 @@ class AgentProcess:
         self.cpu_s = 0.0
         """CPU time that the process reports."""
         self._hosting = hosting
+        self._ends = ExitStack()
         self._block = SharedBlock()
+        self._ends.callback(self._block.close)
         self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
+        if self._scratch is not None:
+            self._ends.callback(shutil.rmtree, self._scratch, ignore_errors=True)
         self.relay = ModelRelay() if hosting.is_sandboxed and hosting.relays_model else None
         """Asks the decision model for a process in a sandbox."""
+        if self.relay is not None:
+            self._ends.callback(self.relay.close)
         self._connection, far_end = socket.socketpair()
-        life, self._life = os.pipe()
+        life, own_end = os.pipe()
         output = None if hosting.log is None else OutputLog(Path(hosting.log), name)
         self._log = output
+        if output is not None:
+            self._ends.callback(output.end)
+        self._ends.callback(os.close, own_end)
         try:
             arguments = (far_end.fileno(), life, self._block.descriptor)
             inherited = arguments if self.relay is None else (*arguments, self.relay.far_descriptor)
@@ -149,13 +158,15 @@ class AgentProcess:
             if output is not None:
                 output.begin()
         self._watch = os.pidfd_open(self._process.pid) if hasattr(os, "pidfd_open") else None
+        if self._watch is not None:
+            self._ends.callback(os.close, self._watch)
+        self._is_group_ended = False
         self._poll = select.poll()
         for descriptor in (self._connection.fileno(), self._watch):
             if descriptor is not None:
                 self._poll.register(descriptor, select.POLLIN)
         self._num_asked = 0
         self._is_waiting = False
-        self._is_closed = False
         try:
             if self._scratch is not None:
                 name = with_absolute_file(name)
@@ -174,7 +185,7 @@ class AgentProcess:
     def is_usable(self) -> bool:
         """True if the process is alive and waits for a request."""
         is_relaying = self.relay is None or self.relay.is_open
-        return is_relaying and not self._is_closed and not self._is_waiting and self._process.poll() is None
+        return is_relaying and not self._is_waiting and self._process.poll() is None
 
     @property
     def memory_mb(self) -> float | None:
@@ -261,14 +272,11 @@ class AgentProcess:
         return f"the {self.noun}'s process died ({how})"
 
     def close(self, *, is_at_once: bool = False) -> None:
-        """End the process and all that it has started; safe to call twice.
+        """End the process and all that it has started; safe to call twice, and after a call that was cut short.
 
         Args:
             is_at_once: Do not wait for the process to end by itself.
         """
-        if self._is_closed:
-            return
-        self._is_closed = True
         self._connection.close()
         try:
             if not is_at_once and not self._is_waiting:
@@ -276,22 +284,16 @@ class AgentProcess:
                     self._process.wait(timeout=2.0)
         finally:  # also in a worker that is asked to end meanwhile
             self._end_group()
+            self._ends.close()
 
     def _end_group(self) -> None:
-        # Processes that it started may still run in its group.
+        """End the processes that it started, too; a signal may cut this short, and then it is called again."""
+        if self._is_group_ended:
+            return
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        os.close(self._life)
-        if self._watch is not None:
-            os.close(self._watch)
-        self._block.close()
-        if self.relay is not None:
-            self.relay.close()
-        if self._scratch is not None:
-            shutil.rmtree(self._scratch, ignore_errors=True)
-        if self._log is not None:
-            self._log.end()
+        self._is_group_ended = True
 
 
 class AgentProcesses:
