@@ -12,7 +12,7 @@ from evonav.errors import StoreError
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel import profiling
 from evonav.parallel.local import EndedError
-from evonav.parallel.profiling import IS_SUPPORTED, VARIABLE, Samples, read_samples, rename, sampled
+from evonav.parallel.profiling import IS_SUPPORTED, SINCE_LAST_SAMPLE, VARIABLE, Samples, read_samples, rename, sampled
 
 pytestmark = pytest.mark.skipif(not IS_SUPPORTED, reason="needs interval timers")
 
@@ -59,6 +59,13 @@ def test_waiting_counts_for_nothing(folder: Path) -> None:
     with sampled("waiting"):
         time.sleep(0.4)
     assert only(folder).total_s < 0.1
+
+
+def test_time_that_the_clock_missed_is_counted(folder: Path) -> None:
+    with sampled("short"):
+        spin(0.002)
+    own = {frame.name: seconds for frame, seconds in only(folder).own_s().items()}
+    assert 0.0015 < own[SINCE_LAST_SAMPLE] < 0.1
 
 
 def test_nothing_is_sampled_unasked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,11 @@ INTERVAL_S = 0.005
 """CPU time between two samples."""
 WRITE_EVERY_S = 5.0
 """Time between two writes of a process's samples, so that little is lost of a process that is killed."""
+SINCE_LAST_SAMPLE = "(since the last sample)"
+"""Name of the function that stands for a process's CPU time after its last sample, or for all of it if none came.
+
+The system's clock may miss every one of a process's short bursts of work.
+"""
 
 _own: "_Sampler | None" = None
 
@@ -142,6 +147,9 @@ class _Sampler:
             for stack, seconds in list(self._cpu_s.items())  # which a signal may add to
         ]
         functions = [[_name_of(code), code.co_filename, code.co_firstlineno] for code in frames]
+        if (rest_s := time.process_time() - self._last_s) > 0.0:
+            stacks.append({"frames": [len(functions)], "cpu_s": rest_s})
+            functions.append([SINCE_LAST_SAMPLE, "", 0])
         content = {"name": self.name, "functions": functions, "stacks": stacks}
         write_atomically(self._folder / f"{os.getpid()}.json", json.dumps(content))
 

@@ -103,6 +103,8 @@ def function_table(samples: Samples) -> Table:
 
 def _place(frame: Frame) -> str:
     """Return a function's file and line; the file from the folder of its package on."""
+    if not frame.file:
+        return NONE
     file = Path(frame.file)
     for folder in (
         Path(evonav.__file__).parent.parent,
