@@ -20,9 +20,9 @@ from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.submission.pack import pack
-from evonav.submission.sealed import INDEX_NAME, SUFFIX, new_key, opened, read_index, seal, unseal
+from evonav.submission.sealed import SUFFIX, new_key, opened, read_index, seal, unseal
 from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import KEY_VARIABLE, TaskFile, task_files
+from evonav.tasks.listing import KEY_VARIABLE, SEALED_NAME, TaskFile, task_files
 
 pytest.importorskip("nacl")
 
@@ -72,7 +72,7 @@ def test_nothing_tells_what_is_in_it(tasks: list[TaskFile], sealed: Path) -> Non
     files = contents(sealed)
     index = read_index(sealed)
     assert (index.num_tasks, index.num_stages) == (2, sum(task.num_stages for task in tasks))
-    assert files.keys() == {INDEX_NAME, *index.files}
+    assert files.keys() == {SEALED_NAME, *index.files}
     told = b"\0".join([*files.values(), *(name.encode() for name in files)])
     for task in tasks:
         for word in (task.task_id, task.digest):
@@ -104,9 +104,9 @@ def changed(sealed: Path, tmp_path: Path) -> tuple[Path, Path]:
 def resealed(copy: Path, part: Path, data: bytes) -> None:
     """Replaces a file and its checksum, as somebody could who has no key."""
     part.write_bytes(data)
-    index = json.loads((copy / INDEX_NAME).read_text())
+    index = json.loads((copy / SEALED_NAME).read_text())
     index["files"][part.name] = hashlib.sha256(data).hexdigest()
-    (copy / INDEX_NAME).write_text(json.dumps(index))
+    (copy / SEALED_NAME).write_text(json.dumps(index))
 
 
 def test_another_key_opens_nothing(sealed: Path, tmp_path: Path) -> None:
@@ -115,9 +115,9 @@ def test_another_key_opens_nothing(sealed: Path, tmp_path: Path) -> None:
     with pytest.raises(TaskError, match="is sealed for another key"):
         unseal(sealed, other, tmp_path / "out")
     copy, _ = changed(sealed, tmp_path)
-    index = json.loads((copy / INDEX_NAME).read_text())
+    index = json.loads((copy / SEALED_NAME).read_text())
     index["public_key"] = public(other).read_text().split()[-1]
-    (copy / INDEX_NAME).write_text(json.dumps(index))
+    (copy / SEALED_NAME).write_text(json.dumps(index))
     with pytest.raises(TaskError, match="cannot be opened"):
         unseal(copy, other, tmp_path / "out")
     assert not list((tmp_path / "out").glob("*/*"))
@@ -151,8 +151,8 @@ def test_a_wrong_index_is_refused(
     sealed: Path, key: Path, tmp_path: Path, change: dict[str, object], message: str
 ) -> None:
     copy, _ = changed(sealed, tmp_path)
-    index = json.loads((copy / INDEX_NAME).read_text())
-    (copy / INDEX_NAME).write_text(json.dumps({**index, **change}))
+    index = json.loads((copy / SEALED_NAME).read_text())
+    (copy / SEALED_NAME).write_text(json.dumps({**index, **change}))
     with pytest.raises(TaskError, match=message):
         unseal(copy, key, tmp_path / "out")
 
@@ -166,7 +166,7 @@ def test_a_member_cannot_lead_out_of_the_folder(key: Path, tmp_path: Path) -> No
     folder = tmp_path / "set"
     folder.mkdir()
     content = {"format": "evonav-sealed-tasks", "version": 1, "public_key": public(key).read_text().split()[-1]}
-    (folder / INDEX_NAME).write_text(
+    (folder / SEALED_NAME).write_text(
         json.dumps({**content, "num_tasks": 1, "num_stages": 1, "files": {"a.sealed": ""}})
     )
     resealed(folder, folder / "a.sealed", box.encrypt(data.getvalue()))

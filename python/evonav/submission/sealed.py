@@ -20,10 +20,10 @@ from evonav._core import __version__
 from evonav.component import optional_module
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.parallel.folders import write_atomically
-from evonav.tasks.listing import KEY_VARIABLE, UNSEALED_NAME, TaskFile, task_roots
+from evonav.tasks.listing import KEY_VARIABLE, SEALED_NAME, UNSEALED_NAME, TaskFile, task_roots
 from evonav.tasks.records import sha256_of
 
-INDEX_NAME, SUFFIX = "sealed.json", ".sealed"
+SUFFIX = ".sealed"
 FORMAT, VERSION = "evonav-sealed-tasks", 1
 _KEY_BYTES = 32
 _PRIVATE, _PUBLIC = "evonav private key", "evonav public key"
@@ -99,7 +99,7 @@ def seal(tasks: Sequence[TaskFile], public_key: Path, out: Path) -> SealedSet:
     index = SealedSet(key.hex(), len(tasks), sum(task.num_stages for task in tasks), dict(sorted(files.items())))
     content = {"format": FORMAT, "version": VERSION, "evonav": __version__}
     content |= {name: getattr(index, name) for name in ("public_key", "num_tasks", "num_stages", "files")}
-    write_atomically(out / INDEX_NAME, json.dumps(content, indent=2) + "\n")
+    write_atomically(out / SEALED_NAME, json.dumps(content, indent=2) + "\n")
     return index
 
 
@@ -137,11 +137,6 @@ def unseal(folder: Path, private_key: Path, out: Path) -> None:
             raise TaskError(f"{path}: cannot be opened: {error}") from error
 
 
-def is_sealed(folder: Path) -> bool:
-    """Return whether a folder is a sealed set."""
-    return (folder / INDEX_NAME).is_file()
-
-
 @contextmanager
 def opened(folder: Path) -> Iterator[Path]:
     """Lend the tasks of a sealed set in a folder that only this user can read, and that is deleted at the end.
@@ -164,7 +159,7 @@ def read_index(folder: Path) -> SealedSet:
     Raises:
         TaskError: It is missing or malformed.
     """
-    path = folder / INDEX_NAME
+    path = folder / SEALED_NAME
     try:
         content: dict[str, Any] = json.loads(path.read_bytes())
         if content["format"] != FORMAT or content["version"] != VERSION:

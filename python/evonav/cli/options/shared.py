@@ -218,10 +218,12 @@ def task_folder(folder: Path | None) -> "Iterator[Path]":
 
     A sealed set is opened for as long as it is lent.
     """
-    from evonav.submission.sealed import is_sealed, opened
     from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import is_sealed
 
     if folder is not None and is_sealed(folder):
+        from evonav.submission.sealed import opened  # needs a library that few have
+
         with opened(folder) as tasks:
             yield tasks
         return

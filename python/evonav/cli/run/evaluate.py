@@ -31,6 +31,7 @@ from evonav.cli.run.failures import print_failures
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
 
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.decision_resources import SpendingSettings
@@ -94,7 +95,6 @@ def evaluate(
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
-    from evonav.report.profile import profiling
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
@@ -125,8 +125,7 @@ def evaluate(
         if dry_run:
             print_estimate(spending, names, task_files, config, run.num_workers)
             return
-        sampling = profiling(out) if profile else nullcontext()
-        with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling:
+        with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
             (summaries,) = evaluate_all(
                 [RunRequest(tuple(names), tuple(task_files), out, config)],
                 workforce,
@@ -245,6 +244,15 @@ def check_profile(run: "RunSettings") -> None:
         raise typer.BadParameter("--profile samples workers on this machine only: use --engine local")
     if run.isolation == "sandbox":
         raise typer.BadParameter("--profile needs agents that can write their samples: use --isolation process")
+
+
+def sampling(out: Path, is_profiled: bool) -> "AbstractContextManager[None]":
+    """Return what samples the processes of a run that is profiled."""
+    if not is_profiled:
+        return nullcontext()
+    from evonav.report.profile import profiling  # builds tables: the command must start fast
+
+    return profiling(out)
 
 
 def print_profile(out: Path) -> None:
