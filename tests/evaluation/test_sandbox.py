@@ -176,7 +176,7 @@ def test_the_environment_is_a_list_of_what_is_allowed(tmp_path, monkeypatch):
     assert given["PATH"] == os.environ["PATH"]
 
 
-@pytest.mark.parametrize(("said", "isolation"), [("in_process = true", "none"), ("in_process = false", "process")])
+@pytest.mark.parametrize(("said", "isolation"), [("in_process = true", "none"), ("in_process = false", None)])
 def test_older_sweep_files_say_in_process(tmp_path, said, isolation):
     path = tmp_path / "sweep.toml"
     path.write_text(f'name = "old"\nagents = ["fu"]\ntasks = ["bundled:1"]\n{said}\n')

@@ -19,6 +19,7 @@ from typing import Literal
 from evonav.agents.hosting.sandbox import landlock_abi, why_not
 from evonav.cli.examples import DOCS
 from evonav.counted import counted
+from evonav.evaluation.hosting.isolation import usual_isolation
 from evonav.parallel.local import num_cores
 from evonav.perception.predicted import STACKS, StackConfig, StackName, weights_of
 from evonav.perception.weights import models_folder, places
@@ -241,7 +242,8 @@ def _extra(extra: str) -> Result:
 def _sandbox() -> Result:
     if reason := why_not():
         return "missing", f"--isolation sandbox: {reason}"
-    return "ok", f"--isolation sandbox: Landlock {landlock_abi()} and seccomp shut agents in"
+    usual = "" if usual_isolation() == "sandbox" else "; not the default where there is a GPU"
+    return "ok", f"--isolation sandbox: Landlock {landlock_abi()} and seccomp shut agents in{usual}"
 
 
 def _gpu() -> Result:

@@ -101,7 +101,7 @@ def evaluate(
     if houses is None and (assets is not None or start != "file"):
         raise typer.BadParameter("--assets and --start belong to --houses: tasks hold houses as they were generated")
     if profile:
-        check_profile(run)
+        run = profiled(run)
     if pdb:
         from evonav.evaluation.hosting.debugger import check_terminal
 
@@ -230,8 +230,8 @@ def print_results(out: Path, summaries: "list[AgentSummary]") -> None:
     print_spending(out)
 
 
-def check_profile(run: "RunSettings") -> None:
-    """Check that all processes of a run can be sampled.
+def profiled(run: "RunSettings") -> "RunSettings":
+    """Return settings with which all processes of a run can be sampled.
 
     Raises:
         BadParameter: They cannot.
@@ -244,6 +244,7 @@ def check_profile(run: "RunSettings") -> None:
         raise typer.BadParameter("--profile samples workers on this machine only: use --engine local")
     if run.isolation == "sandbox":
         raise typer.BadParameter("--profile needs agents that can write their samples: use --isolation process")
+    return run.model_copy(update={"isolation": run.isolation or "process"})
 
 
 def sampling(out: Path, is_profiled: bool) -> "AbstractContextManager[None]":

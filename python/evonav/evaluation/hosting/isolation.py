@@ -7,13 +7,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from evonav.agents.hosting.sandbox import Policy, landlock_abi
+from evonav.agents.hosting.sandbox import Policy, landlock_abi, why_not
 from evonav.parallel.local import THREAD_VARIABLES
 from evonav.perception.weights import MODELS_VARIABLE
 
 Isolation = Literal["none", "process", "sandbox"]
 """`none`: the evaluator's own process; `process`: one of the agent's own; `sandbox`: that, shut in."""
 
+_GPU_DEVICES = ("/dev/nvidiactl", "/dev/kfd")
 _SYSTEM = (
     "/bin",
     "/etc/ld.so.cache",
@@ -34,6 +35,7 @@ _BUNDLED = ("tasks", "houses.jsonl.gz", "former_tasks.json")
 """Members of evonav's data that tell of bundled tasks."""
 _VARIABLES = (
     "CUDA_VISIBLE_DEVICES",
+    "HF_HUB_CACHE",
     "LANG",
     "LANGUAGE",
     "LC_ALL",
@@ -46,6 +48,20 @@ _VARIABLES = (
     *THREAD_VARIABLES,
 )
 """Environment variables that a process in a sandbox is given."""
+_CACHES = {"HF_HOME": "~/.cache/huggingface", "TORCH_HOME": "~/.cache/torch"}
+"""Variables that name the folders of downloaded models, and their defaults."""
+_TOKENS = ("token", "stored_tokens")
+"""Files with keys in `HF_HOME`."""
+
+
+def usual_isolation() -> Isolation:
+    """Return how agents are shut off if nobody says it: in a sandbox if this machine has one, else in a process.
+
+    On a machine with a GPU for computing they are not in a sandbox: drivers read files of their own and reserve more
+    address space than there is memory, and a library that cannot find its GPU may go on without it, unnoticed.
+    """
+    has_gpu = any(Path(device).exists() for device in _GPU_DEVICES)
+    return "process" if why_not() or has_gpu else "sandbox"
 
 
 def isolation_facts(isolation: Isolation) -> str:
@@ -60,7 +76,14 @@ def environment(scratch: Path) -> dict[str, str]:
         scratch: The one folder in which it may write.
     """
     given = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
-    return {**given, "HOME": str(scratch), "TMPDIR": str(scratch), "PYTHONDONTWRITEBYTECODE": "1"}
+    own = {"HOME": str(scratch), "TMPDIR": str(scratch), "PYTHONDONTWRITEBYTECODE": "1", "HF_HUB_OFFLINE": "1"}
+    return {**given, **{name: str(folder) for name, folder in _caches().items()}, **own}
+
+
+def _caches() -> dict[str, Path]:
+    """Return the folders of downloaded models that are there, by the variable that names them."""
+    folders = {name: Path(os.environ.get(name) or default).expanduser() for name, default in _CACHES.items()}
+    return {name: folder.absolute() for name, folder in folders.items() if folder.is_dir()}
 
 
 def with_absolute_file(name: str) -> str:
@@ -77,8 +100,9 @@ def search_path() -> list[str]:
 def policy_of(name: str, scratch: Path, hidden: Sequence[str], memory_mb: int | None) -> Policy:
     """Return what the process of an agent may do.
 
-    It may read the interpreter, all that can be imported, the folder of the agent's file, and the folder of models
-    that the variable `EVONAV_MODELS` names, but nothing that is hidden, wherever that lies.
+    It may read the interpreter, all that can be imported, the folder of the agent's file, and the folders of models
+    that the variables `EVONAV_MODELS`, `HF_HOME`, `HF_HUB_CACHE` and `TORCH_HOME` name, but nothing that is hidden,
+    wherever that lies.
 
     Args:
         name: Name of the agent.
@@ -90,8 +114,11 @@ def policy_of(name: str, scratch: Path, hidden: Sequence[str], memory_mb: int | 
     folders = [*_SYSTEM, sys.prefix, sys.base_prefix, sys.exec_prefix, *search_path(), str(files("evonav"))]
     if file.endswith(".py"):
         folders.append(str(Path(file).absolute().parent))
-    if models := os.environ.get(MODELS_VARIABLE):
-        folders.append(models)
+    folders += [os.environ[name] for name in (MODELS_VARIABLE, "HF_HUB_CACHE") if os.environ.get(name)]
+    caches = _caches()
+    folders += map(str, caches.values())
+    if "HF_HOME" in caches:
+        hidden = (*hidden, *(str(caches["HF_HOME"] / token) for token in _TOKENS))
     data = files("evonav") / "data"
     unseen = [Path(place).resolve() for place in (*hidden, *(str(data / member) for member in _BUNDLED))]
     found = [_shown(Path(folder).resolve(), unseen) for folder in dict.fromkeys(folders)]

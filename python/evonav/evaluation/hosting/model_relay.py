@@ -28,6 +28,14 @@ def is_relayed(decision: Component[DecisionModel]) -> bool:
     return decision.path == VLM
 
 
+def why_not_shut_in(decision: Component[DecisionModel]) -> str:
+    """Return why a decision model cannot be used by agents in a sandbox, in a few words; empty if it can."""
+    needs_more = decision.host_options or "path" in decision.options
+    if needs_more and not is_relayed(decision):
+        return "a decision model of your own needs files or a network, which a sandbox shuts: use `process`"
+    return ""
+
+
 class ModelRelay:
     """Answers the questions of one agent's process, one after the other."""
 

@@ -49,6 +49,10 @@ _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
 """Time between two checks that a process lives, on systems that cannot notify."""
 _START = "import sys; sys.path[:] = sys.argv[4:]; {}from {} import main; main(*map(int, sys.argv[1:4]))"
+_SANDBOX_ADVICE = (
+    "; an agent in a sandbox reads what can be imported, its own folder and folders of models (EVONAV_MODELS), and "
+    "has no network: `--isolation process` runs it without a sandbox"
+)
 _SHUT_IN = "from evonav.agents.hosting.sandbox import begin; begin(int(sys.argv[1])); "
 
 
@@ -222,7 +226,7 @@ class AgentProcess:
         self._is_waiting = False
         self.cpu_s = cpu_s
         if (failure := parts.get("failure")) is not None:
-            raise failure_of(failure)
+            raise failure_of(failure, is_sandboxed=self._scratch is not None)
         return parts
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
@@ -339,7 +343,8 @@ def check_importable(name: str, hosting: AgentHosting) -> None:
     try:
         AgentProcess(name, replace(hosting, log=None)).close()
     except AgentFailedError as error:
-        message = str(error).removeprefix("InvalidArgumentError: ").partition(" [")[0]
+        text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
+        message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice
         raise InvalidArgumentError(message) from None
 
 
@@ -349,7 +354,9 @@ def _new_scratch(hosting: AgentHosting) -> Path:
     return Path(tempfile.mkdtemp(prefix="evonav-agent-", dir=folder))
 
 
-def failure_of(text: bytes) -> AgentFailedError:
+def failure_of(text: bytes, *, is_sandboxed: bool = False) -> AgentFailedError:
     """Return the failure that an agent's process reports as a `wire.FAILURE`."""
     failure = wire.FAILURE.read(text)
-    return AgentFailedError(ErrorKind(failure.kind), failure.message, failure.traceback)
+    was_refused = is_sandboxed and "PermissionError" in f"{failure.message}{failure.traceback}"
+    advice = _SANDBOX_ADVICE if was_refused else ""
+    return AgentFailedError(ErrorKind(failure.kind), failure.message + advice, failure.traceback)

@@ -15,7 +15,7 @@ from evonav.agents.hosting.sandbox import why_not
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.spec import opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
-from evonav.evaluation.hosting.model_relay import is_relayed
+from evonav.evaluation.hosting.model_relay import is_relayed, why_not_shut_in
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -308,10 +308,7 @@ def _check_sandbox(hosting: AgentHosting, backend: Backend) -> None:
     reason = why_not()
     if hosting.is_in_process:
         reason = reason or "agents run in the evaluator's own process: use one worker or more"
-    needs_more = backend.decision.host_options or "path" in backend.decision.options
-    if needs_more and not is_relayed(backend.decision):
-        reason = reason or "a decision model of your own needs files or a network, which a sandbox shuts: use `process`"
-    if reason:
+    if reason := reason or why_not_shut_in(backend.decision):
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 

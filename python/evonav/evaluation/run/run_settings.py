@@ -29,8 +29,9 @@ class RunSettings(Settings):
     """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
     num_retries: int = Field(default=NUM_RETRIES, ge=0)
     """Number of retries of a stage that lost its worker, simulator or agent process."""
-    isolation: Isolation = "process"
-    """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux)."""
+    isolation: Isolation | None = None
+    """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux).
+    Default: sandbox where this machine has one, else process."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
     """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
@@ -69,6 +70,7 @@ class RunSettings(Settings):
         from evonav.evaluation.hosting.process import AgentHosting
         from evonav.evaluation.run.run import RunConfig
 
+        isolation = self.isolation or self._usual_isolation(backend)
         timeout_s = self.agent_timeout_s or decisions.answer_timeout_s
         return RunConfig(
             seed=seed,
@@ -76,9 +78,17 @@ class RunSettings(Settings):
             backend=backend,
             stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
             hosting=AgentHosting(
-                self.isolation == "none",
+                isolation == "none",
                 timeout_s,
                 self.agent_memory_mb,
-                is_sandboxed=self.isolation == "sandbox",
+                is_sandboxed=isolation == "sandbox",
             ),
         )
+
+    def _usual_isolation(self, backend: "Backend") -> Isolation:
+        """Return the isolation of a run for which none is given."""
+        from evonav.evaluation.hosting.isolation import usual_isolation
+        from evonav.evaluation.hosting.model_relay import why_not_shut_in
+
+        is_here = self.num_workers > 0 and self.engine == "local"
+        return usual_isolation() if is_here and not why_not_shut_in(backend.decision) else "process"
