@@ -137,7 +137,9 @@ CHEAP = RunConfig(
 DRIVER = """
 import sys
 from pathlib import Path
+from evonav.agents.hosting.sandbox import why_not
 from evonav.component import Component
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
@@ -146,6 +148,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 config = RunConfig(
     backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
+    hosting=AgentHosting(is_sandboxed=not why_not()),
 )
 evaluate(["random-walk"], task_files(Path(sys.argv[1])), Path(sys.argv[2]), config=config, num_workers=2, num_retries=5)
 """
