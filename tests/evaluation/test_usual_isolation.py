@@ -1,5 +1,7 @@
 """Agents run in a sandbox by default, read folders of models in it, and a refusal says what helps."""
 
+import os
+import tempfile
 from dataclasses import replace
 
 import pytest
@@ -9,13 +11,14 @@ from toy_house import write_tasks
 from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting import isolation
+from evonav.evaluation.hosting import isolation, scratch
 from evonav.evaluation.hosting.process import AgentHosting, check_importable
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import evaluate
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings
+from evonav.parallel.folders import writing
 from evonav.tasks.listing import task_files
 
 NEEDS_SANDBOX = pytest.mark.skipif(bool(sandbox.why_not()), reason=f"no sandbox here: {sandbox.why_not()}")
@@ -92,6 +95,27 @@ def test_downloaded_models_can_be_read_and_their_keys_cannot(tmp_path, monkeypat
     assert refused.state is EndState.ERRORED
     assert "PermissionError" in refused.error.message
     assert "`--isolation process` runs it without a sandbox" in refused.error.message
+
+
+def test_folders_of_killed_runs_are_deleted_and_no_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    left, young, running, foreign = (tmp_path / f"{scratch.PREFIX}{name}" for name in ("a", "b", "c", "d"))
+    outside = tmp_path / "outside"
+    for folder in (left, young, running, outside):
+        (folder / "large").mkdir(parents=True)
+        with writing(folder):
+            pass
+    foreign.symlink_to(outside)
+    for folder in (left, running, outside):
+        os.utime(folder, (0, 0))
+    with writing(running), scratch.agents_scratch() as name:
+        assert not left.exists()
+        assert young.exists()
+        assert running.exists()
+        assert (outside / "large").exists()
+        with scratch.agents_scratch():
+            assert os.path.isdir(name)  # noqa: PTH112 - a text
+    assert not os.path.exists(name)  # noqa: PTH110
 
 
 @NEEDS_SANDBOX

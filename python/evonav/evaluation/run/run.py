@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from evonav._core import __version__
@@ -17,6 +16,7 @@ from evonav.evaluation.episode.spec import opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.model_relay import is_relayed, why_not_shut_in
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
+from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
@@ -233,7 +233,7 @@ def _with_scratch(requests: Sequence[RunRequest], stack: ExitStack) -> Sequence[
     """Give sandboxes a folder that is deleted at the end, also if a worker could not clean up."""
     if not any(request.config.hosting.is_sandboxed for request in requests):
         return requests
-    scratch = stack.enter_context(TemporaryDirectory(prefix="evonav-agents-", ignore_cleanup_errors=True))
+    scratch = stack.enter_context(agents_scratch())
     configs = [replace(one.config, hosting=replace(one.config.hosting, scratch=scratch)) for one in requests]
     return [replace(one, config=config) for one, config in zip(requests, configs, strict=True)]
 
