@@ -132,7 +132,12 @@ def main(how, root, journal, step):
     whole = texts(driver.run)
     shutil.rmtree(driver.run)
     _, num_calls = in_fork(driver.evaluate)
-    mode, error = {"kill": (KILL, 0), "full": (FAIL_ALL, errno.ENOSPC), "broken": (FAIL, errno.EIO)}[how]
+    mode, error = {
+        "kill": (KILL, 0),
+        "full": (FAIL_ALL, errno.ENOSPC),
+        "read-only": (FAIL_ALL, errno.EROFS),
+        "broken": (FAIL, errno.EIO),
+    }[how]
     attempts = [driver.attempt(mode, number, error) for number in range(1, num_calls + 1, int(step))]
     print(json.dumps({"whole": whole, "attempts": attempts}))
 

@@ -14,7 +14,9 @@ from power_loss import Disk, read_log
 from processes import children
 from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
+from typer.testing import CliRunner
 
+from evonav.cli import app
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
@@ -30,14 +32,20 @@ HERE = Path(__file__).parent
 ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
-@pytest.fixture(scope="module")
-def faults(tmp_path_factory):
-    """Runs a function of `fault_driver.py` with the library that makes faults."""
+def compiled(name, folder):
+    """Return a library to be loaded before all else."""
     compiler = shutil.which("cc")
     if compiler is None or sys.platform != "linux":
         pytest.skip("needs a C compiler and Linux")
-    library = tmp_path_factory.mktemp("faults") / "faults.so"
-    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, HERE / "faults.c", "-ldl"], check=True)
+    library = folder / f"{name}.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, HERE / name, "-ldl"], check=True)
+    return library
+
+
+@pytest.fixture(scope="module")
+def faults(tmp_path_factory):
+    """Runs a function of `fault_driver.py` with the library that makes faults."""
+    library = compiled("faults.c", tmp_path_factory.mktemp("faults"))
 
     def run(call):
         done = subprocess.run(
@@ -55,10 +63,17 @@ def faults(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("how", "journal", "step"),
-    [("kill", "WAL", 9), ("kill", "DELETE", 20), ("full", "WAL", 12), ("full", "DELETE", 30), ("broken", "WAL", 13)],
+    [
+        ("kill", "WAL", 9),
+        ("kill", "DELETE", 20),
+        ("full", "WAL", 12),
+        ("full", "DELETE", 30),
+        ("read-only", "WAL", 25),
+        ("broken", "WAL", 13),
+    ],
 )
 def test_nothing_is_lost_at_any_call_that_changes_the_folder(faults, tmp_path, how, journal, step):
-    """Killed at it, or refused by a disk that is full from then on, or once by one that is broken.
+    """Killed at it, or refused by a disk that is full or read-only from then on, or once by one that is broken.
 
     At one call in `step`, or at every one with EVERY_FAULT set.
     """
@@ -80,7 +95,7 @@ def test_nothing_is_lost_at_any_call_that_changes_the_folder(faults, tmp_path, h
         assert kept == whole[: len(kept)], one["number"]
         assert len(kept) >= one["told"], one["number"]  # what the driver has said is finished is there
         assert (one["again"], one["whole"]) == (0, whole), one
-    if how == "full":  # what still comes when all is written needs no room
+    if how in ("full", "read-only"):  # what still comes when all is written needs no room
         assert all(one["code"] == 7 or one["number"] > attempts[-1]["number"] - 10 for one in attempts)
     assert max(one["told"] for one in attempts) >= 2
 
@@ -154,6 +169,22 @@ evaluate(["random-walk"], task_files(Path(sys.argv[1])), Path(sys.argv[2]), conf
 """
 
 
+def test_a_wall_clock_that_jumps_changes_nothing(tmp_path):
+    """By up to a day, forwards or backwards, whenever a driver, worker or agent reads it."""
+    library = compiled("clock.c", tmp_path)
+    tasks = many_tasks(tmp_path / "tasks", 8)
+    evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
+    environment = {**os.environ, "LD_PRELOAD": str(library), "PYTHONPATH": os.pathsep.join(sys.path)}
+    look = [sys.executable, "-c", "import time; print(max(abs(time.time() - time.time()) for _ in range(20)))"]
+    assert float(subprocess.run(look, env=environment, check=True, capture_output=True).stdout) > 3600.0
+    command = [sys.executable, "-c", DRIVER, str(tmp_path / "tasks"), str(tmp_path / "run")]
+    subprocess.run(command, env=environment, check=True, timeout=120.0)
+    assert texts(tmp_path / "run") == texts(tmp_path / "whole")
+    with RunStore(tmp_path / "run") as store:
+        assert not list(store.failures())
+        assert all(0.0 <= wall_s < 100.0 for wall_s, _ in store.timings().values())
+
+
 def resident_mb(pid):
     fields = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     return int(fields["VmRSS"].split()[0]) / 1024.0
@@ -189,27 +220,55 @@ def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
         assert all(failure.is_retried for failure in store.failures())
 
 
-def test_a_full_disk_is_one_clear_error(tmp_path):
-    """On a file system of 300 kB, where one can be had."""
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 300 kB, and a function that mounts it again with other options."""
     small = tmp_path / "small"
     small.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "none", str(small)]
+
+    def mount(*options):
+        subprocess.run(["mount", *options, str(small)], check=True, capture_output=True)
+
     try:
-        subprocess.run(mount, check=True, capture_output=True)
+        mount("-t", "tmpfs", "-o", "size=300k", "none")
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("no file system can be mounted here")
     try:
-        tasks = many_tasks(tmp_path / "tasks", 30)
-        with pytest.raises(StoreError, match="0 MB are free there"):
-            evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
-        kept = texts_of_stages(small / "run")
-        assert 0 < len(kept) < 90
-        subprocess.run(["mount", "-o", "remount,size=20m", str(small)], check=True)
-        evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
-        evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
-        assert texts(small / "run") == texts(tmp_path / "whole")
+        yield small, lambda options: mount("-o", f"remount,{options}")
     finally:
         subprocess.run(["umount", str(small)], check=True)
+
+
+def test_a_full_disk_is_one_clear_error(small_disk, tmp_path):
+    small, remount = small_disk
+    tasks = many_tasks(tmp_path / "tasks", 30)
+    with pytest.raises(StoreError, match="0 MB are free there"):
+        evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+    kept = texts_of_stages(small / "run")
+    assert 0 < len(kept) < 90
+    remount("size=20m")
+    evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+    evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
+    assert texts(small / "run") == texts(tmp_path / "whole")
+
+
+def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_path):
+    small, remount = small_disk
+    tasks = many_tasks(tmp_path / "tasks", 2)
+    remount("size=20m")
+    evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+    kept = texts_of_stages(small / "run")
+    remount("ro")
+    assert len(kept) == 6
+    assert texts_of_stages(small / "run") == kept
+    done = CliRunner().invoke(app, ["report", str(small / "run"), "--out", str(tmp_path / "report")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "report" / "report.html").is_file()
+    with pytest.raises(StoreError, match=r"small/run.*[Rr]ead-only"):
+        evaluate(["random-walk", "stay-still"], tasks, small / "run", config=CHEAP, num_workers=0)
+    remount("rw")
+    evaluate(["random-walk", "stay-still"], tasks, small / "run", config=CHEAP, num_workers=0)
+    assert texts_of_stages(small / "run")[:6] == kept
 
 
 def test_the_second_driver_is_told_of_the_first(tmp_path):

@@ -6,6 +6,7 @@ are equal to the byte: wall-clock times are in `timings`, failed attempts with t
 """
 
 import json
+import os
 import shutil
 import sqlite3
 from collections import Counter
@@ -95,10 +96,22 @@ def holds_run(run_dir: Path) -> bool:
     if not path.is_file():
         return False
     try:
-        with closing(sqlite3.connect(path, timeout=30.0)) as db:
+        with closing(_connect(path)) as db:
             return bool(db.execute("SELECT 1 FROM sqlite_master WHERE name = 'meta'").fetchall())
     except sqlite3.Error as error:
         raise StoreError(f"{path}: {error}") from error
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    """Open a file of records; one that lies where nothing can be written is taken to stay as it is.
+
+    SQLite reads a file with a write-ahead log only where it can make files beside it, or if it is told this.
+    """
+    is_still = (
+        path.is_file() and not os.access(path.parent, os.W_OK) and not path.with_name(f"{path.name}-wal").exists()
+    )
+    name = f"{path.absolute().as_uri()}?mode=ro&immutable=1" if is_still else str(path)
+    return sqlite3.connect(name, isolation_level=None, timeout=30.0, uri=is_still)
 
 
 class RunStore:
@@ -117,7 +130,7 @@ class RunStore:
         try:
             if create:
                 run_dir.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, isolation_level=None, timeout=30.0)
+            self._db = _connect(self.path)
         except (sqlite3.Error, OSError) as error:
             raise StoreError(f"{self.path}: {error}") from error
         try:

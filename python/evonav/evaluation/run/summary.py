@@ -37,5 +37,8 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
         content["perception"] = word_of(make, backend.get("perception_options", {}))
     if models:
         content[MODELS_KEY] = models
-    write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
+    text = json.dumps(content, indent=2, sort_keys=True) + "\n"
+    path = run_dir / SUMMARY_NAME
+    if not path.is_file() or path.read_bytes() != text.encode():  # a run may lie where nothing can be written
+        write_atomically(path, text)
     return [summaries[agent] for agent in only or agents]
