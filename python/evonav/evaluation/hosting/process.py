@@ -26,12 +26,14 @@ from pathlib import Path
 
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean
-from evonav.agents.hosting.sandbox import Policy
+from evonav.agents.hosting.sandbox import Policy, why_not
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
+from evonav.component import Component
+from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
-from evonav.evaluation.hosting.model_relay import ModelRelay
+from evonav.evaluation.hosting.model_relay import ModelRelay, is_relayed
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
@@ -341,6 +343,26 @@ def check_importable(name: str, hosting: AgentHosting) -> None:
     except AgentFailedError as error:
         message = str(error).removeprefix("InvalidArgumentError: ").partition(" [")[0]
         raise InvalidArgumentError(message) from None
+
+
+def check_sandbox(hosting: AgentHosting, decision: Component[DecisionModel]) -> None:
+    """Check that agents can be shut in.
+
+    Args:
+        hosting: Settings of the processes.
+        decision: The run's decision model.
+
+    Raises:
+        InvalidArgumentError: They cannot, and why.
+    """
+    reason = why_not()
+    if hosting.is_in_process:
+        reason = reason or "agents run in the evaluator's own process: use one worker or more"
+    needs_more = decision.host_options or "path" in decision.options
+    if needs_more and not is_relayed(decision):
+        reason = reason or "a decision model of your own needs files or a network, which a sandbox shuts: use `process`"
+    if reason:
+        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 
 def _new_scratch(hosting: AgentHosting) -> Path:

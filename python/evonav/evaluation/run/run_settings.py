@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(Settings):
-    """The workers of a run, the limits of its agents, and its retries. They do not decide records."""
+    """The workers of a run, the limits of its agents, and its retries; only `shift_coordinates` decides records."""
 
     workers: int | None = Field(default=None, ge=0)
     """Number of worker processes; 0 runs in this process. Default: one per core."""
@@ -31,6 +31,8 @@ class RunSettings(Settings):
     """Number of retries of a stage that lost its worker, simulator or agent process."""
     isolation: Isolation = "process"
     """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux)."""
+    shift_coordinates: bool = False
+    """Tell agents all places shifted, by whole metres drawn for each episode; always so for sealed tasks."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
     """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
@@ -81,4 +83,5 @@ class RunSettings(Settings):
                 self.agent_memory_mb,
                 is_sandboxed=self.isolation == "sandbox",
             ),
+            shift_coordinates=self.shift_coordinates,
         )
