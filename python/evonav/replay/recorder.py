@@ -158,7 +158,7 @@ class Recorder:
         if agent is None:
             return seen
         try:
-            belief = agent.belief() if self._shift is None else self._shift.own_belief(agent.belief())
+            belief = agent.belief() if self._shift is None else self._shift.unshifted_belief(agent.belief())
             bodies = self._places[-1]
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(

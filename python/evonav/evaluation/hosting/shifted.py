@@ -32,11 +32,11 @@ class Shift:
     x_m: float
     z_m: float
 
-    def told_task(self, task: TaskInfo) -> TaskInfo:
+    def shifted_task(self, task: TaskInfo) -> TaskInfo:
         """Return a task as the agent is told it."""
         return replace(task, map_frame=self._map_frame(task.map_frame, 1))
 
-    def told_observation(self, observation: Observation) -> Observation:
+    def shifted_observation(self, observation: Observation) -> Observation:
         """Return an observation as the agent is told it."""
         return replace(
             observation,
@@ -44,7 +44,7 @@ class Shift:
             pose=self._pose(observation.pose),
         )
 
-    def own_action(self, action: AgentAction) -> AgentAction:
+    def unshifted_action(self, action: AgentAction) -> AgentAction:
         """Return what an agent answers, in the house's coordinates.
 
         Raises:
@@ -52,20 +52,20 @@ class Shift:
         """
         if not isinstance(action, NavigateTo):
             return action
-        face_m = None if action.face_m is None else self._own_point(action.face_m, "action.face_m")
-        return NavigateTo(self._own_point(action.position_m, "action.position_m"), face_m)
+        face_m = None if action.face_m is None else self._unshifted_point(action.face_m, "action.face_m")
+        return NavigateTo(self._unshifted_point(action.position_m, "action.position_m"), face_m)
 
-    def own_entry(self, entry: EntryBelief) -> EntryBelief:
+    def unshifted_entry(self, entry: EntryBelief) -> EntryBelief:
         """Return an entry that an agent remembers, in the house's coordinates.
 
         Raises:
             InvalidArgumentError: A coordinate is then out of range.
         """
         (x_m, y_m, z_m), name = entry.centre_m, f"entry {entry.entry_id}: centre_m"
-        x_m, z_m = self._own_point((x_m, z_m), name)
+        x_m, z_m = self._unshifted_point((x_m, z_m), name)
         return replace(entry, centre_m=(x_m, y_m, z_m))
 
-    def own_diagnostics(self, diagnostics: RoundDiagnostics) -> RoundDiagnostics:
+    def unshifted_diagnostics(self, diagnostics: RoundDiagnostics) -> RoundDiagnostics:
         """Return what an agent says of a round, in the house's coordinates.
 
         Raises:
@@ -74,11 +74,11 @@ class Shift:
         chosen = diagnostics.chosen_entry
         return replace(
             diagnostics,
-            chosen_entry=None if chosen is None else self.own_entry(chosen),
-            details={name: self._own_detail(name, value) for name, value in diagnostics.details.items()},
+            chosen_entry=None if chosen is None else self.unshifted_entry(chosen),
+            details={name: self._unshifted_detail(name, value) for name, value in diagnostics.details.items()},
         )
 
-    def own_belief(self, belief: Belief) -> Belief:
+    def unshifted_belief(self, belief: Belief) -> Belief:
         """Return what an agent believes, in the house's coordinates; questions stay as they were asked.
 
         Raises:
@@ -86,9 +86,9 @@ class Shift:
         """
         return replace(
             belief,
-            entries=[self.own_entry(entry) for entry in belief.entries],
+            entries=[self.unshifted_entry(entry) for entry in belief.entries],
             frontiers=[
-                replace(frontier, position_m=self._own_point(frontier.position_m, "frontier"))
+                replace(frontier, position_m=self._unshifted_point(frontier.position_m, "frontier"))
                 for frontier in belief.frontiers
             ],
             map_frame=self._map_frame(belief.map_frame, -1),
@@ -101,19 +101,21 @@ class Shift:
         x_m, z_m = frame.corner_m
         return replace(frame, corner_m=(x_m + sign * self.x_m, z_m + sign * self.z_m))
 
-    def _own_point(self, told_m: _Point2, name: str) -> _Point2:
-        x_m, z_m = told_m[0] - self.x_m, told_m[1] - self.z_m
+    def _unshifted_point(self, shifted_m: _Point2, name: str) -> _Point2:
+        x_m, z_m = shifted_m[0] - self.x_m, shifted_m[1] - self.z_m
         if max(abs(x_m), abs(z_m)) > MAX_M:
-            raise InvalidArgumentError(f"{name} = {told_m}: coordinates must be within {MAX_M:g} m of the house's own")
+            raise InvalidArgumentError(
+                f"{name} = {shifted_m}: coordinates must be within {MAX_M:g} m of the house's own"
+            )
         return x_m, z_m
 
-    def _own_detail(self, name: str, value: Any) -> Any:  # noqa: ANN401 - JSON
+    def _unshifted_detail(self, name: str, value: Any) -> Any:  # noqa: ANN401 - JSON
         if isinstance(value, dict):
-            return {inner: self._own_detail(inner, one) for inner, one in value.items()}
+            return {inner: self._unshifted_detail(inner, one) for inner, one in value.items()}
         if not isinstance(value, list):
             return value
         if not (name.endswith(PLACES) and len(value) in (2, 3) and all(map(_is_coordinate, value))):
-            return [self._own_detail(name, one) for one in value]
+            return [self._unshifted_detail(name, one) for one in value]
         return [value[0] - self.x_m, *value[1:-1], value[-1] - self.z_m]
 
 
@@ -147,7 +149,7 @@ class ShiftedAgent(HostedAgent):
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
-        self._agent.begin_task(self._shift.told_task(task))
+        self._agent.begin_task(self._shift.shifted_task(task))
 
     def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal, which has no places."""
@@ -155,16 +157,16 @@ class ShiftedAgent(HostedAgent):
 
     def act(self, observation: Observation) -> AgentAction:
         """Decide what to do in one decision round."""
-        return self._shift.own_action(self._agent.act(self._shift.told_observation(observation)))
+        return self._shift.unshifted_action(self._agent.act(self._shift.shifted_observation(observation)))
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return what the agent said of the last round, right after it."""
-        return self._shift.own_diagnostics(self._agent.diagnostics())
+        return self._shift.unshifted_diagnostics(self._agent.diagnostics())
 
     def entries(self) -> Sequence[EntryBelief] | None:
         """Return the object memory; None if the agent does not explain itself."""
         entries = self._agent.entries()
-        return None if entries is None else [self._shift.own_entry(entry) for entry in entries]
+        return None if entries is None else [self._shift.unshifted_entry(entry) for entry in entries]
 
     def costs(self) -> Mapping[str, float]:
         """Return what its decision model has cost so far, by field of `StageCosts`; empty where that is not known."""
