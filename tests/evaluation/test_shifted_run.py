@@ -7,7 +7,10 @@ import pytest
 from house_knowing_agents import starts
 from short_tasks import short_tasks
 from test_engine import records, texts
+from typer.testing import CliRunner
 
+import evonav
+from evonav.cli import app
 from evonav.errors import StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
@@ -207,3 +210,35 @@ def test_what_a_shift_leads_out_of_range_costs_the_stage(bundled, tmp_path):
     assert record.error.kind is ErrorKind.AGENT
     assert "centre_m" in record.error.message
     assert "of the house's own" in record.error.message
+
+
+SWEEP = """
+agents = ["stay-still"]
+tasks = ["bundled:1"]
+workers = 0
+shift_coordinates = true
+"""
+
+
+def test_command_sweep_and_python_have_the_option(tmp_path):
+    words = ["evaluate", "--agent", "stay-still", "--limit", "1", "--workers", "0", "--shift-coordinates"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "command")])
+    assert done.exit_code == 0, done.output
+    (tmp_path / "sweep.toml").write_text(SWEEP)
+    done = CliRunner().invoke(app, ["sweep", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "sweep")])
+    assert done.exit_code == 0, done.output
+    evonav.evaluate("stay-still", limit=1, workers=0, shift_coordinates=True, out=tmp_path / "python")
+    (cell,) = (tmp_path / "sweep" / "runs").iterdir()
+    for folder in (tmp_path / "command", cell, tmp_path / "python"):
+        with RunStore(folder) as store:
+            assert store.meta("config")[SHIFT_KEY] is True
+
+
+def test_an_oracle_baseline_is_told_where_the_target_is_and_so_true_places(bundled, tmp_path):
+    for name in ("shortest-path", "oracle-memory"):
+        plain, shifted = (
+            run([name], bundled, tmp_path / name / str(is_shifted), is_shifted=is_shifted, limit=1)[name]
+            for is_shifted in (False, True)
+        )
+        assert shifted == plain
+        assert shifted[0].state is EndState.SUCCESS
