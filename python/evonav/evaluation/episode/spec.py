@@ -26,7 +26,7 @@ from evonav.world.pose import Pose
 THUMBNAIL_PX = 160
 """Edge of the reference image in a floor plan."""
 LEAST_SHIFT_M = 32
-"""Least shift along an axis: no house is that wide, so no shifted coordinate is one of the house's own."""
+"""Least shift along an axis: wider than the bundled houses (30.5 m), so it leads out of each of them."""
 NUM_SHIFTS = 32
 """Number of lengths of a shift, in each direction; a shift is less than 64 m."""
 
@@ -184,7 +184,7 @@ def drawn_shift_m(secret: str, agent: str, task_id: str) -> Point2:
     tells the other.
 
     Shifts are whole metres: exact in binary, and multiples of the cells and voxels that agents use (0.05, 0.1 and
-    0.25 m), which so divide the house as without a shift. The starts of episodes, multiples of 0.25 m, are shifted
+    0.25 m), so these divide the house as without a shift. The starts of episodes, multiples of 0.25 m, are shifted
     without rounding. Shifts are short, because object memories hold points in single precision, which rounds by up to
     4 micrometres between 64 and 128 m.
 
