@@ -8,6 +8,7 @@ import shutil
 import stat
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.run import SHIFT_KEY, RunConfig, evaluate, shifts_coordinates
 from evonav.submission.pack import pack
 from evonav.submission.sealed import SUFFIX, new_key, opened, read_index, seal, unseal
 from evonav.tasks.bundled import bundled_tasks
@@ -203,18 +204,39 @@ def test_agents_must_be_shut_in(sealed: Path, key: Path, tmp_path: Path) -> None
     assert not (tmp_path / "run").exists()
 
 
+def test_agents_are_told_shifted_coordinates_on_sealed_tasks_always(
+    tasks: list[TaskFile], sealed: Path, key: Path, tmp_path: Path
+) -> None:
+    unseal(sealed, key, tmp_path)
+    for is_on in (False, True):
+        config = RunConfig(shift_coordinates=is_on)
+        assert shifts_coordinates(task_files(tmp_path), config)
+        assert shifts_coordinates([*tasks, *task_files(tmp_path, 1)], config)
+        assert shifts_coordinates(tasks, config) == is_on
+
+
 @NEEDS_SANDBOX
-def test_a_run_on_sealed_tasks_is_that_on_the_tasks(
+def test_a_run_on_sealed_tasks_is_that_on_the_tasks_with_shifted_coordinates(
     tasks: list[TaskFile], sealed: Path, key: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("evonav.evaluation.run.run.secrets.token_hex", lambda _: "5" * 64)  # runs draw the same shifts
     monkeypatch.setenv(KEY_VARIABLE, str(key))
     words = ["evaluate", "--agent", "fu", "--tasks", str(sealed), "--isolation", "sandbox", "--workers", "1"]
-    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "sealed")])
-    assert done.exit_code == 0, done.output
-    config = RunConfig(hosting=AgentHosting(is_sandboxed=True))
+    for _ in range(2):  # the second call finds that nothing is left
+        done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "sealed")])
+        assert done.exit_code == 0, done.output
+        assert "the tasks were sealed: agents are told shifted coordinates (--shift-coordinates)" in done.output
+    config = RunConfig(hosting=AgentHosting(is_sandboxed=True), shift_coordinates=True)
     evaluate(["fu"], tasks, tmp_path / "plain", num_workers=1, config=config)
-    with RunStore(tmp_path / "sealed") as a, RunStore(tmp_path / "plain") as b:
+    evaluate(["fu"], tasks, tmp_path / "true", num_workers=1, config=replace(config, shift_coordinates=False))
+    with (
+        RunStore(tmp_path / "sealed") as a,
+        RunStore(tmp_path / "plain") as b,
+        RunStore(tmp_path / "true") as c,
+    ):
         assert list(a.records("fu")) == list(b.records("fu"))
+        assert list(a.records("fu")) != list(c.records("fu"))
+        assert [store.meta("config").get(SHIFT_KEY) for store in (a, b, c)] == [True, True, None]
         opened_folder = Path(a.meta("tasks_dir"))
     assert not opened_folder.exists()
     with pytest.raises(InvalidArgumentError, match="its tasks are sealed"):

@@ -145,7 +145,11 @@ class RoundDiagnostics:
     counters: dict[str, int] = field(default_factory=dict)
     """Cumulative counts, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further JSON-ready values."""
+    """Further JSON-ready values.
+
+    `[x, z]` or `[x, y, z]` under a name that ends in `position_m`, `centre_m`, `goal_m`, `mid_term_m` or `path_m` is a
+    place, also in lists: where agents are told shifted places, records hold it in the house's own coordinates.
+    """
 
 
 @runtime_checkable

@@ -172,7 +172,7 @@ def settings_options(name: str) -> Options:
             RunSettings,
             WORKER_PANEL,
             names=run_names,
-            fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb"),
+            fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb", "shift_coordinates"),
         ),
         "changes": Options(RunSettings, WORKER_PANEL, fields=(*pool, "worker_gpus"), overrides=True),
     }[name]

@@ -9,7 +9,7 @@ import typer
 from evonav.cli.options import completion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
@@ -243,3 +243,9 @@ def chosen_tasks(tasks: Path | None, limit: int | None, subset: str | None) -> "
         raise typer.BadParameter("give --limit or --subset, not both")
     with task_folder(tasks) as folder:
         yield task_files(folder, limit, subset)
+
+
+def note_sealed(tasks: "Iterable[TaskFile]") -> None:
+    """Say that agents are told shifted places, whatever the options are, if tasks were sealed."""
+    if any(task.was_sealed for task in tasks):
+        typer.echo("the tasks were sealed: agents are told shifted coordinates (--shift-coordinates)", err=True)

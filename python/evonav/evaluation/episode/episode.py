@@ -15,6 +15,7 @@ from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, Stage
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent
+from evonav.evaluation.hosting.shifted import Shift, ShiftedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import LEVELS, Stopwatch
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
@@ -43,7 +44,7 @@ class Episode:
         self._agent_name = agent_name
         self._context = EpisodeContext(
             spec,
-            *_hosted(agent),
+            *_hosted(agent, spec),
             simulator,
             perception,
             protocol,
@@ -108,7 +109,7 @@ class Episode:
 
     def replace_agent(self, agent: Agent) -> None:
         """Use another agent from the next stage on, as after the loss of a process; for replays in one process."""
-        hosted, baseline = _hosted(agent)
+        hosted, baseline = _hosted(agent, self._spec)
         self._context = replace(self._context, agent=hosted, baseline=baseline)
         self._is_replaced = True
 
@@ -117,8 +118,10 @@ class Episode:
         return process_time() + self._context.agent.cpu_s
 
 
-def _hosted(agent: Agent | HostedAgent) -> tuple[HostedAgent, OracleBaseline | None]:
-    """Return the agent as a stage asks it, and itself if it is an oracle baseline."""
-    if isinstance(agent, HostedAgent):
-        return agent, None
-    return LocalAgent(agent), as_oracle_baseline(agent)
+def _hosted(agent: Agent | HostedAgent, spec: EpisodeSpec) -> tuple[HostedAgent, OracleBaseline | None]:
+    """Return the agent as a stage asks it, and itself if it is an oracle baseline, which is told true places."""
+    hosted = agent if isinstance(agent, HostedAgent) else LocalAgent(agent)
+    baseline = None if isinstance(agent, HostedAgent) else as_oracle_baseline(agent)
+    if spec.shift_m is None or baseline is not None:
+        return hosted, baseline
+    return ShiftedAgent(hosted, Shift(*spec.shift_m)), None

@@ -26,12 +26,14 @@ from pathlib import Path
 
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.error_text import clean
-from evonav.agents.hosting.sandbox import Policy
+from evonav.agents.hosting.sandbox import Policy, why_not
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
+from evonav.component import Component
+from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
-from evonav.evaluation.hosting.model_relay import ModelRelay
+from evonav.evaluation.hosting.model_relay import ModelRelay, why_not_shut_in
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
@@ -346,6 +348,23 @@ def check_importable(name: str, hosting: AgentHosting) -> None:
         text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
         message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice
         raise InvalidArgumentError(message) from None
+
+
+def check_sandbox(hosting: AgentHosting, decision: Component[DecisionModel]) -> None:
+    """Check that agents can be shut in.
+
+    Args:
+        hosting: Settings of the processes.
+        decision: The run's decision model.
+
+    Raises:
+        InvalidArgumentError: They cannot, and why.
+    """
+    reason = why_not()
+    if hosting.is_in_process:
+        reason = reason or "agents run in the evaluator's own process: use one worker or more"
+    if reason := reason or why_not_shut_in(decision):
+        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 
 def _new_scratch(hosting: AgentHosting) -> Path:

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.agents.hosting.sandbox import why_not
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.episode.spec import opaque_task_id
+from evonav.evaluation.episode.spec import drawn_shift_m, opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
-from evonav.evaluation.hosting.model_relay import is_relayed, why_not_shut_in
-from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
+from evonav.evaluation.hosting.model_relay import is_relayed
+from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting, check_sandbox
 from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -37,11 +36,14 @@ from evonav.tasks.listing import KEY_VARIABLE, TaskFile
 SEALED_KEY = "is_sealed"
 """Place in a run's header of whether its tasks were sealed, so that its records must not be shown."""
 NAMES_KEY = "key_of_names"
-"""Place in a run's header of the secret key by which agents' names of tasks are made; nothing shows it."""
+"""Place in a run's header of the secret key of agents' names of tasks and of shifts; nothing shows it."""
+SHIFT_KEY = "shift_coordinates"
+"""Place in a run's configuration of whether agents are told shifted places; it is there only if they are."""
 
 __all__ = [
     "NAMES_KEY",
     "NUM_RETRIES",
+    "SHIFT_KEY",
     "Progress",
     "RunConfig",
     "RunRequest",
@@ -68,6 +70,8 @@ class RunConfig:
     """
     hosting: AgentHosting = field(default_factory=AgentHosting)
     """The process in which agents run; with `num_workers=0`, it is always this one."""
+    shift_coordinates: bool = False
+    """Whether agents are told all places shifted, by a length drawn for each episode; always so for sealed tasks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +197,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
     names = {task.task_id: opaque_task_id(secret, task.task_id) for task in request.tasks}
+    is_shifted = shifts_coordinates(request.tasks, config)
     # An agent's process may count its episodes: in the order of the tasks' ids, the number would tell the task.
     for task in sorted(request.tasks, key=lambda task: names[task.task_id]):
         stages = range(1, task.num_stages + 1)
@@ -206,6 +211,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
                 str(task.path.absolute()),
                 agent_seed(config.seed, agent, task.task_id),
                 perception_seed(config.seed, task.task_id),
+                drawn_shift_m(secret, agent, task.task_id) if is_shifted else None,
                 sends_floor_plans=are_missing and number == 0,
             )
             for number, agent in enumerate(agents)
@@ -280,7 +286,7 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
             raise InvalidArgumentError("no task to evaluate on")
         hosting = _hosting(request, num_workers)
         if hosting.is_sandboxed:
-            _check_sandbox(hosting, request.config.backend)
+            check_sandbox(hosting, request.config.backend.decision)
         elif any(task.was_sealed for task in request.tasks):
             raise InvalidArgumentError(
                 f"isolation = {hosting.isolation}: the tasks were sealed, so agents must not read them: use sandbox"
@@ -299,19 +305,6 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
                 checked.add((agent, hosting.isolation))
 
 
-def _check_sandbox(hosting: AgentHosting, backend: Backend) -> None:
-    """Check that agents can be shut in.
-
-    Raises:
-        InvalidArgumentError: They cannot, and why.
-    """
-    reason = why_not()
-    if hosting.is_in_process:
-        reason = reason or "agents run in the evaluator's own process: use one worker or more"
-    if reason := reason or why_not_shut_in(backend.decision):
-        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
-
-
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:
     """Return the identity of a run: a folder holds one run, of any number of agents."""
     return {
@@ -321,7 +314,13 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "backend": config.backend.identity(),
         "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
+        **({SHIFT_KEY: True} if shifts_coordinates(tasks, config) else {}),
     }
+
+
+def shifts_coordinates(tasks: Sequence[TaskFile], config: RunConfig) -> bool:
+    """Return whether agents are told shifted places: if the configuration says so, and always on sealed tasks."""
+    return config.shift_coordinates or any(task.was_sealed for task in tasks)
 
 
 def _digest_of(tasks: Sequence[TaskFile]) -> str:

@@ -11,7 +11,7 @@ process or a failure of the harness; `evonav.evaluation.run.scheduler` retries a
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -67,6 +67,8 @@ class EpisodeJob:
     """The agent's."""
     perception_seed: int
     """The perception's."""
+    shift_m: Sequence[float] | None = None
+    """`(x, z)` by which places are shifted for the agent; `None` tells true ones."""
     sends_floor_plans: bool = False
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
@@ -207,7 +209,9 @@ class EpisodeWork:
         job, context = EpisodeJob(**json.loads(head)), self._context(config_text)
         num_left = _Retries(context.config.num_retries)
         try:
-            spec = replace(context.config.backend.tasks.create(Path(job.path)), opaque_id=job.opaque_id)
+            shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
+            task = context.config.backend.tasks.create(Path(job.path))
+            spec = replace(task, opaque_id=job.opaque_id, shift_m=shift_m)
             is_whole = False
             while not is_whole:
                 is_whole = True
