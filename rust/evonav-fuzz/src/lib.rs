@@ -1,0 +1,13 @@
+//! What the fuzzers of evonav-core share: the targets, which an ordinary test of the core runs too, and
+//! mutation of JSON.
+
+pub mod json;
+#[path = "../../evonav-core/tests/fuzzing/targets.rs"]
+pub mod targets;
+
+use libfuzzer_sys::Corpus;
+
+/// Run a target.
+pub fn fuzz(target: fn(&[u8]) -> bool, data: &[u8]) -> Corpus {
+    if target(data) { Corpus::Keep } else { Corpus::Reject }
+}
