@@ -44,8 +44,13 @@ const MAX_MESSAGE: usize = 5000;
 pub type Target = (&'static str, fn(&[u8]) -> bool);
 
 /// All targets. The corpus of each is the folder of its name in `tests/data/fuzzing`.
-pub const TARGETS: [Target; 4] =
-    [("house", house), ("requests", requests), ("weights", weights), ("world", world)];
+pub const TARGETS: [Target; 5] = [
+    ("house", house),
+    ("lit", lit),
+    ("requests", requests),
+    ("weights", weights),
+    ("world", world),
+];
 
 /// The reader of houses agrees with `serde_json` on what is JSON and on its values, and what it reads it
 /// writes and reads again.
@@ -106,9 +111,8 @@ pub fn requests(data: &[u8]) -> bool {
         let look = world.with_look(&appearance);
         assert_eq!(look.mesh().faces().len(), world.mesh().faces().len());
     }
-    if let Some(request) = accepted(SpawnRequest::from_json(text))
-        && request.num_attempts <= 4
-    {
+    if let Some(request) = accepted(SpawnRequest::from_json(text)) {
+        let request = SpawnRequest { num_attempts: request.num_attempts.min(4), ..request };
         let (house, scene) = (world.house(), world.scene());
         if let Some(spawned) =
             accepted(random_spawn(house, Catalogue::bundled(), CONFIG.unknown, scene, &request))
@@ -132,8 +136,7 @@ pub fn weights(data: &[u8]) -> bool {
 /// A house is built, rendered, walked through and changed. Returns whether it was, or was refused by the
 /// simulator: what is no house, or no small one, teaches nothing here.
 pub fn world(data: &[u8]) -> bool {
-    let house = str::from_utf8(data).ok().and_then(|text| House::from_json("fuzzed", text).ok());
-    let Some(house) = house.filter(is_small) else { return false };
+    let Some(house) = small_house(data) else { return false };
     let Some(world) = accepted(EmbeddedSimulator::new(house, CONFIG)) else { return true };
     let scene = world.scene();
     for body in scene.bodies.iter().filter(|body| !body.parts.is_empty()) {
@@ -151,6 +154,15 @@ pub fn world(data: &[u8]) -> bool {
         accepted(inspect_houses(house, house, Catalogue::bundled(), CONFIG.unknown, tolerances));
     assert!(findings.is_none_or(|all| all.iter().all(|one| one.amount_m.is_finite())));
     rearrange(&world);
+    true
+}
+
+/// A house is lit, and drawn in its light, which takes longer than all of [`world`]. Returns as there.
+pub fn lit(data: &[u8]) -> bool {
+    let Some(house) = small_house(data) else { return false };
+    let config = SimulatorConfig { style: Style::Default, ..CONFIG };
+    let Some(world) = accepted(EmbeddedSimulator::new(house, config)) else { return true };
+    look_around(&world, &world.start());
     true
 }
 
@@ -184,7 +196,9 @@ fn walk(world: &EmbeddedSimulator, start_m: Vec2) {
     let house = world.house();
     let rooms = house.rooms.iter().map(|room| room.polygon_m[0]);
     let objects = house.objects.iter().map(|object| [object.position_m[0], object.position_m[2]]);
-    let targets_m: Vec<Vec2> = rooms.chain(objects).take(12).collect();
+    // Snapping takes longer than the search: it is done once.
+    let targets_m = rooms.chain(objects).take(8).filter_map(|point_m| navigation.snap(point_m));
+    let targets_m: Vec<Vec2> = targets_m.collect();
     let lengths_m = navigation.distances_m(start_m, &targets_m);
     let field = navigation.field(start_m).expect("a field of a free point");
     for (&target_m, length_m) in targets_m.iter().zip(lengths_m) {
@@ -232,6 +246,12 @@ fn accepted<T>(read: Result<T, Error>) -> Option<T> {
 fn check(error: &Error) {
     let length = error.to_string().len();
     assert!(length < MAX_MESSAGE, "an error of {length} bytes");
+}
+
+/// Read a house; `None` if it is none, or takes long to build.
+fn small_house(data: &[u8]) -> Option<House> {
+    let text = str::from_utf8(data).ok()?;
+    House::from_json("fuzzed", text).ok().filter(is_small)
 }
 
 fn is_small(house: &House) -> bool {
