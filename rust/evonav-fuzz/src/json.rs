@@ -25,19 +25,20 @@ impl Draws {
     }
 
     fn word(&mut self) -> &'static str {
-        static WORDS: OnceLock<Vec<&str>> = OnceLock::new();
+        static ENTRIES: OnceLock<Vec<&str>> = OnceLock::new();
         let quoted = |line: &'static str| line.strip_prefix('"')?.strip_suffix('"');
-        let words = WORDS.get_or_init(|| DICTIONARY.lines().filter_map(quoted).collect());
-        words[self.below(words.len())]
+        let entries = ENTRIES.get_or_init(|| DICTIONARY.lines().filter_map(quoted).collect());
+        entries[self.below(entries.len())]
     }
 }
 
-/// How a document is changed.
+/// The way to change a document.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// In any way; half of the mutations are libFuzzer's own, of bytes.
+    /// Any change; half of the mutations are libFuzzer's own, of bytes.
     Wild,
-    /// Mostly so that it is still read: types are kept, and numbers and names changed wherever they occur.
+    /// Changes after which most documents are still read: types are kept, and most numbers and names are
+    /// changed wherever they occur.
     Tame,
 }
 

@@ -1,5 +1,4 @@
-//! What the fuzzers of evonav-core share: the targets, which an ordinary test of the core runs too, and
-//! mutation of JSON.
+//! The targets of the fuzzers, which an ordinary test of evonav-core runs too, and mutation of JSON.
 
 pub mod json;
 #[path = "../../evonav-core/tests/fuzzing/targets.rs"]
