@@ -196,6 +196,15 @@ fn named_things_go_to_named_receptacles_or_to_the_floor_of_a_room() {
 }
 
 #[test]
+fn a_request_without_end_is_refused() {
+    let read =
+        |num: u64| SpawnRequest::from_json(&format!("{{\"seed\":1,\"num_attempts\":{num}}}"));
+    assert_eq!(read(1000).expect("the most").num_attempts, 1000);
+    let error = read(u64::MAX).expect_err("too many").to_string();
+    assert!(error.starts_with("argument `num_attempts` is 18446744073709551615"), "{error}");
+}
+
+#[test]
 fn a_carried_thing_takes_along_what_stands_on_it() {
     let plate = object("plate", "Plate_1", [0.0, -20.0, 0.0], [0.0; 3]);
     let mut document: Value = plate;

@@ -25,6 +25,8 @@ use crate::{
 
 /// Yaws that AI2-THOR tries at a point.
 const NUM_YAWS: usize = 4;
+/// Largest number of points tried on a receptacle after the first; AI2-THOR's default is 5.
+const MAX_ATTEMPTS: usize = 1000;
 
 /// Parameters of a random spawn. The names are those of AI2-THOR's parameters in snake case.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -63,8 +65,11 @@ impl SpawnRequest {
     /// # Errors
     /// [`Error::InvalidArgument`] saying what is malformed, and where.
     pub fn from_json(json: &str) -> Result<Self, Error> {
-        serde_json::from_str(json)
-            .map_err(|error| Error::invalid("request", error, "a SpawnRequest"))
+        let found: Self = serde_json::from_str(json)
+            .map_err(|error| Error::invalid("request", error, "a SpawnRequest"))?;
+        let is_count = |num: usize| num <= MAX_ATTEMPTS;
+        Error::require("num_attempts", found.num_attempts, "at most 1000", is_count)?;
+        Ok(found)
     }
 }
 

@@ -32,18 +32,6 @@ impl Node {
         let [a, b] = self.normals.map(|n| n[0] * leg[0] + n[1] * leg[1]);
         a.min(b) <= TANGENT_SLACK_M && a.max(b) >= -TANGENT_SLACK_M
     }
-
-    /// Return whether a path from `before_m` over this node to `after_m` bends towards the
-    /// obstacle.
-    pub(super) fn is_taut(&self, before_m: Vec2, after_m: Vec2) -> bool {
-        let cross = |a: Vec2, b: Vec2| a[0] * b[1] - a[1] * b[0];
-        let [a, b] = self.normals;
-        let [x, z] = self.point_m;
-        let (arrive, leave) =
-            ([x - before_m[0], z - before_m[1]], [after_m[0] - x, after_m[1] - z]);
-        let side = cross([a[0] + b[0], a[1] + b[1]], arrive).signum();
-        side * cross(arrive, leave) >= -TANGENT_SLACK_M * (arrive[0].abs() + arrive[1].abs())
-    }
 }
 
 /// Return the free corners of the polygon of tangents around an obstacle's grown outline.

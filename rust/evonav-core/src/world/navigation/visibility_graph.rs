@@ -176,48 +176,13 @@ impl VisibilityGraph {
         if obstacles.is_clear_between(*start_m, target_m) {
             return distance_2d_m(*start_m, target_m);
         }
-        self.last_leg(obstacles, search, *start_m, target_m)
-    }
-
-    /// Return the smallest cost to a target over the nodes that see it, given the costs to all
-    /// nodes.
-    fn last_leg(
-        &self,
-        obstacles: &Obstacles,
-        search: &Search,
-        start_m: Vec2,
-        target_m: Vec2,
-    ) -> f64 {
-        let parent_m = |i: usize| match search.parents[i] {
-            START => start_m,
-            parent => self.nodes[parent as usize].point_m,
-        };
-        // A shortest path bends around the corner that it touches. Where corners are so close that
-        // some of their nodes are not free, only other paths may remain.
-        let bends = |i: usize, node: &Node| node.is_taut(parent_m(i), target_m);
-        let taut_m = self.last_leg_over(obstacles, search, target_m, bends);
-        if taut_m.is_finite() {
-            return taut_m;
-        }
-        self.last_leg_over(obstacles, search, target_m, |_, _| true)
-    }
-
-    fn last_leg_over(
-        &self,
-        obstacles: &Obstacles,
-        search: &Search,
-        target_m: Vec2,
-        is_taken: impl Fn(usize, &Node) -> bool,
-    ) -> f64 {
         let leads_to_target = Self::leads_to(obstacles, target_m);
         let to_open = |(i, node): (usize, &Node)| {
             let cost_m = search.cost_m[i];
             let bound_m = cost_m + distance_2d_m(node.point_m, target_m);
             Open { bound_m, cost_m, node: i as u32, parent: START }
         };
-        let is_open = |&(i, node): &(usize, &Node)| {
-            search.is_closed[i] && leads_to_target(node) && is_taken(i, node)
-        };
+        let is_open = |&(i, node): &(usize, &Node)| search.is_closed[i] && leads_to_target(node);
         let mut open: BinaryHeap<Open> =
             self.nodes.iter().enumerate().filter(is_open).map(to_open).collect();
         while let Some(Open { bound_m, node, .. }) = open.pop() {
