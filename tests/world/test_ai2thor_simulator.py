@@ -24,6 +24,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
+from evonav.parallel.folders import LOCK_NAME
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from evonav.world import ai2thor
@@ -252,7 +253,9 @@ def test_nothing_outlives_an_evaluation_that_is_killed(tmp_path: Path, number: i
         while any(is_alive(pid) for pid in family):
             assert time.monotonic() < deadline_s
             time.sleep(0.05)
-        assert not list(temporary.iterdir())
+        left = [file for file in temporary.rglob("*") if file.is_file()]
+        assert all(file.name == LOCK_NAME for file in left)  # of the agents' folder, which the next run deletes
+        assert number == signal.SIGKILL or not left
     finally:
         evonav.kill()
         evonav.wait()
