@@ -20,6 +20,7 @@ from evonav.evaluation.run.run import NAMES_KEY, SHIFT_KEY, RunConfig, evaluate
 from evonav.replay.replay import RunReplay
 from evonav.submission.file import SubmissionFile
 from evonav.submission.pack import pack
+from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
@@ -200,6 +201,7 @@ def test_a_packed_run_is_verified_by_its_actions(bundled, tmp_path):
     assert [check.name for check in verdict.checks][-1] == "actions"
     with SubmissionFile(tmp_path / "run.zip") as file:
         assert file.header.config[SHIFT_KEY] is True
+        assert packed_setup(file.header).isolation.endswith("shifted coordinates")
 
 
 def test_what_a_shift_leads_out_of_range_costs_the_stage(bundled, tmp_path):
