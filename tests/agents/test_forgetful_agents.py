@@ -12,7 +12,18 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import check_agent_name
 
-FORGETFUL = ("fu", "stage-reset", "ftu", "ftu-relook", "3d-mem", "3d-mem+", "msgnav", "msgnav+")
+FORGETFUL = (
+    "fu",
+    "stage-reset",
+    "ftu",
+    "ftu-relook",
+    "ftu-identity",
+    "ftu-early-stop",
+    "3d-mem",
+    "3d-mem+",
+    "msgnav",
+    "msgnav+",
+)
 
 
 def test_agents_with_object_entries_of_ours_take_a_rule() -> None:

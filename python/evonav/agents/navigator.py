@@ -139,6 +139,11 @@ class Navigator:
         is_done = observation.has_arrived or not observation.is_action_success
         return self.target if is_done else None
 
+    def is_detected(self, entry_id: int) -> bool:
+        """Return whether a view of the last round detects an entry."""
+        seen = (one.entry_id for view in self.round_views for one in view.seen)
+        return any(one is not None and self.views.resolve(one) == entry_id for one in seen)
+
     def observation_point(self, centre_m: Point2) -> Point2 | None:
         """Return where to stand to look at a place; `None` if the map knows no free floor around it."""
         occupancy = self.explorer.map

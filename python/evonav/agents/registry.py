@@ -34,6 +34,14 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.frontier_update.fail_then_update:FailThenUpdateRelook",
         "Fail-then-Update with a second look from another side",
     ),
+    "ftu-identity": (
+        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateIdentity",
+        "Fail-then-Update that sets aside what contradicts the goal",
+    ),
+    "ftu-early-stop": (
+        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateEarlyStop",
+        "Fail-then-Update that stops 1.8 m from its target",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

@@ -64,6 +64,7 @@ class FrontierUpdate(NavigatorAgent):
         if reached is not None and self._stops_at_sight_of_place():
             return self._stop("arrived", reached.entry_id)
         navigator.observe(observation)
+        reached = reached or self._in_reach(observation)
         if reached is not None:
             navigator.target = None
             action = self._act_at_place(navigator.views.resolve(reached.entry_id), observation)
@@ -77,6 +78,10 @@ class FrontierUpdate(NavigatorAgent):
     def _stops_at_sight_of_place(self) -> bool:
         """Return whether arriving at an entry's place ends the stage without another look."""
         return True
+
+    def _in_reach(self, observation: Observation) -> Target | None:
+        """Return the committed target if the agent need not go any nearer, though it has not reached its place."""
+        return None
 
     def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
         """Act at the reached place of an entry, after a look; `None` to decide anew."""

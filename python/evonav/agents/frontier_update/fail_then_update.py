@@ -7,10 +7,10 @@ from typing import Literal
 
 from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
+from evonav.agents.frontier_update.questions import IdentityQuestion, Sighting, VerifyQuestion
 from evonav.agents.frontier_update.relook import FirstLook, RelookConfig, place_from_another_side
 from evonav.agents.navigator import Target
-from evonav.decision.candidates import Pixels, Point3
+from evonav.decision.candidates import Pixels, Point2, Point3
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence
@@ -18,6 +18,8 @@ from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 
+EARLY_STOP_M = 1.8
+"""Distance of `ftu-early-stop`: a little less than the success radius of 2.0 m, since boxes of parts are off-centre."""
 SAME_PLACE_M = 0.5
 """An entry whose middle is this near that of a rejected one with its label counts as the same."""
 
@@ -37,6 +39,16 @@ class FailThenUpdateConfig(FrontierUpdateConfig):
     """Conditions of a second look, from another side, before the question is asked; `None` for no such look.
 
     It is offered where neither detections nor depth tell whether the object is there, once an entry and stage."""
+    checks_identity: bool = False
+    """Whether an entry that is there, but contradicts the goal, is set aside for the stage in place of ending it.
+
+    Entries that were set aside come back when nothing else is left, or at `reserve_rounds`; then none is checked."""
+    reserve_rounds: int = 8
+    """Number of remaining rounds from which identity is no longer checked; as the text matcher's `hurry_rounds`."""
+    stop_within_m: float | None = None
+    """Distance to the middle of the chosen entry from which the agent asks at once, if a view of the round detects it.
+
+    `None`: it asks at the place to stand, 1.5 m from the middle."""
 
 
 class FailThenUpdate(FrontierUpdate):
@@ -46,6 +58,10 @@ class FailThenUpdate(FrontierUpdate):
         self._verification = config or FailThenUpdateConfig()
         super().__init__(self._verification, decision)
         self._rejected: list[tuple[int, str, Point3]] = []
+        self._set_aside: set[int] = set()
+        """Entries of this stage that are there, but contradict the goal."""
+        self._accepts_any = False
+        """Whether identity is no longer checked in this stage."""
         self._first_looks: list[FirstLook] = []
         """Looks of this stage that told nothing and led to a second one."""
 
@@ -53,6 +69,10 @@ class FailThenUpdate(FrontierUpdate):
         """Forget everything."""
         super().begin_task(task)
         self._counters.update(verifications=0, rejected_entries=0)
+        if self._verification.checks_identity:
+            self._counters.update(identity_checks=0, set_aside=0)
+        if self._verification.stop_within_m is not None:
+            self._counters.update(early_looks=0)
         if self._verification.relook is not None:
             self._counters.update(relooks=0, relooks_yes=0, relooks_no=0, relooks_unknown=0, relooks_without_place=0)
 
@@ -60,11 +80,23 @@ class FailThenUpdate(FrontierUpdate):
         """Take a new goal; entries rejected in the last stage are no longer in memory."""
         super().begin_stage(goal)
         self._rejected.clear()
+        self._set_aside.clear()
+        self._accepts_any = False
         self._first_looks.clear()
         self._details = {}
 
     def _stops_at_sight_of_place(self) -> bool:
         return False
+
+    def _in_reach(self, observation: Observation) -> Target | None:
+        """Return the committed target if it is near and this round's views detect it."""
+        target, within_m = self._navigator.target, self._verification.stop_within_m
+        if target is None or within_m is None or math.dist(target.centre_m, _here(observation)) >= within_m:
+            return None
+        if not self._navigator.is_detected(target.entry_id):
+            return None
+        self._counters["early_looks"] += 1
+        return target
 
     def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
         navigator = self._navigator
@@ -84,10 +116,49 @@ class FailThenUpdate(FrontierUpdate):
         if first_look is not None:
             outcome = "no" if not is_present else "unknown" if presence is Presence.UNKNOWN else "yes"
             self._counters[f"relooks_{outcome}"] += 1
-        if is_present:
-            return self._stop("verified", entry_id)
-        self._reject(entry)
-        return None
+        if not is_present:
+            self._reject(entry)
+            return None
+        if self._verification.checks_identity and not self._may_be_goal(entry, observation):
+            self._counters["set_aside"] += 1
+            self._set_aside.add(entry_id)
+            self._details = {**self._details, "set_aside": sorted(self._set_aside)}
+            return None
+        return self._stop("verified", entry_id)
+
+    def _may_be_goal(self, entry: ObjectEntry, observation: Observation) -> bool:
+        """Return whether an entry does not contradict the goal, or the agent has no time for another one."""
+        if self._accepts_any or observation.num_rounds_left <= self._verification.reserve_rounds:
+            return True
+        navigator = self._navigator
+        self._counters["identity_checks"] += 1
+        remembered = navigator.candidate(entry)
+        answer = self._queries.ask(
+            IdentityQuestion(
+                goal=self._goal,
+                entry=navigator.with_images(remembered) if self._shows_images else remembered,
+                surroundings=[navigator.candidate(one) for one in navigator.objects.entries],
+            )
+        )
+        return answer is not False
+
+    def _decide(self, observation: Observation) -> AgentAction:
+        """Decide as Frontier-Update does; take entries back that were set aside if nothing else is left."""
+        if self._set_aside and not self._is_anything_left(observation):
+            self._set_aside.clear()
+            self._accepts_any = True
+        return super()._decide(observation)
+
+    def _is_anything_left(self, observation: Observation) -> bool:
+        """Return whether there is time, and a frontier or another entry with the goal's name."""
+        if observation.num_rounds_left <= self._verification.reserve_rounds:
+            return False
+        navigator = self._navigator
+        goal = self._matcher.parsed(self._goal)
+        return bool(navigator.explorer.frontiers) or any(
+            self._is_offered(entry) and self._matcher.names_goal(goal, navigator.candidate(entry))
+            for entry in navigator.objects.entries
+        )
 
     def _verify_question(
         self, entry: ObjectEntry, observation: Observation, first_look: FirstLook | None
@@ -158,7 +229,7 @@ class FailThenUpdate(FrontierUpdate):
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
         limit = self._verification.hide_after_rejections
-        is_offered = super()._is_offered(entry)
+        is_offered = super()._is_offered(entry) and not self._is_set_aside(entry)
         if limit is None or not is_offered:
             return is_offered
         times = sum(
@@ -167,9 +238,30 @@ class FailThenUpdate(FrontierUpdate):
         )
         return times < limit
 
+    def _is_set_aside(self, entry: ObjectEntry) -> bool:
+        return any(self._navigator.views.resolve(entry_id) == entry.id for entry_id in self._set_aside)
+
 
 class FailThenUpdateRelook(FailThenUpdate):
     """Fail-then-Update that looks once more, from another side, where its look on arrival does not tell."""
 
     def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         super().__init__(config or FailThenUpdateConfig(relook=RelookConfig()), decision)
+
+
+class FailThenUpdateIdentity(FailThenUpdate):
+    """Fail-then-Update that does not stop at an object that contradicts the goal."""
+
+    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
+        super().__init__(config or FailThenUpdateConfig(checks_identity=True), decision)
+
+
+class FailThenUpdateEarlyStop(FailThenUpdate):
+    """Fail-then-Update that stops as soon as it is near enough to an object that it sees."""
+
+    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
+        super().__init__(config or FailThenUpdateConfig(stop_within_m=EARLY_STOP_M), decision)
+
+
+def _here(observation: Observation) -> Point2:
+    return (observation.pose.x_m, observation.pose.z_m)

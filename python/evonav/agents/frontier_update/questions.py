@@ -159,3 +159,39 @@ class VerifyQuestion(YesNoQuestion):
         """Return whether a detection may be of the remembered object."""
         is_here = seen.overlap > matcher.config.min_overlap or seen.distance_m < matcher.config.same_place_m
         return is_here and canonical(seen.label) == canonical(self.entry.label)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityQuestion(YesNoQuestion):
+    """Ask whether a remembered object may be the goal, or its surroundings contradict the description."""
+
+    kind: ClassVar[str] = "identity"
+    goal: Goal
+    entry: ObjectCandidate
+    surroundings: Sequence[ObjectCandidate]
+    """Everything remembered, the object too. Not part of the prompt."""
+
+    def prompt(self) -> Prompt:
+        """Show the crop of the object, and the view in which it was last seen."""
+        return goal_prompt(
+            self.goal,
+            (f"The robot stands before this object: {self.entry.label}", self.entry.crop),
+            ("The view in which it was last seen:", self.entry.view),
+            'May it be the goal? There may be others of its kind. Answer on the first line with exactly "yes", or '
+            'with "no" if its looks or what is around it contradict the description; give your reason on the second.',
+        )
+
+    def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
+        """Answer no if another object of the goal's kind would fit the description better than this one does.
+
+        Objects of another kind are not compared: an agent goes to one only when nothing else is left.
+        """
+        goal = matcher.parsed(self.goal)
+        named = [one for one in self.surroundings if matcher.names_goal(goal, one)]
+        index = next((i for i, one in enumerate(named) if one.entry_id == self.entry.entry_id), None)
+        if index is None:
+            return True, f"{self.entry.label} is no {goal.noun}: there is nothing to compare"
+        appearance = matcher.appearance_ratios(goal, named)[index]
+        context = matcher.context_ratios(goal, named, self.surroundings)[index]
+        reason = f"appearance {appearance:.2g} and surroundings {context:.2g} times as likely for the goal"
+        return appearance * context >= 1.0, reason

@@ -115,14 +115,34 @@ class AppearanceMatcher(Matcher):
             around: Everything remembered; of it, only what an object's own views show counts.
             unseen_m2: Area that the map does not know.
         """
-        rules = (self._colour_ratio, self._form_ratio, self._picture_ratio)
-        ratios = [math.prod(rule(goal, one) for rule in rules) for one in named]
-        for relation in goal.relations:
-            for index, ratio in enumerate(self._relation_ratios(relation, named, around)):
-                ratios[index] *= ratio
+        ratios = self._times_relations(self.appearance_ratios(goal, named), goal, named, around)
         unseen = PER_100_M2.get(goal.noun, UNKNOWN_PER_100_M2) * unseen_m2 / 100.0
         total = math.fsum(ratios) + unseen
         return [ratio / total for ratio in ratios]
+
+    def appearance_ratios(self, goal: ParsedGoal, named: Sequence[ObjectCandidate]) -> list[float]:
+        """Return the ratios of colours, size, form and picture together."""
+        rules = (self._colour_ratio, self._form_ratio, self._picture_ratio)
+        return [math.prod(rule(goal, one) for rule in rules) for one in named]
+
+    def context_ratios(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate]
+    ) -> list[float]:
+        """Return the ratios of all relations together."""
+        return self._times_relations([1.0] * len(named), goal, named, around)
+
+    def _times_relations(
+        self,
+        ratios: list[float],
+        goal: ParsedGoal,
+        named: Sequence[ObjectCandidate],
+        around: Sequence[ObjectCandidate],
+    ) -> list[float]:
+        """Return the ratios of objects, each times those of their relations."""
+        for relation in goal.relations:
+            each = self._relation_ratios(relation, named, around)
+            ratios = [ratio * factor for ratio, factor in zip(ratios, each, strict=True)]
+        return ratios
 
     def _colour_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
         """Return the ratio of the named colours; 1 if none is named, or none was seen."""

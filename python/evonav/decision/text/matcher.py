@@ -72,6 +72,12 @@ class TextMatchConfig:
     """Verification: centres this near are the same place."""
     min_overlap: float = 0.2
     """Verification: or this share of the object's points lies by the remembered object's points."""
+    violated_fixed: float = 0.1
+    """Identity: factor for a violated relation to what does not move: the room, a doorway, a window."""
+    violated_movable: float = 0.4
+    """Identity: factor for a violated relation to a support or a neighbour."""
+    chance_fit: float = 0.2
+    """Identity: probability that a description fits a place of which nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +144,41 @@ class Matcher:
         """Return how well each object with the goal's name fits, from 0 to 1; for the arguments see `best`."""
         return [self.relation_share(goal, candidate, around) for candidate in named]
 
+    def appearance_ratios(self, goal: ParsedGoal, named: Sequence[ObjectCandidate]) -> list[float]:
+        """Return how much likelier the appearance of each object is for the goal than for another of its type.
+
+        Its appearance stays when an object moves. Rules that only read see none, so all ratios are 1.
+        """
+        return [1.0] * len(named)
+
+    def context_ratios(
+        self, goal: ParsedGoal, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate]
+    ) -> list[float]:
+        """Return how much likelier what is around each object is for the goal than for an object at an unknown place.
+
+        Below 1 the surroundings contradict the description. The sentence describes the home as it is now, so they do
+        so for another object, and for the right one at a place where it no longer is.
+        """
+        config = self.config
+        fixed = {relation for relation in goal.relations if relation.kind == "in" or is_structure(relation.noun)}
+        factors = {r: config.violated_fixed if r in fixed else config.violated_movable for r in goal.relations}
+        return [
+            math.prod(factors[relation] for relation in self._violated(goal, one, around)) / config.chance_fit
+            for one in named
+        ]
+
+    def _violated(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> list[Relation]:
+        """Return the relations that can be judged and do not hold."""
+        return [relation for relation in self._judged(goal, around) if self.holds(relation, entry, around) == 0.0]
+
+    def _judged(self, goal: ParsedGoal, around: Sequence[ObjectCandidate]) -> list[Relation]:
+        """Return the relations but for those to a doorway or a window if none is remembered."""
+        return [
+            relation
+            for relation in goal.relations
+            if not is_structure(relation.noun) or any(similarity(relation.noun, o.label) >= 1.0 for o in around)
+        ]
+
     def relation_share(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Return the share of the relations that hold, 1 if there is none.
 
@@ -145,11 +186,7 @@ class Matcher:
         Adjectives do not count: memory has no colours, and an object that is small for its kind may be the
         larger of two that are remembered.
         """
-        judged = [
-            self.holds(relation, entry, around)
-            for relation in goal.relations
-            if not is_structure(relation.noun) or any(similarity(relation.noun, o.label) >= 1.0 for o in around)
-        ]
+        judged = [self.holds(relation, entry, around) for relation in self._judged(goal, around)]
         return sum(judged) / len(judged) if judged else 1.0
 
     def holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
