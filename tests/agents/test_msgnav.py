@@ -257,6 +257,20 @@ def test_verification_sees_only_what_was_seen_before_the_arrival():
     assert first.num_views == 7 * min(5, verified[0])  # rounds before this one, which is number `verified[0]`
 
 
+def test_verification_may_also_see_what_the_place_itself_shows():
+    """Seven views more are shown on arrival; they are remembered once, as without, so the same answers lead the way."""
+    found = []
+    for looks in (False, True):
+        model = script(object_of("Fridge"), arrival="no")
+        agent = MsgNav(MsgNavConfig(looks_on_arrival=looks), model)
+        (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_rounds=10))
+        found.append((asked(model, "arrival")[0].num_views, record.trace))
+    (before, trace), (after, same_trace) = found
+    assert before < 35
+    assert after == before + 7
+    assert trace == same_trace
+
+
 def test_without_a_selection_the_choice_is_asked_among_what_is_in_view():
     model = script("Continue Exploration", subgraph="I do not know.")
     run(MsgNav(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=4))

@@ -122,6 +122,16 @@ def test_as_released_the_category_is_a_chair_after_ten_answers_that_name_none():
     assert record.trace[0].details["category"] == "chair"
 
 
+def test_a_category_may_be_declined_and_then_nothing_is_taken_for_the_goal():
+    agent = UniGoal(UniGoalConfig(graph=GraphConfig(may_decline=True)), scripted(category="none"))
+    (record,) = run(agent, stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_actions=40))
+    assert all(entry.details["category"] is None for entry in record.trace)
+    assert not record.has_stopped
+    agent = UniGoal(UniGoalConfig(graph=GraphConfig(may_decline=True)))
+    (record,) = run(agent, stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_actions=1))
+    assert record.trace[0].details["category"] == "bed"
+
+
 class ShySight(GroundTruthPerception):
     """Ground truth that loses the bed as soon as the camera is within 1.5 m of its edge."""
 

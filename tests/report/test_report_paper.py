@@ -93,9 +93,22 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     assert cells(order)["SR"] == {"Measure": "SR", "paper": "ftu > fu", "ours": "ftu > fu"}
     assert cells(order)["SR, stage 1"]["ours"] == "fu > ftu"
     (pair,) = differences.rows
-    assert pair[:2] == ("ftu minus fu", "+6.3")
+    assert pair[:2] == ("ftu minus fu", "+6.3 [-0.6, +13.2]")
     assert pair[2].startswith("+41.7 [")
-    assert pair[6:] == ("a tie at this n", "no")
+    assert pair[6:] == ("a tie at this n", "no", "no")
+
+
+def test_a_difference_may_be_in_the_papers_interval_while_the_papers_is_not_in_ours(tmp_path: Path) -> None:
+    tasks = [f"task-{number}" for number in range(60)]
+    records = [
+        stage_record(agent, task, 1, EndState.FAILURE if (agent, task) == ("fu", "task-7") else EndState.SUCCESS)
+        for agent in ("fu", "ftu")
+        for task in tasks
+    ]
+    run = load_run(record_run(tmp_path / "run", records, dict.fromkeys(tasks, 1), ["fu", "ftu"]))
+    (pair,) = paper.paper_tables(run)[-1].rows
+    assert pair[2].startswith("+1.7 [+0.0, +")
+    assert pair[6:] == ("a tie at this n", "no", "yes")
 
 
 def test_moved_targets_are_split_by_how_far_they_moved(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evonav.statistics import percentile_interval, student_quantile, widened_tail, wilson
+from evonav.statistics import newcombe, percentile_interval, student_quantile, widened_tail, wilson
 
 
 def test_wilson_is_the_published_interval() -> None:
@@ -12,6 +12,14 @@ def test_wilson_is_the_published_interval() -> None:
     assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
     assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
     assert wilson(0, 0) is None
+
+
+def test_newcombe_is_the_published_interval_of_a_difference() -> None:
+    assert newcombe(48, 80, 56, 70) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+    assert newcombe(3, 10, 9, 10) == pytest.approx((0.1705, 0.8090), abs=5e-5)
+    assert newcombe(0, 10, 10, 10) == pytest.approx((0.6075, 1.0), abs=5e-5)
+    assert newcombe(0, 0, 3, 10) is None
+    assert newcombe(3, 10, 0, 0) is None
 
 
 @pytest.mark.parametrize(("num_degrees", "printed"), [(1, 12.706), (2, 4.303), (9, 2.262), (30, 2.042)])

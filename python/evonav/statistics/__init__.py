@@ -3,7 +3,7 @@
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate
 from evonav.statistics.counts import ChiSquare, chi_square, mcnemar
 from evonav.statistics.distributions import student_quantile
-from evonav.statistics.interval import Z_95, Interval, percentile_interval, widened_tail, wilson
+from evonav.statistics.interval import Z_95, Interval, newcombe, percentile_interval, widened_tail, wilson
 from evonav.statistics.paired import (
     DETECTABLE_Z,
     LEVEL,
@@ -35,6 +35,7 @@ __all__ = [
     "effective_size",
     "holm",
     "mcnemar",
+    "newcombe",
     "paired_effect",
     "paired_effects",
     "percentile_interval",

@@ -25,6 +25,19 @@ def wilson(num_successes: float, n: float) -> Interval | None:
     return (max(0.0, centre - half), min(1.0, centre + half))
 
 
+def newcombe(num_a: int, n_a: int, num_b: int, n_b: int) -> Interval | None:
+    """Return Newcombe's 95% interval of rate b minus rate a in independent samples, `None` if one has no trials.
+
+    Source: method 10 of Newcombe, "Interval estimation for the difference between independent proportions",
+    Statistics in Medicine 17, 1998.
+    """
+    a, b = wilson(num_a, n_a), wilson(num_b, n_b)
+    if a is None or b is None:
+        return None
+    p_a, p_b = num_a / n_a, num_b / n_b
+    return (p_b - p_a - math.hypot(p_b - b[0], a[1] - p_a), p_b - p_a + math.hypot(b[1] - p_b, p_a - a[0]))
+
+
 def percentile_interval(resampled: NDArray[np.float64], num_clusters: int) -> Interval | None:
     """Return the 95% interval of a statistic from its values in resamples.
 

@@ -53,6 +53,8 @@ class MsgNavConfig:
     """Number of last rounds whose views are shown on arrival..."""
     arrival_views: int = 35
     """...and the largest number of these views."""
+    looks_on_arrival: bool = False
+    """The views from the place itself are among them; the original asks before it takes them."""
     num_tries: int = 3
     """Number of tries before a question without a valid answer counts as failed."""
 
@@ -115,10 +117,15 @@ class MsgNav(NavigatorAgent):
         self._queries.begin_round()
         self._candidates = ()
         is_over = observation.has_arrived or not observation.is_action_success
-        # The original asks right after the move: it shows what was seen on the way, and not from the place itself.
-        arrival = self._arrival_question(self._target, observation) if self._target is not None and is_over else None
-        self._memory.observe(observation)
+        looks_first = self.config.looks_on_arrival
+        if looks_first:
+            self._memory.observe(observation)
         target = self._followed()
+        # The original asks right after the move: it shows what was seen on the way, and not from the place itself.
+        arrival = self._arrival_question(target, observation) if target is not None and is_over else None
+        if not looks_first:
+            self._memory.observe(observation)
+            target = self._followed()
         if target is not None and arrival is not None:
             self._target = None
             self._counters["verifications"] += 1

@@ -61,6 +61,8 @@ class GraphConfig:
     """Number of tries before the whole graph is the only subgraph."""
     num_category_tries: int = 10
     """Number of tries before the category is a chair, as released."""
+    may_decline: bool = False
+    """The category may be `none` in `code`, too: then no detection is taken for the goal."""
     correction_hops: int = 2
     correction_reach_m: float = 2.0
     """Longest edge of a hop: every two nodes are joined, so two hops without a limit would be the whole house."""
@@ -124,10 +126,12 @@ class GraphReasoner:
 
     def _category(self, text: str, target: str) -> str | None:
         """Return what the detector looks for; as released, it is always one of six categories."""
-        if self.config.mode == "code":
-            question = CategoryQuestion(self._goal, text, target, CODE_CATEGORIES, may_decline=False)
+        is_released = self.config.mode == "code"
+        categories = CODE_CATEGORIES if is_released else MAP_CATEGORIES
+        if is_released and not self.config.may_decline:
+            question = CategoryQuestion(self._goal, text, target, categories, may_decline=False)
             return self._queries.ask(question, self.config.num_category_tries) or FALLBACK_CATEGORY
-        category = self._queries.ask(CategoryQuestion(self._goal, text, target, MAP_CATEGORIES, may_decline=True))
+        category = self._queries.ask(CategoryQuestion(self._goal, text, target, categories, may_decline=True))
         return None if category == NO_CATEGORY else category
 
     def observe(self, view: View) -> None:

@@ -16,7 +16,7 @@ from evonav.evaluation.records.schema import StageRecord
 from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
-from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
+from evonav.statistics import DETECTABLE_Z, Z_95, Interval, newcombe, power, wilson
 
 Perception = Literal["gt", "prediction"]
 
@@ -65,6 +65,10 @@ PAPER: dict[Perception, dict[str, PaperResult]] = {
     },
 }
 _PAPER_NOTE = "Paper: Wilson's 95% interval of its counts, as if its stages were independent."
+_PAPER_DIFFERENCE_NOTE = (
+    "Paper: Newcombe's 95% interval of its counts, as if its agents and stages were independent. Its agents had the "
+    "same stages, but it does not publish pairs; with them its intervals would be narrower for agents that are alike."
+)
 _OURS_NOTE = f"Ours: {INTERVALS}"
 
 
@@ -229,32 +233,43 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
     for pair in pairs:
         if pair.a not in paper or pair.b not in paper:
             continue
-        theirs = paper[pair.b].sr() - paper[pair.a].sr()
-        ends = pair.sr.ci95
+        a, b = paper[pair.a], paper[pair.b]
+        theirs = b.sr() - a.sr()
+        their_ends = newcombe(a.num_all, NUM_STAGES["all"], b.num_all, NUM_STAGES["all"])
         rows.append(
             (
                 f"{pair.b} minus {pair.a}",
-                f"{100 * theirs:+.1f}",
+                f"{100 * theirs:+.1f}{_ends(their_ends)}",
                 points(pair.sr),
                 p_words(pair.sr.adjusted_p),
                 points(pair.spl),
                 str(pair.n),
                 verdict_words(pair.a, pair.b, pair.sr),
-                NONE if ends is None else "yes" if ends[0] <= theirs <= ends[1] else "no",
+                _is_in(theirs, pair.sr.ci95),
+                _is_in(pair.sr.difference, their_ends),
             )
         )
     columns = (
         "Agents",
-        "SR, paper",
+        "SR, paper [95% CI]",
         "SR, ours [95% CI]",
         p_heading(len(pairs)),
         "SPL, ours [95% CI]",
         "n",
         "ours says",
         "paper's in our interval",
+        "ours in the paper's interval",
     )
-    note = f"Percentage points, on the stages that both scored. {INTERVALS} {VERDICTS}"
-    return Table("Differences between agents", columns, tuple(rows), (note,))
+    notes = (f"Percentage points, on the stages that both scored. {INTERVALS} {VERDICTS}", _PAPER_DIFFERENCE_NOTE)
+    return Table("Differences between agents", columns, tuple(rows), notes)
+
+
+def _ends(interval: Interval | None) -> str:
+    return "" if interval is None else f" [{100 * interval[0]:+.1f}, {100 * interval[1]:+.1f}]"
+
+
+def _is_in(value: float, interval: Interval | None) -> str:
+    return NONE if interval is None else "yes" if interval[0] <= value <= interval[1] else "no"
 
 
 def _theirs(known: PaperResult | None, split: str = "all") -> str:
