@@ -4,7 +4,7 @@ Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCand
 from evonav.decision.text.language import canonical
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig, forgetting
 from evonav.memory.colours import Layout
-from evonav.memory.objects import ObjectEntry
+from evonav.memory.objects import ObjectEntry, ObjectUpdate
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
 from evonav.sensors.observation import MapFrame, Observation, View
@@ -76,6 +76,8 @@ class Navigator:
         self.objects = ObjectMap(config.objects)
         self._forgetting = forgetting.make(config.forgetting)
         self.views = ViewStore(names_colours=names_colours, keeps_layouts=keeps_layouts)
+        self.observers: list[Callable[[ObjectMap, View, ObjectUpdate], None]] = []
+        """Functions that are called after the object map has taken in a view, before anything is forgotten."""
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
         """Views of the last round, the heading view last."""
@@ -109,6 +111,8 @@ class Navigator:
             update = self.objects.update(view)
             self.views.follow(update.merged)
             self.round_views.append(self.views.add(view, update.entry_ids, stage=self.stage, round_=self.round))
+            for observer in self.observers:
+                observer(self.objects, view, update)
             self._follow(update.removed)
             self._follow(self._forgetting.after_update(self.objects, view, update, self._time_s))
         is_outdated = self.explorer.observe(observation)

@@ -42,6 +42,18 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.frontier_update.fail_then_update:FailThenUpdateEarlyStop",
         "Fail-then-Update that stops 1.8 m from its target",
     ),
+    "pro": (
+        "evonav.agents.proactive.agent:Proactive",
+        "Belief-Weighted Search: goes where most of its posterior is found a metre",
+    ),
+    "pro-blind": (
+        "evonav.agents.proactive.agent:ProactiveBlind",
+        "Belief-Weighted Search that knows nothing of how homes change",
+    ),
+    "pro-oracle-theta": (
+        "evonav.agents.proactive.agent:ProactiveOracleTheta",
+        "Belief-Weighted Search that knows the probabilities of changes",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

@@ -119,7 +119,7 @@ class Matcher:
 
     def may_help(self, goal: ParsedGoal, label: str) -> bool:
         """Return whether a label is the goal's, or of something that is near it or in the same type of room."""
-        sign_of = _ROOM_OF_SIGN.get(canonical(label))
+        sign_of = self.sign_of(label)
         return self.label_score(goal, label) > 0.0 or (sign_of is not None and sign_of == goal.room)
 
     def best(
@@ -213,9 +213,13 @@ class Matcher:
         """Return the type of room that nearby objects indicate, the nearer the more; `None` if none does."""
         return self.room_of_signs(place_m, self.room_signs(around))
 
+    def sign_of(self, label: str) -> str | None:
+        """Return the type of room that an object indicates, if it does."""
+        return _ROOM_OF_SIGN.get(canonical(label))
+
     def room_signs(self, around: Sequence[ObjectCandidate]) -> list[tuple[str, Point2]]:
         """Return the objects that indicate a type of room: that room, and where they stand."""
-        rooms = ((_ROOM_OF_SIGN.get(canonical(other.label)), other) for other in around)
+        rooms = ((self.sign_of(other.label), other) for other in around)
         return [(room, other.ground_m) for room, other in rooms if room is not None]
 
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
@@ -274,3 +278,13 @@ class TextMatch:
         """
         answer, reason = question.by_rule(self.matcher)
         return Reply(answer, f"{question.answer_text(answer)}\n{reason}")
+
+
+def matcher_of(model: object) -> Matcher:
+    """Return the matcher of a model that answers by rules, also if it is wrapped; else one that only reads."""
+    while model is not None:
+        matcher = getattr(model, "matcher", None)
+        if isinstance(matcher, Matcher):
+            return matcher
+        model = getattr(model, "model", None)
+    return Matcher()

@@ -1,0 +1,79 @@
+"""Parameters of Belief-Weighted Search, each part of which can be switched off."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
+from evonav.agents.navigator import NavigatorConfig
+from evonav.agents.proactive.priors import BLIND, FITTED, ORACLE_THETA, ChangePrior
+
+PriorName = Literal["blind", "fitted", "oracle-theta"]
+PRIORS: dict[PriorName, ChangePrior] = {"blind": BLIND, "fitted": FITTED, "oracle-theta": ORACLE_THETA}
+
+
+@dataclass(frozen=True, slots=True)
+class ProactiveConfig:
+    """Parts, and numbers of the rules. All numbers are ours."""
+
+    prior: PriorName = "fitted"
+    """Name of the expectations of changes before any was seen."""
+
+    uses_text: bool = True
+    """Weigh entries by how well the goal's text fits what is around them; else all namesakes weigh alike."""
+    checks_identity: bool = True
+    """Ask before a stop whether the object contradicts the goal."""
+    sees_through: bool = True
+    """Lower the belief in entries whose places are seen empty, wherever the agent goes."""
+    uses_rooms: bool = True
+    """Let evidence in a room raise or lower the belief that this room changed, and with it its other entries."""
+    explains_away: bool = True
+    """Let proof that one room changed raise the trust in all others."""
+    searches_rooms: bool = True
+    """Believe that an object that is not at its place is still in its room."""
+    expects_change: bool = True
+    """Lower the belief in all entries at each stage, before any evidence."""
+    uses_anchors: bool = True
+    """Look first near what the goal's text names."""
+    weighs_rooms: bool = True
+    """Look first in rooms of the type that the text names, or where the category is frequent."""
+    gates_sectors: bool = True
+    """Count looks from one side of a place once a stage: they are not independent."""
+    keeps_reserve: bool = True
+    """Go to the best entry while there are rounds enough to reach it."""
+    keeps_choice: bool = True
+    """Change the way only for another one that is clearly better."""
+
+    commit_share: float = 0.5
+    """Share of the posterior from which an entry is gone to, whatever else is near."""
+    near_m: float = 1.0
+    """Added to every way: nothing is for free."""
+    keep: float = 0.15
+    """Share by which another place must be better than the one to which the agent goes."""
+    stop_within_m: float = 1.8
+    """Distance from the middle of a detected entry at which the agent stops."""
+    unfit: float = 0.1
+    """Factor of an entry whose identity was denied, for the rest of the stage."""
+    reserve_rounds: int = 3
+    """Rounds that are kept beyond those that the way to the best entry takes."""
+    search_radius_m: float = 2.5
+    """Distance within which a place to stand shows the floor and the furniture around it."""
+    detection_range_m: float = 3.5
+    """Distance within which cells count as seen; detections farther away are not remembered."""
+    detection_rate: float = 0.9
+    """Probability that a view finds an object in a cell that it shows."""
+    small_detection_rate: float = 0.7
+    """The same for objects smaller than `small_edge_m`."""
+    small_edge_m: float = 0.25
+    """Edge of the cube with an object's volume below which it is small."""
+    anchor_ratio: float = 4.0
+    """Factor of places by what the text names."""
+    anchor_m: float = 0.75
+    """Distance from the box of such a thing within which places are by it."""
+    room_ratio: float = 4.0
+    """Factor of a room of the type that the text names; its inverse is that of rooms of other types."""
+    revisit: float = 0.3
+    """Factor of a place to search from for each time that the agent stood within half a metre of it."""
+    num_places: int = 64
+    """Largest number of places to search from that are compared."""
+    navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS))
+    """Parameters of the shared navigator: the map is never cleared, and the last observation of a cell wins."""

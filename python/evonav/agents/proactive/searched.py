@@ -1,0 +1,111 @@
+"""Cells of the floor, and what the views of a stage, and of all stages, would have shown if it were there."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.proactive.config import ProactiveConfig
+from evonav.agents.proactive.presence import NUM_SECTORS
+from evonav.sensors.observation import MapFrame, View
+from evonav.world.camera import unproject
+from evonav.world.simulator import Intrinsics
+
+CELL_M = 0.25
+"""Wanted edge of a cell, which is a whole number of the map's cells."""
+STRIDES = (5, 3)
+"""Every fifth pixel of every fifth row is looked at, if the size of the image allows it; else every third, or all."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseFrame:
+    """A grid of coarser cells over a map."""
+
+    frame: MapFrame
+    step: int
+    """Number of the map's cells along the edge of a coarse one."""
+
+    @classmethod
+    def over(cls, frame: MapFrame) -> "CoarseFrame":
+        """Return the grid over a map."""
+        step = max(1, round(CELL_M / frame.cell_m))
+        return cls(
+            MapFrame(math.ceil(frame.rows / step), math.ceil(frame.cols / step), frame.cell_m * step, frame.corner_m),
+            step,
+        )
+
+    def taken(self, cells: NDArray[np.generic], rest: int) -> NDArray[np.generic]:
+        """Return `(R, C, step * step)` blocks of a map's cells; `rest` stands beyond its edges."""
+        rows, cols, step = self.frame.rows, self.frame.cols, self.step
+        missing = (rows * step - cells.shape[0], cols * step - cells.shape[1])
+        padded = np.pad(cells, ((0, missing[0]), (0, missing[1])), constant_values=rest)
+        return padded.reshape(rows, step, cols, step).transpose(0, 2, 1, 3).reshape(rows, cols, step * step)
+
+    def centres_m(self) -> NDArray[np.float64]:
+        """Return the `(R, C, 2)` middles of the cells, `(x, z)`."""
+        frame = self.frame
+        x_m = frame.corner_m[0] + (np.arange(frame.cols) + 0.5) * frame.cell_m
+        z_m = frame.corner_m[1] + (np.arange(frame.rows) + 0.5) * frame.cell_m
+        return np.stack(np.meshgrid(x_m, z_m), axis=-1)
+
+
+class SearchedCells:
+    """Probabilities that a target at each cell would not have been detected."""
+
+    def __init__(self, frame: MapFrame, config: ProactiveConfig) -> None:
+        self._config = config
+        self.coarse = CoarseFrame.over(frame)
+        shape = (self.coarse.frame.rows, self.coarse.frame.cols)
+        self._rates = np.array([config.detection_rate, config.small_detection_rate])
+        self._ever = np.ones((2, *shape))
+        self._stage = np.ones((2, *shape))
+        self._sectors = np.zeros((NUM_SECTORS, *shape), np.bool_)
+
+    def begin_stage(self) -> None:
+        """Let things have moved to any place."""
+        self._stage[:] = 1.0
+        self._sectors[:] = False
+
+    def see(self, view: View) -> None:
+        """Take in the surfaces that a view shows."""
+        rows, cols = seen_cells(view, self.coarse.frame, self._config.detection_range_m)
+        frame = self.coarse.frame
+        dx_m = view.pose.x_m - (frame.corner_m[0] + (cols + 0.5) * frame.cell_m)
+        dz_m = view.pose.z_m - (frame.corner_m[1] + (rows + 0.5) * frame.cell_m)
+        sectors = (np.arctan2(dx_m, dz_m) % math.tau / math.tau * NUM_SECTORS).astype(int) % NUM_SECTORS
+        if self._config.gates_sectors:
+            is_new = ~self._sectors[sectors, rows, cols]
+            rows, cols, sectors = rows[is_new], cols[is_new], sectors[is_new]
+            self._sectors[sectors, rows, cols] = True
+        missed = 1.0 - self._rates[:, None]
+        self._stage[:, rows, cols] *= missed
+        self._ever[:, rows, cols] *= missed
+
+    def missed(self, *, is_small: bool) -> NDArray[np.float64]:
+        """Return `(R, C)`: the probability that this stage's views would have missed a target at a cell."""
+        found: NDArray[np.float64] = self._stage[int(is_small)]
+        return found
+
+    def ever_missed(self, *, is_small: bool) -> NDArray[np.float64]:
+        """Return `(R, C)`: the same for the views of all stages."""
+        found: NDArray[np.float64] = self._ever[int(is_small)]
+        return found
+
+
+def seen_cells(view: View, frame: MapFrame, range_m: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of the cells with a surface that a view shows within a distance on the ground plane."""
+    height_px, width_px = view.depth_m.shape
+    stride = next((s for s in STRIDES if height_px % s == 0 and width_px % s == 0), 1)
+    depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
+    coarse = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
+    points_m = unproject(depth_m, view.pose, coarse)[np.isfinite(depth_m)]
+    dx_m, dz_m = points_m[:, 0] - view.pose.x_m, points_m[:, 2] - view.pose.z_m
+    points_m = points_m[dx_m**2 + dz_m**2 <= range_m**2]
+    cols = np.floor((points_m[:, 0] - frame.corner_m[0]) / frame.cell_m).astype(np.int64)
+    rows = np.floor((points_m[:, 2] - frame.corner_m[1]) / frame.cell_m).astype(np.int64)
+    is_inside = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
+    flat = np.zeros(frame.rows * frame.cols, np.bool_)
+    flat[rows[is_inside] * frame.cols + cols[is_inside]] = True
+    found = np.flatnonzero(flat)
+    return found // frame.cols, found % frame.cols

@@ -1,0 +1,258 @@
+"""Belief-Weighted Search in the words of its rule: what it believes, and what it does with that."""
+
+import math
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scripted_model import scripted
+from toy_episode import rounds_of, run
+from toy_house import moved_table_stages, stage_case
+
+from evonav.agents.proactive.agent import Proactive, ProactiveBlind
+from evonav.agents.proactive.config import PRIORS, ProactiveConfig
+from evonav.agents.proactive.presence import PresenceBelief, _Entry
+from evonav.agents.proactive.rooms import NO_ROOM, eroded, grown, numbered, rooms_of
+from evonav.agents.proactive.search import Option, best_option
+from evonav.agents.proactive.searched import SearchedCells
+from evonav.agents.registry import agent_factory, new_agent
+from evonav.decision.candidates import ObjectCandidate
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.memory.occupancy import BLOCKED, FREE
+from evonav.sensors.observation import MapFrame
+from evonav.toml import tomllib
+
+FRAME = MapFrame(rows=60, cols=100, cell_m=0.1, corner_m=(0.0, 0.0))
+
+
+def two_rooms(door_cells):
+    """Two rooms side by side, 6 x 5 m each, with a doorway in the wall between them."""
+    cells = np.full((60, 100), FREE, np.uint8)
+    cells[:, 49:51] = BLOCKED
+    cells[30 : 30 + door_cells, 49:51] = FREE
+    return cells
+
+
+def test_rooms_are_cut_at_doorways_and_not_at_wide_openings():
+    cut = rooms_of(two_rooms(door_cells=10), FRAME, [])
+    assert set(np.unique(cut[:, :40])) == {0}
+    assert set(np.unique(cut[:, 60:])) == {1}
+    assert (cut[:30, 49:51] == NO_ROOM).all()  # a wall is in no room
+    open_ = rooms_of(two_rooms(door_cells=30), FRAME, [])
+    assert open_[10, 10] == open_[10, 90] != NO_ROOM
+
+
+def test_furniture_does_not_divide_a_room_but_a_shelf_on_the_wall_is_none():
+    cells = np.full((60, 100), FREE, np.uint8)
+    cells[8:, 48:52] = BLOCKED  # all but a gap of 0.8 m
+    table = ObjectCandidate(1, "DiningTable", (5.0, 0.4, 3.4), (0.4, 0.8, 5.2), 3)
+    divided, whole = rooms_of(cells, FRAME, []), rooms_of(cells, FRAME, [table])
+    on_wall = rooms_of(cells, FRAME, [replace(table, centre_m=(5.0, 1.4, 3.4))])
+    assert divided[30, 10] != divided[30, 90]
+    assert whole[30, 10] == whole[30, 90]
+    assert (on_wall == divided).all()
+
+
+def groups_naive(cells, min_cells):
+    """Flood fill, cell by cell."""
+    rooms, number = np.full(cells.shape, NO_ROOM, np.int32), 0
+    seen = np.zeros(cells.shape, bool)
+    for start in map(tuple, np.argwhere(cells)):
+        if seen[start]:
+            continue
+        group, seen[start] = [start], True
+        for row, col in group:
+            for after in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
+                is_inside = 0 <= after[0] < cells.shape[0] and 0 <= after[1] < cells.shape[1]
+                if is_inside and cells[after] and not seen[after]:
+                    seen[after] = True
+                    group.append(after)
+        if len(group) >= min_cells:
+            for cell in group:
+                rooms[cell] = number
+            number += 1
+    return rooms
+
+
+@given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([0.2, 0.55, 0.9]), min_cells=st.integers(1, 6))
+def test_groups_are_those_of_a_flood_fill(seed, share, min_cells):
+    cells = np.random.default_rng(seed).random((13, 17)) < share
+    assert (numbered(cells, min_cells) == groups_naive(cells, min_cells)).all()
+
+
+@given(seed=st.integers(0, 2**32 - 1), depth=st.integers(0, 3), steps=st.integers(0, 5))
+def test_erosion_and_growth_are_those_of_their_definitions(seed, depth, steps):
+    draws = np.random.default_rng(seed)
+    floor = draws.random((12, 15)) < 0.85
+    padded = np.pad(floor, depth)
+    naive = [[padded[r : r + 2 * depth + 1, c : c + 2 * depth + 1].all() for c in range(15)] for r in range(12)]
+    assert (eroded(floor, depth) == np.array(naive)).all()
+    seeds = np.where((draws.random((12, 15)) < 0.05) & floor, 1, NO_ROOM).astype(np.int32)
+    reached = {tuple(cell) for cell in np.argwhere(seeds == 1)}
+    for _ in range(steps):
+        reached |= {
+            (r + dr, c + dc)
+            for r, c in reached
+            for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0))
+            if 0 <= r + dr < 12 and 0 <= c + dc < 15 and floor[r + dr, c + dc]
+        }
+    assert {tuple(cell) for cell in np.argwhere(grown(seeds, floor, steps) == 1)} == reached
+
+
+def belief(rooms, evidence, **config):
+    """A belief in entries of rooms, after a transition, with evidence for and against some: id -> sign."""
+    presence = PresenceBelief(ProactiveConfig(**config))
+    presence._entries = {entry_id: _Entry(0.99, 1, present=0.99) for entry_id in rooms}
+    presence.begin_stage(2, rooms, frozenset(), NO_ROOM)
+    for entry_id, sign in evidence.items():
+        presence._entries[entry_id].evidence = 3.0 * sign
+    presence.update()
+    return presence
+
+
+ROOMS = {1: 0, 2: 0, 3: 0, 4: 0, 5: 1, 6: 1}
+
+
+def test_everything_is_doubted_at_a_transition_before_any_evidence():
+    presence = belief(ROOMS, {})
+    assert all(0.5 < presence.p_present(one) < 0.95 for one in ROOMS)
+    assert belief(ROOMS, {}, expects_change=False).p_present(1) == pytest.approx(0.99)
+
+
+def test_a_room_with_gone_objects_is_doubted_as_a_whole_and_trust_in_the_others_returns():
+    before, after = belief(ROOMS, {}), belief(ROOMS, {1: -1, 2: -1})
+    assert after.changed[0] > 0.95
+    assert after.p_present(3) < before.p_present(3) - 0.2
+    assert after.p_present(5) > before.p_present(5) + 0.05
+    assert belief(ROOMS, {1: -1, 2: -1}, uses_rooms=False).p_present(3) == pytest.approx(before.p_present(3))
+    kept = belief(ROOMS, {1: -1, 2: -1}, explains_away=False)
+    assert kept.p_present(5) == pytest.approx(before.p_present(5))
+
+
+def test_objects_that_are_where_they_were_raise_the_doubt_about_other_rooms():
+    before, after = belief(ROOMS, {}), belief(ROOMS, {1: 1, 2: 1, 3: 1})
+    assert after.changed[0] < 0.5 * before.changed[0]
+    assert after.p_present(4) > before.p_present(4)
+    assert after.p_present(5) < before.p_present(5)
+
+
+def test_the_room_of_the_agent_does_not_change():
+    presence = PresenceBelief(ProactiveConfig())
+    presence._entries = {one: _Entry(0.99, 1, present=0.99) for one in ROOMS}
+    presence.begin_stage(2, ROOMS, frozenset({0}), here=1)
+    assert presence.p_present(5) == pytest.approx(0.99)
+    assert presence.p_present(1) < 0.9
+
+
+def test_priors_are_probabilities():
+    for prior in PRIORS.values():
+        assert sum(prior.modes) == pytest.approx(1.0)
+        assert 0.0 < prior.mean_moved < 1.0
+    assert not PRIORS["blind"].knows_rooms
+
+
+def test_the_rule_is_gain_a_metre_and_a_choice_is_kept_unless_another_is_clearly_better():
+    near, far = (
+        Option("place", 1, (1.0, 0.0), (1.0, 0.0), 0.2, 1.0),
+        Option("place", 2, (9.0, 0.0), (9.0, 0.0), 0.9, 8.0),
+    )
+    config = ProactiveConfig()
+    assert best_option([near, far], None, {}, config) is near or far.gain / 9.0 > near.gain / 2.0
+    better = replace(near, gain=0.21)
+    assert best_option([better, far], None, {}, config) is better
+    assert best_option([replace(near, gain=0.19), better], near, {}, config) is better  # the same place
+    other = replace(better, key=3, position_m=(5.0, 0.0))
+    assert best_option([near, other], near, {}, config) is near
+    assert best_option([near, other], near, {}, ProactiveConfig(keeps_choice=False)) is other
+    assert best_option([near, replace(other, gain=0.3)], near, {}, config).key == 3
+
+
+def test_looks_from_one_side_count_once_a_stage(monkeypatch):
+    seen = (np.array([4]), np.array([7]))
+    monkeypatch.setattr("evonav.agents.proactive.searched.seen_cells", lambda *_: seen)
+
+    class At:
+        def __init__(self, x_m, z_m):
+            self.pose = type("Pose", (), {"x_m": x_m, "z_m": z_m})()
+
+    searched = SearchedCells(FRAME, ProactiveConfig())
+    edge_m = searched.coarse.frame.cell_m
+    north, south = At(7.5 * edge_m, 4.5 * edge_m + 1.0), At(7.5 * edge_m, 4.5 * edge_m - 1.0)
+    for view, missed in ((north, 0.1), (north, 0.1), (south, 0.01)):
+        searched.see(view)
+        assert searched.missed(is_small=False)[4, 7] == pytest.approx(missed)
+    searched.begin_stage()
+    assert searched.missed(is_small=False)[4, 7] == 1.0
+    assert searched.ever_missed(is_small=False)[4, 7] == pytest.approx(0.01)
+    assert searched.missed(is_small=False)[0, 0] == 1.0
+
+
+def test_it_stops_near_a_detected_entry_and_asks_once_about_its_identity():
+    records, told = rounds_of(Proactive(), *moved_table_stages())
+    assert [record.state.value for record in records] == ["success"] * 3
+    for record in records:
+        assert record.stop_reason == "identified"
+        chosen = record.trace[-1].chosen_entry
+        end = record.trace[-1].pose
+        assert math.dist((end.x_m, end.z_m), chosen.centre_m[::2]) < 2.0
+    assert told[-1][2].counters["identity_checks"] == 3
+
+
+def test_the_moved_table_is_doubted_once_its_place_is_seen_empty_and_the_entry_stays():
+    _, told = rounds_of(Proactive(), *moved_table_stages())
+    last = [(belief, said) for stage, belief, said, _ in told if stage == 3]
+    shares = [said.details["p_entries"] for _, said in last]
+    old = next(iter(shares[0]))
+    assert shares[-1][old] < 0.2
+    assert int(old) in {entry.entry_id for entry in last[-1][0].entries}
+    assert last[-1][1].chosen_entry.entry_id != int(old)
+
+
+def test_without_see_through_it_has_to_walk_to_the_empty_place():
+    seeing = run(Proactive(), *moved_table_stages())[2]
+    blind = run(Proactive(ProactiveConfig(sees_through=False)), *moved_table_stages())[2]
+    assert seeing.path_length_m <= blind.path_length_m
+
+
+def test_what_contradicts_the_goal_is_left_for_others_and_taken_when_nothing_else_is_left():
+    agent = Proactive(decision=scripted(identity="no"))
+    (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_rounds=30))
+    counters = record.trace[-1].counters
+    assert counters["identities_denied"] >= 1
+    assert record.stop_reason == "identified"
+    assert record.num_rounds > run(Proactive(), stage_case(1, "Fridge|1"))[0].num_rounds
+
+
+def test_without_the_check_nothing_is_asked():
+    agent = Proactive(ProactiveConfig(checks_identity=False), scripted(identity="no"))
+    (record,) = run(agent, stage_case(1, "Fridge|1"))
+    assert record.trace[-1].counters["identity_checks"] == 0
+    assert record.state.value == "success"
+
+
+def test_it_goes_back_to_the_best_entry_before_the_rounds_run_out():
+    """Nobody accepts the fridge, and there is a whole home to search: but no round is left for it at the end."""
+    agent = Proactive(decision=scripted(identity="no"))
+    protocol = ProtocolConfig(max_rounds=14)
+    (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=protocol)
+    assert record.has_stopped
+    assert record.state.value == "success"
+
+
+def test_every_part_can_be_switched_off_by_a_name_in_the_ablation_sweep():
+    switches = {field.name for field in fields(ProactiveConfig) if field.default is True}
+    sweep = tomllib.loads((Path(__file__).parents[2] / "examples/sweeps/proactive-ablation.toml").read_text())
+    made = [new_agent(agent_factory(name)) for name in sweep["agents"] if ":" in name]
+    off = [{name for name in switches if not getattr(agent.config, name)} for agent in made]
+    assert all(len(one) == 1 for one in off)
+    assert set.union(*off) == switches
+    for agent in made:
+        assert all(r.is_scored for r in run(agent, stage_case(1, "Bed|1"), stage_case(2, "Fridge|1")))
+
+
+def test_equal_seeds_give_equal_paths():
+    first, second = (run(ProactiveBlind(), *moved_table_stages()) for _ in range(2))
+    assert [r.trace for r in first] == [r.trace for r in second]
