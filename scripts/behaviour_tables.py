@@ -42,15 +42,16 @@ def behaviour_of(run: RecordedRun) -> dict[str, BehaviourCounts]:
 def _add(behaviour: BehaviourCounts, records: Sequence[StageRecord]) -> None:
     # Counters count over a task; an agent that was lost on the way began anew.
     last: Counter[str] = Counter()
+    lost_at: int | None = None
     for record in records:
         if record.is_scored:
             behaviour.num_stages += 1
             behaviour.ends[record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
+        if record.memory_lost_at != lost_at:
+            behaviour.counters.update(last)
+            last, lost_at = Counter(), record.memory_lost_at
         if record.trace:
-            counters = Counter(record.trace[-1].counters)
-            if any(counters[name] < count for name, count in last.items()):
-                behaviour.counters.update(last)
-            last = counters
+            last = Counter(record.trace[-1].counters)
     behaviour.counters.update(last)
 
 

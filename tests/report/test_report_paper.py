@@ -265,15 +265,16 @@ def counted(record, **counters):
 def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tmp_path: Path) -> None:
     success, failure = EndState.SUCCESS, EndState.FAILURE
     stale = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
+    began_anew = stage_record("fu", "b", 2, failure, has_stopped=False).model_copy(update={"memory_lost_at": 2})
     records = [
-        counted(stage_record("fu", "a", 1, success), decisions=4, conflicts=1),
-        counted(stage_record("fu", "a", 2, failure, chosen=stale), decisions=9, conflicts=1),
-        counted(stage_record("fu", "b", 1, success), decisions=7, conflicts=0),
-        counted(stage_record("fu", "b", 2, failure, has_stopped=False), decisions=2, conflicts=0),  # began anew
+        counted(stage_record("fu", "a", 1, success), decisions=4, edges=6),
+        counted(stage_record("fu", "a", 2, failure, chosen=stale), decisions=9, edges=5),  # one was dropped
+        counted(stage_record("fu", "b", 1, success), decisions=7, edges=0),
+        counted(began_anew, decisions=8, edges=1),
     ]
     run = load_run(record_run(tmp_path / "run", records, {"a": 2, "b": 2}, ["fu"]))
     behaviour = behaviour_of(run)
-    assert counter_table(behaviour).rows == (("conflicts", "1"), ("decisions", "18"))
+    assert counter_table(behaviour).rows == (("decisions", "24"), ("edges", "6"))
     assert end_table(behaviour).rows == (("arrived", "3"), ("budget", "1"))
     shares = {row[0]: row[1] for row in cause_share_table(run, "relocated").rows}
     assert shares == {"n": "2", "success": "0.0", "stopped at a stale entry": "50.0", "target never in view": "50.0"}
