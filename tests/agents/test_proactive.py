@@ -16,7 +16,7 @@ from evonav.agents.proactive.agent import Proactive, ProactiveBlind
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.presence import PresenceBelief, _Entry
 from evonav.agents.proactive.rooms import NO_ROOM, eroded, grown, numbered, rooms_of
-from evonav.agents.proactive.search import Option, best_option
+from evonav.agents.proactive.search import Option, best_option, shown_from
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
@@ -160,14 +160,35 @@ def test_the_rule_is_gain_a_metre_and_a_choice_is_kept_unless_another_is_clearly
         Option("place", 2, (9.0, 0.0), (9.0, 0.0), 0.9, 8.0),
     )
     config = ProactiveConfig()
-    assert best_option([near, far], None, {}, config) is near or far.gain / 9.0 > near.gain / 2.0
+    assert best_option([near, far], None, [], config) is near or far.gain / 9.0 > near.gain / 2.0
     better = replace(near, gain=0.21)
-    assert best_option([better, far], None, {}, config) is better
-    assert best_option([replace(near, gain=0.19), better], near, {}, config) is better  # the same place
+    assert best_option([better, far], None, [], config) is better
+    assert best_option([replace(near, gain=0.19), better], near, [], config) is better  # the same place
     other = replace(better, key=3, position_m=(5.0, 0.0))
-    assert best_option([near, other], near, {}, config) is near
-    assert best_option([near, other], near, {}, ProactiveConfig(keeps_choice=False)) is other
-    assert best_option([near, replace(other, gain=0.3)], near, {}, config).key == 3
+    assert best_option([near, other], near, [], config) is near
+    assert best_option([near, other], near, [], ProactiveConfig(keeps_choice=False)) is other
+    assert best_option([near, replace(other, gain=0.3)], near, [], config).key == 3
+
+
+def test_a_place_that_was_left_before_the_agent_was_there_counts_half_each_time():
+    config = ProactiveConfig()
+    one, other = (Option("place", k, (5.0 * k, 0.0), (0.0, 0.0), gain, 3.0) for k, gain in ((1, 1.0), (2, 0.4)))
+    assert best_option([one, other], None, [one], config) is one
+    assert best_option([one, other], None, [one, one], config) is other
+    assert best_option([one, other], None, [replace(one, kind="frontier")] * 2, config) is one
+
+
+def test_a_place_shows_its_own_room_alone():
+    searched = SearchedCells(FRAME, ProactiveConfig())
+    rooms = rooms_of(two_rooms(door_cells=10), FRAME, [])
+    shown = shown_from((4.0, 1.0), searched.coarse, rooms, 2.5)
+    centres_m = searched.coarse.centres_m()
+    assert shown[(np.hypot(*(centres_m - (3.0, 1.0)).transpose(2, 0, 1)) < 1.0)].all()
+    assert not shown[:, centres_m[0, :, 0] > 5.3].any()
+    assert not shown[(np.hypot(*(centres_m - (4.0, 1.0)).transpose(2, 0, 1)) > 2.6)].any()
+    searched.give_up(shown, 0.3)
+    assert searched.missed(is_small=True)[shown] == pytest.approx(0.3)
+    assert (searched.ever_missed(is_small=False)[~shown] == 1.0).all()
 
 
 def test_looks_from_one_side_count_once_a_stage(monkeypatch):
@@ -206,9 +227,32 @@ def test_the_moved_table_is_doubted_once_its_place_is_seen_empty_and_the_entry_s
     last = [(belief, said) for stage, belief, said, _ in told if stage == 3]
     shares = [said.details["p_entries"] for _, said in last]
     old = next(iter(shares[0]))
-    assert shares[-1][old] < 0.2
+    assert shares[-1][old] < 0.5 * shares[-1][str(last[-1][1].chosen_entry.entry_id)]
     assert int(old) in {entry.entry_id for entry in last[-1][0].entries}
     assert last[-1][1].chosen_entry.entry_id != int(old)
+
+
+@pytest.mark.parametrize("is_empty", [True, False])
+def test_at_a_place_without_a_detection_it_stops_unless_the_place_is_seen_empty(is_empty):
+    """What stands at the place may be too small or too hidden to be detected: then the place itself must do."""
+    agent, stages = Proactive(), []
+    act, begin_stage = agent.act, agent.begin_stage
+
+    def undetected(view):
+        depth_m = np.full_like(view.depth_m, 9.0 if is_empty else 0.3)  # nothing at all, or a door before the camera
+        return replace(view, depth_m=depth_m, detections=view.detections.taken([]))
+
+    def act_without_detections(observation):
+        if stages[-1] == 2:
+            observation = replace(observation, views=tuple(map(undetected, observation.views)))
+        return act(observation)
+
+    agent.begin_stage = lambda goal: stages.append(goal.stage) or begin_stage(goal)
+    agent.act = act_without_detections
+    cases = (stage_case(1, "Bed|1"), stage_case(2, "Fridge|1"))
+    first, second = run(agent, *cases, protocol=ProtocolConfig(max_rounds=20))
+    assert first.stop_reason == "identified"
+    assert (second.stop_reason == "at its place") != is_empty
 
 
 def test_without_see_through_it_has_to_walk_to_the_empty_place():

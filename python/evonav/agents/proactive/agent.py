@@ -1,7 +1,6 @@
 """Belief-Weighted Search: goes where most of the posterior over the target's place is found a metre."""
 
 import math
-from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,11 +16,20 @@ from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.posterior import Posterior, Surroundings, posterior_of
 from evonav.agents.proactive.presence import PresenceBelief
 from evonav.agents.proactive.rooms import NO_ROOM, box_slices, rooms_of
-from evonav.agents.proactive.search import Option, best_option, frontier_gains, places_to_search, with_ways
+from evonav.agents.proactive.search import (
+    Option,
+    best_option,
+    frontier_gains,
+    is_same,
+    places_to_search,
+    shown_from,
+    with_ways,
+)
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import matcher_of
+from evonav.memory.presence import Presence, judge_presence
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal
 
@@ -31,8 +39,6 @@ FURNITURE_M = 0.3
 """Distance from an object's box within which its room is looked up."""
 SAME_SPOT_M = 0.5
 """Distance within which the agent has stood at a place."""
-MAX_ARRIVALS = 2
-"""Number of arrivals at an entry that is not detected, after which it counts as denied."""
 
 
 class Proactive(NavigatorAgent):
@@ -59,8 +65,8 @@ class Proactive(NavigatorAgent):
         super().begin_stage(goal)
         self._parsed = self._matcher.parsed(self._goal)
         self._factors: dict[int, float] = {}
-        self._arrivals = Counter[int]()
         self._last: Option | None = None
+        self._abandoned: list[Option] = []
         self._is_final = False
         """Whether the agent goes to an entry because nothing else is left, or no time."""
         self._summary: dict[str, Any] = {}
@@ -82,30 +88,40 @@ class Proactive(NavigatorAgent):
         self._path.append(here)
         is_done = observation.has_arrived or not observation.is_action_success
         arrived_at = None
+        around = self._surroundings()
+        if last is not None and last.kind == "place" and is_done:
+            radius_m = self.config.search_radius_m
+            shown = shown_from(last.position_m, self._searched.coarse, around.rooms, radius_m)
+            self._searched.give_up(shown, self.config.searched)
+            self._last = None
         if last is not None and last.kind == "object" and last.is_reached and is_done:
             arrived_at = navigator.views.resolve(last.key)
-            self._arrive(arrived_at, observation)
         self._presence.update()
-        around = self._surroundings()
         posterior = self._posterior(around)
-        stopped = self._stop_in_reach(posterior, here, arrived_at)
+        stopped = self._stop_in_reach(posterior, observation, arrived_at)
         if stopped is not None:
             return stopped
-        if self._queries.log:  # an identity was denied
+        if arrived_at is not None:
+            self._leave(arrived_at, observation)
+        if self._queries.log or arrived_at is not None:  # an identity was denied, or a way was in vain
             posterior = self._posterior(around)
         return self._go(self._chosen(posterior, around, observation), posterior, here)
 
-    def _arrive(self, entry_id: int, observation: Observation) -> None:
-        """Take in what is seen on arrival at an entry's place."""
+    def _leave(self, entry_id: int, observation: Observation) -> None:
+        """Take in that the agent stands at an entry's place, does not detect it, and does not stop."""
         navigator = self._navigator
         if navigator.objects.entry(entry_id) is None or navigator.is_detected(entry_id):
             return
         view = observation.views[-1]
         (evidence,) = navigator.objects.depth_evidence([entry_id], view)
         self._presence.see_nothing_on_arrival(navigator.objects, entry_id, view, evidence)
-        self._arrivals[entry_id] += 1
-        if self._arrivals[entry_id] >= MAX_ARRIVALS:
-            self._factors[entry_id] = self.config.unfit
+        self._presence.update()
+        self._factors[entry_id] = self.config.unfit
+
+    def _is_empty(self, entry_id: int, observation: Observation) -> bool:
+        """Return whether the view towards an entry sees through its place."""
+        (evidence,) = self._navigator.objects.depth_evidence([entry_id], observation.views[-1])
+        return judge_presence(evidence, is_detected=False) is Presence.NO
 
     def _surroundings(self) -> Surroundings:
         navigator = self._navigator
@@ -151,23 +167,28 @@ class Proactive(NavigatorAgent):
         is_best = weight >= ALIKE * max(posterior.entries.values())
         return is_best and weight >= self.config.commit_share * (weight + posterior.elsewhere + math.fsum(others))
 
-    def _stop_in_reach(self, posterior: Posterior, here: Point2, arrived_at: int | None) -> Stop | None:
-        """Stop if an entry that may be the goal is in view and near; `None` to go on."""
-        navigator = self._navigator
+    def _stop_in_reach(self, posterior: Posterior, observation: Observation, arrived_at: int | None) -> Stop | None:
+        """Stop at an entry that is near and may be the goal; `None` to go on.
+
+        It is near if it is detected within `stop_within_m`, or the agent stands where it can be looked at, and its
+        place is not seen empty: what is small or half hidden may not be detected.
+        """
+        navigator, here = self._navigator, (observation.pose.x_m, observation.pose.z_m)
         for entry_id in sorted(posterior.entries, key=lambda one: (-posterior.entries[one], one)):
             entry = navigator.objects.entry(entry_id)
-            if entry is None or not navigator.is_detected(entry_id):
+            if entry is None:
                 continue
-            distance_m = math.dist((entry.centre_m[0], entry.centre_m[2]), here)
-            if distance_m >= self.config.stop_within_m and entry_id != arrived_at:
+            is_near = math.dist((entry.centre_m[0], entry.centre_m[2]), here) < self.config.stop_within_m
+            is_detected = navigator.is_detected(entry_id)
+            has_arrived = entry_id == arrived_at and (is_detected or not self._is_empty(entry_id, observation))
+            if not has_arrived and not (is_near and is_detected):
                 continue
-            is_chosen = (
-                self._is_final and self._last is not None and navigator.views.resolve(self._last.key) == entry_id
-            )
+            last = self._last
+            is_chosen = self._is_final and last is not None and navigator.views.resolve(last.key) == entry_id
             if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry_id)):
                 self._note(posterior)
-                self._record_round(f"object {entry_id}", "identified", entry_id)
-                return Stop("identified")
+                self._record_round(f"object {entry_id}", "identified" if is_detected else "at its place", entry_id)
+                return Stop("identified" if is_detected else "at its place")
         return None
 
     def _may_be_goal(self, entry_id: int) -> bool:
@@ -215,7 +236,7 @@ class Proactive(NavigatorAgent):
             ):
                 return best
         options += [one for one in entries if not self._presence.is_verified(one.key)]
-        found = best_option(options, self._last, self._visit_factors(options), config)
+        found = best_option(options, self._last, self._abandoned, config)
         if found is None or found.gain <= 0.0:
             self._is_final = True
             return best or self._related(around, here)
@@ -235,16 +256,6 @@ class Proactive(NavigatorAgent):
         good = [one for one in entries if one.gain >= ALIKE * top and one.gain > 0.0]
         return min(good, key=lambda one: (one.way_m, one.key), default=None)
 
-    def _visit_factors(self, options: list[Option]) -> dict[tuple[str, int], float]:
-        """Return factors of places to search from, by how often the agent stood there in this stage."""
-        path = np.array(self._path)
-        factors: dict[tuple[str, int], float] = {}
-        for one in options:
-            if one.kind == "place":
-                gaps_m = np.hypot(path[:, 0] - one.position_m[0], path[:, 1] - one.position_m[1])
-                factors[one.kind, one.key] = self.config.revisit ** int((gaps_m <= SAME_SPOT_M).sum())
-        return factors
-
     def _related(self, around: Surroundings, here: Point2) -> Option | None:
         """Return the nearest thing that the goal should be on or near."""
         near = [one for one in around.remembered if self._matcher.label_score(self._parsed, one.label) > 0.0]
@@ -255,6 +266,8 @@ class Proactive(NavigatorAgent):
         """Go to what was chosen; to an object that the map does not reach, by way of the frontier nearest to it."""
         self._note(posterior)
         last, self._last = self._last, option
+        if last is not None and last.kind != "object" and (option is None or not is_same(option, last)):
+            self._abandoned.append(last)
         if option is None:
             self._record_round("none", "nothing left to go to")
             return Stop("nothing left to go to")

@@ -65,14 +65,18 @@ class ProactiveConfig:
     """The same for objects smaller than `small_edge_m`."""
     small_edge_m: float = 0.25
     """Edge of the cube with an object's volume below which it is small."""
+    support_ratio: float = 20.0
+    """Factor of places on what the text names as the support: the text fits there, and small things stand on things."""
     anchor_ratio: float = 4.0
-    """Factor of places by what the text names."""
+    """Factor of places by what the text names as a neighbour."""
     anchor_m: float = 0.75
     """Distance from the box of such a thing within which places are by it."""
     room_ratio: float = 4.0
     """Factor of a room of the type that the text names; its inverse is that of rooms of other types."""
-    revisit: float = 0.3
-    """Factor of a place to search from for each time that the agent stood within half a metre of it."""
+    searched: float = 0.3
+    """Factor of the weight that a place to search from has promised, once the agent has been there."""
+    abandoned: float = 0.5
+    """Factor of a place or frontier for each time that the agent turned away from it before it was there."""
     num_places: int = 64
     """Largest number of places to search from that are compared."""
     navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS))

@@ -150,7 +150,7 @@ def _anchored(
         for one in around.remembered:
             if similarity(relation.noun, one.label) >= 1.0:
                 near[box_slices(one, frame, 0.0 if relation.kind == "on" else config.anchor_m)] = True
-        prior[near] *= config.anchor_ratio
+        prior[near] *= config.support_ratio if relation.kind == "on" else config.anchor_ratio
     return prior
 
 

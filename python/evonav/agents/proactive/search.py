@@ -1,7 +1,7 @@
 """Choose the next place: where most of the posterior is found a metre."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -115,6 +115,17 @@ def places_to_search(
     ]
 
 
+def shown_from(place_m: Point2, coarse: CoarseFrame, rooms: NDArray[np.int32], radius_m: float) -> NDArray[np.bool_]:
+    """Return the `(R, C)` coarse cells within a distance of a place that are in its room, or in none."""
+    room = np.asarray(coarse.taken(rooms, NO_ROOM).max(axis=2))
+    frame = coarse.frame
+    row = min(max(int((place_m[1] - frame.corner_m[1]) / frame.cell_m), 0), frame.rows - 1)
+    col = min(max(int((place_m[0] - frame.corner_m[0]) / frame.cell_m), 0), frame.cols - 1)
+    gaps_m = np.hypot(*np.moveaxis(coarse.centres_m() - np.array(place_m), -1, 0))
+    shown: NDArray[np.bool_] = (gaps_m <= radius_m) & ((room == room[row, col]) | (room == NO_ROOM))
+    return shown
+
+
 def with_ways(occupancy: OccupancyMap, here_m: Point2, options: Sequence[Option]) -> list[Option]:
     """Return options with the lengths of their ways over known floor."""
     if not options:
@@ -129,23 +140,25 @@ def with_ways(occupancy: OccupancyMap, here_m: Point2, options: Sequence[Option]
 
 
 def best_option(
-    options: Sequence[Option], last: Option | None, factors: Mapping[tuple[str, int], float], config: ProactiveConfig
+    options: Sequence[Option], last: Option | None, abandoned: Sequence[Option], config: ProactiveConfig
 ) -> Option | None:
     """Return the option with the largest gain a metre; the last one is kept unless another is clearly better.
 
     Args:
         options: The options.
         last: The last round's option.
-        factors: Factors of gains by kind and key, such as of places where the agent was.
+        abandoned: Options from which the agent turned away before it was there.
         config: The agent's parameters.
     """
 
     def rate(one: Option) -> float:
-        bonus = 1.0 + config.keep if config.keeps_choice and _is_same(one, last) else 1.0
-        return one.rate(config.near_m) * factors.get((one.kind, one.key), 1.0) * bonus
+        bonus = 1.0 + config.keep if config.keeps_choice and is_same(one, last) else 1.0
+        malus = config.abandoned ** sum(is_same(one, other) for other in abandoned) if config.keeps_choice else 1.0
+        return one.rate(config.near_m) * bonus * malus
 
     return max(options, key=lambda one: (rate(one), -one.way_m, -one.key), default=None)
 
 
-def _is_same(one: Option, last: Option | None) -> bool:
+def is_same(one: Option, last: Option | None) -> bool:
+    """Return whether two rounds' options are the same place."""
     return last is not None and one.kind == last.kind and math.dist(one.position_m, last.position_m) <= SAME_PLACE_M

@@ -82,6 +82,11 @@ class SearchedCells:
         self._stage[:, rows, cols] *= missed
         self._ever[:, rows, cols] *= missed
 
+    def give_up(self, cells: NDArray[np.bool_], factor: float) -> None:
+        """Lower the weight of `(R, C)` cells that the agent went to see, whatever hides a part of them."""
+        self._stage[:, cells] *= factor
+        self._ever[:, cells] *= factor
+
     def missed(self, *, is_small: bool) -> NDArray[np.float64]:
         """Return `(R, C)`: the probability that this stage's views would have missed a target at a cell."""
         found: NDArray[np.float64] = self._stage[int(is_small)]
