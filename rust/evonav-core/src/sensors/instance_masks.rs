@@ -139,11 +139,20 @@ pub fn mask_extents(
 
 /// Return the runs of equal pixels: value, index of the first pixel, and index after the last.
 pub(crate) fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
-    let mut end = 0;
-    pixels.chunk_by(|a, b| a == b).map(move |run| {
-        let start = end;
-        end += run.len();
-        (run[0], [start, end])
+    let mut next = 0;
+    std::iter::from_fn(move || {
+        let (start, &value) = (next, pixels.get(next)?);
+        next += 1;
+        // Eight pixels are compared at once.
+        let differ =
+            |chunk: &[i32]| chunk.iter().fold(false, |found, &pixel| found | (pixel != value));
+        while pixels.get(next..next + 8).is_some_and(|chunk| !differ(chunk)) {
+            next += 8;
+        }
+        while pixels.get(next) == Some(&value) {
+            next += 1;
+        }
+        Some((value, [start, next]))
     })
 }
 

@@ -47,16 +47,22 @@ pub fn unproject_masks(
     for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.len())] {
         Error::require(name, len, "one value a pixel of the camera", |n| n == num_px)?;
     }
-    if let Some(depth) = depth_m.iter().find(|depth| depth.is_nan()) {
+    if let Some(depth) = first_nan(depth_m) {
         return Err(Error::invalid("depth_m", depth, "not NaN"));
     }
+    // Detection, row and columns of each run of pixels.
+    let mut found: Vec<(usize, usize, [usize; 2])> = Vec::new();
     let mut num_px = vec![0; num_detections];
-    for (mask, [start, end]) in runs(masks) {
-        let Ok(detection) = usize::try_from(mask) else { continue };
-        let count = num_px
-            .get_mut(detection)
-            .ok_or_else(|| Error::invalid("masks", mask, "negative or the index of a detection"))?;
-        *count += depth_m[start..end].iter().filter(|&&depth| has_depth(depth)).count();
+    let rows = masks.chunks_exact(camera.width_px).zip(depth_m.chunks_exact(camera.width_px));
+    for (row, (masks, depth_m)) in rows.enumerate() {
+        for (mask, [begin, end]) in runs(masks) {
+            let Ok(detection) = usize::try_from(mask) else { continue };
+            let count = num_px.get_mut(detection).ok_or_else(|| {
+                Error::invalid("masks", mask, "negative or the index of a detection")
+            })?;
+            *count += depth_m[begin..end].iter().filter(|&&depth| has_depth(depth)).count();
+            found.push((detection, row, [begin, end]));
+        }
     }
     let strides: Vec<usize> =
         num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
@@ -70,30 +76,34 @@ pub fn unproject_masks(
     let first = camera.ray([0.5, 0.5]);
     let [along_u, along_v] = [camera.ray([1.5, 0.5]), camera.ray([0.5, 1.5])]
         .map(|ray| [0, 1, 2].map(|i| ray[i] - first[i]));
-    let rows = masks.chunks_exact(camera.width_px).zip(depth_m.chunks_exact(camera.width_px));
-    for (row, (masks, depth_m)) in rows.enumerate() {
+    for (detection, row, [begin, end]) in found {
         let start = [0, 1, 2].map(|i| first[i] + along_v[i] * row as f64);
-        for (mask, [begin, end]) in runs(masks) {
-            let Ok(detection) = usize::try_from(mask) else { continue };
-            let (skip, cloud) = (&mut skips[detection], &mut clouds[detection]);
-            for (col, &depth) in (begin..end).zip(&depth_m[begin..end]) {
-                if !has_depth(depth) {
-                    continue;
-                }
-                if *skip > 0 {
-                    *skip -= 1;
-                    continue;
-                }
-                *skip = strides[detection] - 1;
-                let depth = f64::from(depth);
-                cloud.push([0, 1, 2].map(|i| {
-                    let ray = start[i] + along_u[i] * col as f64;
-                    (camera.position_m[i] + ray * depth) as f32
-                }));
+        let (skip, cloud) = (&mut skips[detection], &mut clouds[detection]);
+        let depth_m = &depth_m[row * camera.width_px..][begin..end];
+        for (col, &depth) in (begin..end).zip(depth_m) {
+            if !has_depth(depth) {
+                continue;
             }
+            if *skip > 0 {
+                *skip -= 1;
+                continue;
+            }
+            *skip = strides[detection] - 1;
+            let depth = f64::from(depth);
+            cloud.push([0, 1, 2].map(|i| {
+                let ray = start[i] + along_u[i] * col as f64;
+                (camera.position_m[i] + ray * depth) as f32
+            }));
         }
     }
     Ok(clouds)
+}
+
+/// Return the first value that is NaN; whole chunks are compared at once.
+fn first_nan(values: &[f32]) -> Option<f32> {
+    let has_nan = |chunk: &[f32]| chunk.iter().fold(false, |found, value| found | value.is_nan());
+    let chunk = values.chunks(64).find(|chunk| has_nan(chunk))?;
+    chunk.iter().copied().find(|value| value.is_nan())
 }
 
 pub(crate) fn has_depth(depth_m: f32) -> bool {

@@ -5,7 +5,10 @@ use std::borrow::Cow;
 use crate::{
     geometry::{Aabb, Vec3},
     memory::objects::{
-        ObjectMapConfig, cloud::Cloud, dbscan::largest_cluster, voxels::voxel_filter,
+        ObjectMapConfig,
+        cloud::Cloud,
+        dbscan::largest_cluster,
+        voxels::{bounds, voxel_filter},
     },
     sensors::unproject::Point,
 };
@@ -21,7 +24,8 @@ pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<P
         Some(Cow::Owned(cluster)) if cluster.len() >= 5 => cluster,
         _ => filtered,
     };
-    let bounds_m = Aabb::of_points(cluster.iter().map(|point| point.map(f64::from)));
+    let [min_m, max_m] = bounds(&cluster)?.map(|corner| corner.map(f64::from));
+    let bounds_m = Aabb { min_m, max_m };
     // A picture on a wall is a plane, but as a set of voxels it has a volume.
     let volume_m3: f64 = bounds_m.size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
     (volume_m3 >= config.min_box_m3).then_some((cluster, bounds_m))

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::LazyLock};
 
 use crate::{
     grid::components::find,
-    memory::objects::voxels::{Voxel, VoxelIndex, voxel_of},
+    memory::objects::voxels::{Voxel, VoxelIndex, bounds, voxel_of},
     sensors::unproject::Point,
 };
 
@@ -23,10 +23,10 @@ pub const NOISE: i32 = -1;
 /// The result is exact. The grid's cells are so small that all points of a cell are neighbours
 /// (Gunawan, 2013); this takes close to O(points) for the surfaces of objects.
 pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
-    let grid = Grid::new(points, radius_m);
-    let is_core = grid.core_points(min_points);
-    let clusters = grid.join_cells(&is_core);
-    grid.label(&is_core, &clusters)
+    let mut grid = Grid::new(points, radius_m);
+    let others = grid.take_others(min_points);
+    let parts = grid.parts();
+    grid.label(&others, &parts)
 }
 
 /// Return the points of the largest cluster (the first of equals), in their order; `None` if all
@@ -60,15 +60,49 @@ struct Grid<'a> {
     points: &'a [Point],
     radius2: f32,
     cell_of: Vec<u32>,
-    /// Point indices by cell, ascending in each; cell `c` has `members[starts[c]..starts[c + 1]]`.
-    members: Vec<u32>,
+    /// Points by cell; cell `c` has `fours[starts[c]..starts[c + 1]]`.
+    fours: Vec<Four>,
     starts: Vec<u32>,
+    /// Number of points of each cell.
+    sizes: Vec<u32>,
     voxels: Vec<Voxel>,
     index: VoxelIndex,
     /// Slot of each voxel in the index.
     slots: Vec<usize>,
-    /// Steps as in [`HALF_STEPS`].
-    half_steps: Vec<Step>,
+    /// Steps as in [`STEPS`].
+    steps: Vec<Step>,
+}
+
+/// Four points of a cell, whose distances are computed together. A place without a point is
+/// infinitely far away.
+#[derive(Debug, Clone, Copy)]
+struct Four {
+    /// Coordinates by axis.
+    at: [[f32; 4]; 3],
+    /// Index of each point.
+    points: [u32; 4],
+}
+
+impl Four {
+    const EMPTY: Self = Self { at: [[f32::INFINITY; 4]; 3], points: [0; 4] };
+
+    fn point(&self, place: usize) -> Point {
+        [0, 1, 2].map(|axis| self.at[axis][place])
+    }
+
+    fn set(&mut self, place: usize, point: Point) {
+        (0..3).for_each(|axis| self.at[axis][place] = point[axis]);
+    }
+
+    /// Return whether each of the points is within a distance of a point; see [`distance2`].
+    fn is_near(&self, point: Point, radius2: f32) -> [bool; 4] {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.at[axis].map(|value| value - point[axis]));
+        std::array::from_fn(|i| x[i] * x[i] + y[i] * y[i] + z[i] * z[i] <= radius2)
+    }
+
+    fn num_near(&self, point: Point, radius2: f32) -> u32 {
+        self.is_near(point, radius2).map(u32::from).iter().sum()
+    }
 }
 
 /// A step from one cell to another.
@@ -79,51 +113,57 @@ struct Step {
     stride: isize,
 }
 
-impl Step {
-    fn back(self) -> Self {
-        Self { voxels: self.voxels.map(|i| -i), stride: -self.stride }
-    }
-}
-
 impl<'a> Grid<'a> {
     fn new(points: &'a [Point], radius_m: f32) -> Self {
         // The edge is slightly less than radius / sqrt(3), so that rounding cannot separate the
         // points of a cell.
         let inverse_edge = 3.0_f64.sqrt() * 1.0001 / f64::from(radius_m);
-        let voxel_of_point: Vec<Voxel> =
-            points.iter().map(|&point| voxel_of(point, inverse_edge)).collect();
-        let mut index = VoxelIndex::spanning(&voxel_of_point, REACH);
-        let mut voxels: Vec<Voxel> = Vec::new();
-        let enter = |&voxel: &Voxel| {
-            let cell = index.entry(voxel, voxels.len() as u32);
+        let corners = bounds(points).unwrap_or_default().map(|at| voxel_of(at, inverse_edge));
+        let mut index = VoxelIndex::between(corners, REACH, points.len());
+        let num = points.len() / 4;
+        let (mut voxels, mut slots) = (Vec::with_capacity(num), Vec::with_capacity(num));
+        let mut sizes: Vec<u32> = Vec::with_capacity(num);
+        let enter = |&point: &Point| {
+            let voxel = voxel_of(point, inverse_edge);
+            let slot = index.slot(voxel);
+            let cell = index.entry_at(slot, voxel, voxels.len() as u32);
             if cell as usize == voxels.len() {
                 voxels.push(voxel);
+                slots.push(slot);
+                sizes.push(0);
             }
+            sizes[cell as usize] += 1;
             cell
         };
-        let cell_of: Vec<u32> = voxel_of_point.iter().map(enter).collect();
-        let mut starts = vec![0_u32; voxels.len() + 1];
-        cell_of.iter().for_each(|&cell| starts[cell as usize + 1] += 1);
-        (0..voxels.len()).for_each(|cell| starts[cell + 1] += starts[cell]);
-        let mut next = starts.clone();
-        let mut members = vec![0; points.len()];
-        for (point, &cell) in cell_of.iter().enumerate() {
-            members[next[cell as usize] as usize] = point as u32;
-            next[cell as usize] += 1;
+        let cell_of: Vec<u32> = points.iter().map(enter).collect();
+        let mut starts = Vec::with_capacity(voxels.len() + 1);
+        let mut num_fours = 0;
+        starts.push(0);
+        for size in &sizes {
+            num_fours += size.div_ceil(4);
+            starts.push(num_fours);
         }
-        let slots = voxels.iter().map(|&voxel| index.slot(voxel)).collect();
+        let mut fours = vec![Four::EMPTY; num_fours as usize];
+        let mut num_placed = vec![0_u32; voxels.len()];
+        for (index, (&point, &cell)) in points.iter().zip(&cell_of).enumerate() {
+            let place = &mut num_placed[cell as usize];
+            let four = &mut fours[(starts[cell as usize] + *place / 4) as usize];
+            four.set((*place % 4) as usize, point);
+            four.points[(*place % 4) as usize] = index as u32;
+            *place += 1;
+        }
         let step = |&voxels: &Voxel| Step { voxels, stride: index.stride(voxels) };
-        let half_steps = HALF_STEPS.iter().map(step).collect();
+        let steps = STEPS.iter().map(step).collect();
         let radius2 = radius_m * radius_m;
-        Self { points, radius2, cell_of, members, starts, voxels, index, slots, half_steps }
+        Self { points, radius2, cell_of, fours, starts, sizes, voxels, index, slots, steps }
     }
 
     fn num_cells(&self) -> usize {
         self.voxels.len()
     }
 
-    fn members(&self, cell: usize) -> &[u32] {
-        &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    fn fours(&self, cell: usize) -> &[Four] {
+        &self.fours[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
     /// Return the cell that is a step away, if it has points.
@@ -135,136 +175,162 @@ impl<'a> Grid<'a> {
 
     /// Return the cells that may hold neighbours of a cell's points, the nearest first.
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
-        let steps = self.half_steps.iter().flat_map(|&step| [step, step.back()]);
-        steps.filter_map(move |step| self.beside(cell, step))
+        self.steps.iter().filter_map(move |&step| self.beside(cell, step))
     }
 
-    fn is_near(&self, a: u32, b: u32) -> bool {
-        distance2(self.points[a as usize], self.points[b as usize]) <= self.radius2
-    }
-
-    fn core_points(&self, min_points: usize) -> Vec<bool> {
-        let mut is_core = vec![true; self.points.len()];
-        // Points of a cell with too few neighbours so far, and their numbers of neighbours.
-        let mut lacking: Vec<(u32, usize)> = Vec::new();
-        for cell in 0..self.num_cells() {
-            let here = self.members(cell);
-            if here.len() >= min_points {
-                continue;
-            }
-            lacking.extend(here.iter().map(|&point| (point, here.len())));
+    /// Take the points that are not core points out of their cells; return their indices,
+    /// ascending.
+    fn take_others(&mut self, min_points: usize) -> Vec<u32> {
+        let mut others: Vec<[usize; 2]> = Vec::new();
+        // Four and place of points of a cell with too few neighbours so far, and the number of
+        // their neighbours.
+        let mut lacking: Vec<([usize; 2], Point, u32)> = Vec::new();
+        let min_points = u32::try_from(min_points).unwrap_or(u32::MAX);
+        for cell in (0..self.num_cells()).filter(|&cell| self.sizes[cell] < min_points) {
+            let (first, size) = (self.starts[cell] as usize, self.sizes[cell]);
+            lacking.extend((0..size as usize).map(|i| {
+                let (four, place) = (first + i / 4, i % 4);
+                ([four, place], self.fours[four].point(place), size)
+            }));
             for other in self.around(cell) {
-                let others = self.members(other);
-                lacking.retain_mut(|(point, count)| {
-                    *count += others.iter().filter(|&&other| self.is_near(*point, other)).count();
+                let fours = self.fours(other);
+                lacking.retain_mut(|(_, point, count)| {
+                    let near = fours.iter().map(|four| four.num_near(*point, self.radius2));
+                    *count += near.sum::<u32>();
                     *count < min_points
                 });
                 if lacking.is_empty() {
                     break;
                 }
             }
-            lacking.drain(..).for_each(|(point, _)| is_core[point as usize] = false);
+            others.extend(lacking.drain(..).map(|(place, ..)| place));
         }
-        is_core
+        let take = |[four, place]: [usize; 2]| {
+            let four = &mut self.fours[four];
+            four.set(place, [f32::INFINITY; 3]);
+            four.points[place]
+        };
+        let mut others: Vec<u32> = others.into_iter().map(take).collect();
+        others.sort_unstable();
+        others
     }
 
-    /// Join cells that have core points within the radius of each other; return a representative
-    /// for each cell.
-    fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
-        let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
-        let cores = |cell: usize| {
-            self.members(cell).iter().copied().filter(|&point| is_core[point as usize])
-        };
-        let has_core: Vec<bool> =
-            (0..self.num_cells()).map(|cell| cores(cell).next().is_some()).collect();
-        // Joins a cell and the one a step away; returns whether two parts became one.
-        let join = |parents: &mut [u32], cell: usize, step: Step| {
-            let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
-                return false;
-            };
-            let (a, b) = (find(parents, cell as u32), find(parents, other as u32));
-            let is_joined = a != b && cores(cell).any(|a| cores(other).any(|b| self.is_near(a, b)));
-            if is_joined {
-                parents[a.max(b) as usize] = a.min(b);
+    /// Join cells that have core points within the radius of each other; return the part of each
+    /// cell. Cells without core points are parts of their own.
+    fn parts(&self) -> Vec<u32> {
+        let mut part_of = vec![NO_PART; self.num_cells()];
+        let mut sizes = Vec::new();
+        let mut left = Vec::new();
+        for first in 0..self.num_cells() {
+            if part_of[first] != NO_PART {
+                continue;
             }
-            is_joined
-        };
-        let with_core = || (0..self.num_cells()).filter(|&cell| has_core[cell]);
-        let mut num_parts = with_core().count();
-        for &step in &self.half_steps[..NUM_TOUCHING] {
-            if num_parts < 2 {
-                break;
+            let part = sizes.len() as u32;
+            part_of[first] = part;
+            sizes.push(0_usize);
+            left.push(first);
+            while let Some(cell) = left.pop() {
+                sizes[part as usize] += 1;
+                for &step in &self.steps[..NUM_TOUCHING] {
+                    let Some(other) = self.beside(cell, step) else { continue };
+                    if part_of[other] == NO_PART && self.are_joined(cell, other) {
+                        part_of[other] = part;
+                        left.push(other);
+                    }
+                }
             }
-            num_parts -= with_core().filter(|&cell| join(&mut parents, cell, step)).count();
         }
-        if num_parts > 1 {
-            self.join_rest(&mut parents, &has_core, join);
+        if sizes.len() > 1 {
+            self.join_rest(&mut part_of, &sizes);
         }
-        (0..self.num_cells() as u32).map(|cell| find(&mut parents, cell)).collect()
+        part_of
+    }
+
+    /// Return whether a core point of one cell is near a core point of another.
+    fn are_joined(&self, cell: usize, other: usize) -> bool {
+        let others = self.fours(other);
+        self.fours(cell).iter().any(|four| {
+            (0..4)
+                .map(|place| four.point(place))
+                .any(|point| others.iter().any(|four| four.num_near(point, self.radius2) > 0))
+        })
     }
 
     /// Join the parts that touching cells leave separate. It is enough to start from cells outside
     /// the largest part: of two cells to be joined, at least one is outside.
-    fn join_rest(
-        &self,
-        parents: &mut [u32],
-        has_core: &[bool],
-        join: impl Fn(&mut [u32], usize, Step) -> bool,
-    ) {
-        let with_core = || (0..self.num_cells()).filter(|&cell| has_core[cell]);
-        let mut sizes = vec![0_usize; self.num_cells()];
-        with_core().for_each(|cell| sizes[find(parents, cell as u32) as usize] += 1);
-        let largest = (0..sizes.len()).max_by_key(|&cell| sizes[cell]);
-        let mut left: Vec<usize> = with_core().collect();
-        left.retain(|&cell| Some(find(parents, cell as u32) as usize) != largest);
-        for &step in &self.half_steps[NUM_TOUCHING..] {
-            for &cell in &left {
-                join(parents, cell, step);
-                join(parents, cell, step.back());
+    fn join_rest(&self, part_of: &mut [u32], sizes: &[usize]) {
+        let mut parents: Vec<u32> = (0..sizes.len() as u32).collect();
+        let largest = (0..sizes.len()).max_by_key(|&part| sizes[part]);
+        let outside = |&cell: &usize| Some(part_of[cell] as usize) != largest;
+        for cell in (0..self.num_cells()).filter(outside) {
+            for &step in &self.steps[NUM_TOUCHING..] {
+                let Some(other) = self.beside(cell, step) else { continue };
+                let (a, b) =
+                    (find(&mut parents, part_of[cell]), find(&mut parents, part_of[other]));
+                if a != b && self.are_joined(cell, other) {
+                    parents[a.max(b) as usize] = a.min(b);
+                }
             }
         }
+        part_of.iter_mut().for_each(|part| *part = find(&mut parents, *part));
     }
 
-    fn label(&self, is_core: &[bool], cluster_of_cell: &[u32]) -> Vec<i32> {
-        let mut labels = vec![NOISE; self.points.len()];
-        let mut number_of = vec![NOISE; self.num_cells()];
-        let mut num = 0;
-        for point in (0..self.points.len()).filter(|&point| is_core[point]) {
-            let number = &mut number_of[cluster_of_cell[self.cell_of[point] as usize] as usize];
-            if *number == NOISE {
-                *number = num;
-                num += 1;
+    /// Number the clusters in the order of their first core points, then look for one near each of
+    /// the other points.
+    fn label(&self, others: &[u32], parts: &[u32]) -> Vec<i32> {
+        let mut labels = vec![0; self.points.len()];
+        others.iter().for_each(|&other| labels[other as usize] = NOISE);
+        if parts.iter().any(|&part| part != 0) {
+            let mut number_of = vec![NOISE; self.num_cells()];
+            let mut num = 0;
+            for (label, &cell) in labels.iter_mut().zip(&self.cell_of).filter(|(l, _)| **l == 0) {
+                let number = &mut number_of[parts[cell as usize] as usize];
+                if *number == NOISE {
+                    *number = num;
+                    num += 1;
+                }
+                *label = *number;
             }
-            labels[point] = *number;
         }
-        for border in (0..self.points.len()).filter(|&point| !is_core[point]) {
-            labels[border] = self.border_label(border, is_core, &labels);
+        for &border in others {
+            labels[border as usize] = self.border_label(border as usize, &labels);
         }
         labels
     }
 
     /// Return the first cluster among the core points around a point that is not a core point.
-    fn border_label(&self, border: usize, is_core: &[bool], labels: &[i32]) -> i32 {
+    fn border_label(&self, border: usize, labels: &[i32]) -> i32 {
         let cell = self.cell_of[border] as usize;
-        let others = std::iter::once(cell).chain(self.around(cell));
-        let near = others.flat_map(|other| self.members(other)).copied();
-        let cores = near.filter(|&i| is_core[i as usize] && self.is_near(border as u32, i));
-        cores.map(|core| labels[core as usize]).min().unwrap_or(NOISE)
+        let mut first = NOISE;
+        for four in std::iter::once(cell).chain(self.around(cell)).flat_map(|cell| self.fours(cell))
+        {
+            let is_near = four.is_near(self.points[border], self.radius2);
+            for place in (0..4).filter(|&place| is_near[place]) {
+                let label = labels[four.points[place] as usize];
+                if label == 0 {
+                    return 0;
+                }
+                first = if first == NOISE { label } else { first.min(label) };
+            }
+        }
+        first
     }
 }
+
+const NO_PART: u32 = u32::MAX;
 
 /// Largest number of steps along an axis to cells that may contain neighbours.
 const REACH: i32 = 2;
 
-/// Number of [`HALF_STEPS`] that lead to touching cells, at most one step along each axis.
-const NUM_TOUCHING: usize = 13;
+/// Number of [`STEPS`] that lead to touching cells, at most one step along each axis.
+const NUM_TOUCHING: usize = 26;
 
-/// One of every two opposite steps to cells within [`REACH`], the shortest first.
-static HALF_STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {
+/// Steps to the cells within [`REACH`], the shortest first.
+static STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {
     let side = 2 * REACH + 1;
     let step = |i: i32| [i / (side * side), i / side % side, i % side].map(|i| i - REACH);
     let mut steps: Vec<Voxel> =
-        (0..side.pow(3)).map(step).filter(|&step| step > [0, 0, 0]).collect();
+        (0..side.pow(3)).map(step).filter(|&step| step != [0, 0, 0]).collect();
     steps.sort_by_key(|step| step.iter().map(|i| i * i).sum::<i32>());
     steps
 });

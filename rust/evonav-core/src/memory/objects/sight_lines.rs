@@ -153,7 +153,7 @@ impl Obstacles {
             corner.map_or([by; 3], |corner| corner.map(|i| i.saturating_add(by)))
         };
         let (low, high) = (bound(i32::min, -1), bound(i32::max, 1));
-        let mut cells = VoxelIndex::spanning(&voxels, 2);
+        let mut cells = VoxelIndex::between([low, high], 1, voxels.len());
         let mut counts: Vec<u32> = Vec::new();
         let mut owners = Vec::with_capacity(points.len());
         for &voxel in &voxels {

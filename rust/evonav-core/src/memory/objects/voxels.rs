@@ -7,12 +7,18 @@ pub type Voxel = [i32; 3];
 
 /// Return the voxel that contains a point; far outside any house the index saturates.
 pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
-    point.map(|value| {
-        let scaled = f64::from(value) * inverse_edge;
-        // `floor` is a library call on baseline x86-64.
-        let truncated = scaled as i32;
-        truncated.saturating_sub(i32::from(f64::from(truncated) > scaled))
-    })
+    point.map(|value| floor(f64::from(value) * inverse_edge))
+}
+
+/// Return the largest whole number that is not above a value, or the nearest `i32`.
+fn floor(value: f64) -> i32 {
+    // `f64::floor` is a library call on baseline x86-64, and a conversion checks what it converts.
+    // Added to this number, a value is rounded to a whole one, which the lowest bits then show.
+    const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
+    let value = if value > f64::from(i32::MIN) { value } else { f64::from(i32::MIN) };
+    let value = if value < f64::from(i32::MAX) { value } else { f64::from(i32::MAX) };
+    let rounded = value + ROUNDING;
+    (rounded.to_bits() as i32).wrapping_sub(i32::from(rounded - ROUNDING > value))
 }
 
 /// A hash table from voxels to small numbers: linear probing, with keys of 21 bits per axis in one
@@ -101,14 +107,13 @@ impl<T> Blocks<T> {
 
     /// Return the value of a voxel's block.
     pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
-        self.index.get(clamped(voxel).map(|i| i >> 2)).map(|index| &self.values[index as usize])
+        self.index.get(block_of(voxel)).map(|index| &self.values[index as usize])
     }
 
     /// Return the value of a voxel's block, which is `new` if there was none, and the voxel's
     /// [`place`].
     pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
-        let voxel = clamped(voxel);
-        let block = voxel.map(|i| i >> 2);
+        let block = block_of(voxel);
         if block != self.last.0 {
             let (&mut index, is_new) = self.index.entry(block, self.values.len() as u32);
             if is_new {
@@ -162,22 +167,19 @@ const FREE_INDEX: u32 = u32::MAX;
 const SLOTS_A_VOXEL: usize = 64;
 
 impl VoxelIndex {
-    /// Create a map for these voxels, for look-ups at most `margin` steps beyond their bounds.
-    pub(crate) fn spanning(voxels: &[Voxel], margin: i32) -> Self {
-        let bound = |pick: fn(i32, i32) -> i32| {
-            voxels.iter().copied().reduce(|a, b| [0, 1, 2].map(|i| pick(a[i], b[i])))
-        };
-        let (low, high) = (bound(i32::min).unwrap_or([0; 3]), bound(i32::max).unwrap_or([0; 3]));
+    /// Create a map for about `num` voxels in the box between two, for look-ups at most `margin`
+    /// steps beyond it.
+    pub(crate) fn between([low, high]: [Voxel; 2], margin: i32, num: usize) -> Self {
         let size =
             [0, 1, 2].map(|i| i64::from(high[i]) - i64::from(low[i]) + 1 + 2 * i64::from(margin));
         let num_slots = size.iter().try_fold(1_i64, |product, &side| product.checked_mul(side));
         match num_slots.and_then(|num| usize::try_from(num).ok()) {
-            Some(num) if num <= SLOTS_A_VOXEL * voxels.len() => Self::Dense {
+            Some(num_slots) if num_slots <= SLOTS_A_VOXEL * num => Self::Dense {
                 corner: low.map(|i| i.saturating_sub(margin)),
                 size: size.map(|side| side as usize),
-                slots: vec![FREE_INDEX; num],
+                slots: vec![FREE_INDEX; num_slots],
             },
-            _ => Self::Sparse(VoxelTable::with_capacity(voxels.len() / 4)),
+            _ => Self::Sparse(VoxelTable::with_capacity(num / 4)),
         }
     }
 
@@ -212,9 +214,14 @@ impl VoxelIndex {
 
     /// Return the value of a voxel; `value` is inserted if there is none.
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> u32 {
+        self.entry_at(self.slot(voxel), voxel, value)
+    }
+
+    /// Return the same as [`VoxelIndex::entry`] for a voxel whose slot is known.
+    pub(crate) fn entry_at(&mut self, slot: usize, voxel: Voxel, value: u32) -> u32 {
         match self {
-            Self::Dense { corner, size, slots } => {
-                let slot = &mut slots[slot_of(voxel, corner, size)];
+            Self::Dense { slots, .. } => {
+                let slot = &mut slots[slot];
                 if *slot == FREE_INDEX {
                     *slot = value;
                 }
@@ -233,6 +240,11 @@ fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
 
 const HALF: i32 = 1 << 20;
 
+/// Return the block of 4 x 4 x 4 voxels around a voxel.
+fn block_of(voxel: Voxel) -> Voxel {
+    clamped(voxel).map(|i| i >> 2)
+}
+
 /// Clamp a voxel's index: voxels within a million of the origin (10 km at 0.01 m) are
 /// distinguished.
 fn clamped(voxel: Voxel) -> Voxel {
@@ -244,25 +256,60 @@ fn key_of(voxel: Voxel) -> u64 {
     x << 42 | y << 21 | z
 }
 
+/// Return the smallest and the largest corner of the box around points; `None` without points.
+pub(crate) fn bounds(points: &[Point]) -> Option<[Point; 2]> {
+    let &first = points.first()?;
+    Some(points.iter().fold([first; 2], |[low, high], point| {
+        // `f32::min` looks out for NaN, which takes longer.
+        let lower = [0, 1, 2].map(|i| if point[i] < low[i] { point[i] } else { low[i] });
+        [lower, [0, 1, 2].map(|i| if point[i] > high[i] { point[i] } else { high[i] })]
+    }))
+}
+
 /// Reduce points to one per voxel, the mean of the points inside, in the order of the voxels' first
 /// points. This is Open3D's `voxel_down_sample` with voxels aligned to the world instead of the
 /// cloud.
 pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     let inverse_edge = 1.0 / edge_m;
-    let mut blocks = Blocks::with_capacity(points.len() / 16);
-    let mut sums: Vec<([f64; 3], f64)> = Vec::with_capacity(points.len());
+    let Some(corners) = bounds(points) else { return Vec::new() };
+    let corners = corners.map(|corner| block_of(voxel_of(corner, inverse_edge)));
+    let mut index = VoxelIndex::between(corners, 0, points.len());
+    // Number of the average of each voxel, by blocks.
+    let mut blocks: Vec<[u32; 64]> = Vec::with_capacity(points.len() / 4);
+    let mut last = ([i32::MAX; 3], 0);
+    let mut averages: Vec<Point> = Vec::with_capacity(points.len());
+    // Of the voxels with several points: sum, number of points, and number of the average.
+    let mut sums: Vec<([f64; 3], f64, u32)> = Vec::new();
+    let mut sum_of: Vec<u32> = Vec::with_capacity(points.len());
     for &point in points {
-        let (indices, place) = blocks.entry(voxel_of(point, inverse_edge), [FREE_INDEX; 64]);
-        let index = &mut indices[place];
-        if *index == FREE_INDEX {
-            *index = sums.len() as u32;
-            sums.push(([0.0; 3], 0.0));
+        let voxel = clamped(voxel_of(point, inverse_edge));
+        let block = voxel.map(|i| i >> 2);
+        if block != last.0 {
+            last = (block, index.entry(block, blocks.len() as u32) as usize);
+            if last.1 == blocks.len() {
+                blocks.push([FREE_INDEX; 64]);
+            }
         }
-        let (sum, count) = &mut sums[*index as usize];
+        let average = &mut blocks[last.1][place(voxel)];
+        if *average == FREE_INDEX {
+            *average = averages.len() as u32;
+            averages.push(point);
+            sum_of.push(FREE_INDEX);
+            continue;
+        }
+        let sum = &mut sum_of[*average as usize];
+        if *sum == FREE_INDEX {
+            *sum = sums.len() as u32;
+            sums.push((averages[*average as usize].map(f64::from), 1.0, *average));
+        }
+        let (sum, count, _) = &mut sums[*sum as usize];
         for (sum, value) in sum.iter_mut().zip(point) {
             *sum += f64::from(value);
         }
         *count += 1.0;
     }
-    sums.into_iter().map(|(sum, count)| sum.map(|s| (s / count) as f32)).collect()
+    for (sum, count, average) in sums {
+        averages[average as usize] = sum.map(|value| (value / count) as f32);
+    }
+    averages
 }
