@@ -130,8 +130,10 @@ def checked(entries: Entries) -> Entries:
             value = float(numbers[row, column])
             rule = "must be from 0 to 1" if column < 8 else "must be finite or None"
         raise _wrong(place, value, rule)
-    if len(np.unique(entries.ids)) < len(entries.ids):
+    if not (entries.ids[1:] > entries.ids[:-1]).all():  # most memories answer in the order of their numbers
         values, counts = np.unique(entries.ids, return_counts=True)
+        if len(values) == len(entries.ids):
+            return entries
         raise _wrong("entries(): entry_id", int(values[counts > 1][0]), "must be of one entry only")
     return entries
 

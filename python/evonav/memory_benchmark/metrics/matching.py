@@ -31,6 +31,9 @@ class Boxes:
         for index, body in enumerate(self.bodies):
             by_label.setdefault(body.category, []).append(index)
         self._of_label = {label: np.array(indices) for label, indices in by_label.items()}
+        # A memory is asked frame by frame, and its labels seldom change in between.
+        self._last_labels: tuple[str, ...] = ()
+        self._last_pairs = self._pairs_of(())
 
     def __len__(self) -> int:
         """Return the number of bodies."""
@@ -49,15 +52,18 @@ class Boxes:
             `(P,)` indices of entries in ascending order, `(P,)` indices of bodies, and `(P,)` distances from the centre
             to the box, 0 inside.
         """
-        none = np.empty(0, np.intp)
-        candidates = [self._of_label.get(label, none) for label in labels]
-        sizes = np.fromiter(map(len, candidates), np.intp, len(candidates))
-        if not sizes.sum():
-            return none, none, np.empty(0)
-        entries, bodies = np.repeat(np.arange(len(candidates)), sizes), np.concatenate(candidates).astype(np.intp)
+        if (names := tuple(labels)) != self._last_labels:
+            self._last_labels, self._last_pairs = names, self._pairs_of(names)
+        entries, bodies = self._last_pairs
         gaps_m = np.abs(centres_m[entries] - self.centres_m[bodies]) - self.half_sizes_m[bodies]
         gaps_m = np.maximum(gaps_m, 0.0)
         return entries, bodies, np.sqrt(np.einsum("ij,ij->i", gaps_m, gaps_m))
+
+    def _pairs_of(self, labels: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        none = np.empty(0, np.intp)
+        candidates = [self._of_label.get(label, none) for label in labels]
+        sizes = np.fromiter(map(len, candidates), np.intp, len(candidates))
+        return np.repeat(np.arange(len(candidates)), sizes), np.concatenate([none, *candidates])
 
     def match(
         self, labels: Sequence[str], centres_m: NDArray[np.float64]

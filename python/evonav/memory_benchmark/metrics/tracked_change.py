@@ -25,7 +25,7 @@ class _Wait:
             self.start = replace(now, evidence_frames=0)
 
     def answer(self, now: Clocks, is_done: bool) -> None:
-        now = self.last = replace(now, evidence_frames=self.evidence_frames)
+        now = self.last = Clocks(now.frames, now.seconds, now.metres, self.evidence_frames)
         if is_done:
             self.done = self.done or now
         elif self.must_stay:
