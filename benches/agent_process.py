@@ -213,5 +213,5 @@ def _start_s(hosting: AgentHosting) -> float:
     """Wall seconds until a process waits for requests."""
     began_s = time.perf_counter()
     with closing(AgentProcesses(hosting)) as processes:
-        processes.process("fu")
+        processes.lend("fu")
         return time.perf_counter() - began_s

@@ -291,9 +291,12 @@ def test_processes_are_reused_and_agents_are_not():
     first.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
     nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
     assert first.act(nothing).reason == "nothing left to explore"
-    process = processes.process("toy_agents:Explorer")
+    first.close()
+    first.close()
+    process = processes.lend("toy_agents:Explorer")
+    processes.take_back(process)
     assert second.sensors == first.sensors
-    assert processes.process("toy_agents:Explorer") is process
+    assert processes.lend("toy_agents:Explorer") is not process  # which `second` has
     with pytest.raises(AgentFailedError, match="begin_task comes first"):
         second.act(nothing)
     processes.close()

@@ -1,3 +1,5 @@
+from contextlib import nullcontext
+
 import pytest
 
 from evonav.agents.agent import SensorConfig
@@ -88,7 +90,9 @@ class Silent:
     cpu_s = 0.0
     relay = None
 
-    def process(self, name):
+    waiting = staticmethod(nullcontext)
+
+    def lend(self, name):
         return self
 
     def describe(self, label):

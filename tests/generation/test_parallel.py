@@ -7,7 +7,7 @@ import pytest
 from evonav.errors import InvalidArgumentError
 from evonav.parallel import pool as parallel
 from evonav.parallel.pool import Job, WorkerPool, open_pool
-from evonav.parallel.worker import EngineError, WorkerLostError, Workforce
+from evonav.parallel.worker import EngineError, Message, WorkerLostError, Workforce
 
 
 def make_echo(settings, alive):
@@ -67,7 +67,7 @@ class ScriptedWorker:
     def __init__(self, *said):
         self.said = list(said)
 
-    def send(self, text):
+    def send(self, key, text):
         pass
 
     def receive(self):
@@ -91,7 +91,7 @@ class ScriptedHost:
 
     def wait(self, workers, timeout_s):
         new = [worker for worker in workers if worker is not self.first]
-        is_starting = self.first.said[:1] == [("ready", "")]
+        is_starting = self.first.said[:1] == [Message("ready")]
         return [self.first] if is_starting or not new else new[:1]
 
     def close(self):
@@ -100,7 +100,7 @@ class ScriptedHost:
 
 def test_one_worker_goes_on_alone_where_no_others_start():
     texts = [str(i) for i in range(6)]
-    host = ScriptedHost(ScriptedWorker(("ready", ""), *(("done", text) for text in texts)))
+    host = ScriptedHost(ScriptedWorker(Message("ready"), *(Message("done", int(text), text) for text in texts)))
     with WorkerPool(host, 3, 60.0, 2) as pool:
         answers = answers_of(pool, texts)
     assert sorted(answer.text for answer in answers.values()) == texts
@@ -109,7 +109,7 @@ def test_one_worker_goes_on_alone_where_no_others_start():
 
 
 def test_it_is_an_error_once_that_worker_is_lost_too():
-    host = ScriptedHost(ScriptedWorker(("ready", ""), ("done", "0")))
+    host = ScriptedHost(ScriptedWorker(Message("ready"), Message("done", 0, "0")))
     with WorkerPool(host, 3, 60.0, 2) as pool, pytest.raises(EngineError, match="workers do not start: gone"):
         answers_of(pool, ["0", "1", "2", "3"])
 

@@ -86,15 +86,16 @@ def evaluate(
     named = named_agents(agents)
     settings = read_settings(RunSettings, "", {**options, "workers": _num_workers(workers, named)}, "evaluate")
     decisions = read_settings(DecisionSettings, "kind", decision, "decision")
+    simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
+    settings = settings.with_episodes([decisions], [simulation])
     costs = read_settings(SpendingSettings, "", spending or {}, "spending")
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
     decisions.check()
     recorded = recorded_backend(folder)
-    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_workers), recorded)
+    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_episodes), recorded)
     if not decisions.asks_rules:
         check_decision(model, seed)
-    simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
     backend = Backend(
         simulator=simulation.component(recorded),
         perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 from evonav.parallel.work import serve
-from evonav.parallel.worker import Worker, WorkerLostError
+from evonav.parallel.worker import Message, Worker, WorkerLostError
 
 END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""
@@ -30,13 +30,19 @@ def num_cores() -> int:
 class ProcessHost:
     """Starts processes on this machine."""
 
-    def __init__(self, work: str, settings: str) -> None:
-        """Remember the work and its settings; no process is started."""
-        self._work, self._settings = work, settings
+    def __init__(self, work: str, settings: str, *, has_threads: bool = False) -> None:
+        """Remember the work and its settings; no process is started.
+
+        Args:
+            work: `module:factory`.
+            settings: Text with which the factory is called.
+            has_threads: Run each job on a thread of its own.
+        """
+        self._arguments = (work, settings, has_threads)
 
     def start(self) -> "WorkerProcess":
         """Start another process."""
-        return WorkerProcess(self._work, self._settings)
+        return WorkerProcess(*self._arguments)
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
         """Wait until a worker has a message, and return all that have one."""
@@ -51,41 +57,59 @@ class ProcessHost:
 class WorkerProcess:
     """A process that runs jobs until its parent closes the connection or dies."""
 
-    def __init__(self, work: str, settings: str) -> None:
-        """Start the process."""
+    def __init__(self, *arguments: str | bool) -> None:
+        """Start the process with the arguments of `ProcessHost`."""
         context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
         with one_thread_each(), _without_main():
-            self._process = context.Process(target=_serve, args=(far_end, work, settings), daemon=True)
+            self._process = context.Process(target=_serve, args=(far_end, *arguments), daemon=True)
             self._process.start()
         far_end.close()
 
-    def send(self, text: str) -> None:
+    def send(self, key: int, text: str) -> None:
         """Send a job."""
         with suppress(BrokenPipeError):
-            self.connection.send_bytes(text.encode())
+            self.connection.send_bytes(f"{key} {text}".encode())
 
-    def receive(self) -> tuple[str, str]:
+    def receive(self) -> Message:
         """Return the next message."""
         try:
-            kind, _, text = self.connection.recv_bytes().decode().partition(" ")
+            kind, key, text = self.connection.recv_bytes().decode().split(" ", 2)
         except (EOFError, OSError):
             raise WorkerLostError(f"the worker process died ({cause_of_death(self._process)})") from None
-        return kind, text
+        return Message(kind, int(key), text)
 
     def close(self) -> None:
         """End the process at once."""
         end_process(self._process, self.connection)
 
 
-def _serve(connection: Connection, name: str, settings: str) -> None:
+def _serve(connection: Connection, name: str, settings: str, has_threads: bool) -> None:
     """Run the jobs that arrive, until the parent closes the connection."""
+
+    def job() -> tuple[int, str]:
+        key, _, text = connection.recv_bytes().decode().partition(" ")
+        return int(key), text
+
+    def send(message: Message) -> None:
+        connection.send_bytes(f"{message.kind} {message.key} {message.text}".encode())
+
     with suppress(OSError):
         Path("/proc/self/comm").write_text(PROCESS_NAME)
     end_with_parent()
-    jobs = iter(lambda: connection.recv_bytes().decode(), None)
+    if has_threads:
+        _raise_open_files()
     with suppress(EOFError, OSError):  # the parent closed the connection
-        serve(name, settings, jobs, lambda kind, text: connection.send_bytes(f"{kind} {text}".encode()))
+        serve(name, settings, iter(job, None), send, has_threads=has_threads)
+
+
+def _raise_open_files() -> None:
+    """Allow as many open files as the system does: each job has its own."""
+    import resource
+
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 @contextmanager

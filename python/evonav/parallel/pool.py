@@ -5,8 +5,12 @@ A job and its answer are text: nothing that a worker sends is unpickled. The wor
 text into the answer's text. A work that is a generator yields progress messages first. A job calls `alive()` to show
 that it is still running. If a worker dies, another one repeats its job; if a job is silent for too long, its worker is
 killed.
+
+A worker may run several jobs at once (`Workforce.jobs_at_once`). If it is lost, nobody knows which of them was the
+cause: their answers say that it was shared, and a job that `is_alone` shares its worker with no other.
 """
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections import Counter, deque
@@ -16,7 +20,7 @@ from itertools import islice
 from typing import Literal
 
 from evonav.parallel.work import end_work, load_work, steps
-from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Worker, WorkerLostError, Workforce
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Message, Worker, WorkerLostError, Workforce
 
 FailureKind = Literal["crash", "timeout", "error"]
 
@@ -35,6 +39,8 @@ class Job:
     text: str
     timeout_s: float | None = None
     """Longest silence before the job is abandoned; default: the pool's."""
+    is_alone: bool = False
+    """Run it on a worker that runs no other job meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +54,10 @@ class Answer:
     failure: FailureKind | None = None
     detail: str = ""
     """A traceback or one line, if the job failed."""
+    is_shared: bool = False
+    """True if the worker that was lost ran other jobs, too."""
+    is_displaced: bool = False
+    """True if it did not fail: its worker was ended because another job there was silent for too long."""
 
 
 class Pool(ABC):
@@ -99,12 +109,14 @@ def open_pool(
         from evonav.parallel.ray import RayHost
 
         host = RayHost(work, settings, workforce)
-        return WorkerPool(host, min(workforce.num_workers, host.max_workers), timeout_s, max_losses)
+        num_workers = min(workforce.num_workers, host.max_workers)
+        return WorkerPool(host, num_workers, timeout_s, max_losses, workforce.jobs_at_once)
     if workforce.num_workers == 0:
         return InlinePool(work, settings)
     from evonav.parallel.local import ProcessHost
 
-    return WorkerPool(ProcessHost(work, settings), workforce.num_workers, timeout_s, max_losses)
+    local_host = ProcessHost(work, settings, has_threads=workforce.jobs_at_once > 1)
+    return WorkerPool(local_host, workforce.num_workers, timeout_s, max_losses, workforce.jobs_at_once)
 
 
 def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
@@ -145,7 +157,7 @@ class InlinePool(Pool):
         """Run the job until its next message."""
         assert self._job is not None, "`submit` comes first"
         kind, text = next(self._job)
-        return _answer(self._key, kind, text)
+        return _answer(Message(kind, self._key, text))
 
     def close(self) -> None:
         """End the job that is running."""
@@ -154,28 +166,42 @@ class InlinePool(Pool):
         end_work(self._work)
 
 
+@dataclass(slots=True)
+class _Running:
+    """A job that a worker runs."""
+
+    job: Job
+    heard_s: float
+    """Time of its last message."""
+
+
 class _Slot:
-    """A worker and the job that it runs."""
+    """A worker and the jobs that it runs."""
 
     def __init__(self, worker: Worker) -> None:
         self.worker = worker
         self.is_ready = False
-        self.job: Job | None = None
-        self.since_s = time.monotonic()
+        self.running: dict[int, _Running] = {}
+        self.began_s = time.monotonic()
 
     @property
     def is_idle(self) -> bool:
-        return self.is_ready and self.job is None
+        return self.is_ready and not self.running
+
+    @property
+    def is_lent_whole(self) -> bool:
+        return any(one.job.is_alone for one in self.running.values())
 
 
 class WorkerPool(Pool):
-    """Runs jobs on workers, one at a time on each."""
+    """Runs jobs on workers, one or several at a time on each."""
 
-    def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int) -> None:
+    def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int, jobs_at_once: int = 1) -> None:
         """Prepare a pool; workers start with the first jobs."""
-        self.capacity = 2 * num_workers  # one running and one waiting, so that no worker waits
+        self.capacity = num_workers * (jobs_at_once + 1)  # one of each is waiting, so that no worker waits
         self._host = host
         self._num_workers = num_workers
+        self._jobs_at_once = jobs_at_once
         self._timeout_s = timeout_s
         self._max_losses = max_losses
         self._queue: deque[Job] = deque()
@@ -194,13 +220,12 @@ class WorkerPool(Pool):
         while not self._answers:
             self._assign()
             busy = [slot for slot in self._slots if not slot.is_idle]
-            now_s = time.monotonic()
-            left_s = min(slot.since_s + self._limit_s(slot) - now_s for slot in busy)
+            left_s = min(self._deadline_s(slot) for slot in busy) - time.monotonic()
             ready = self._host.wait([slot.worker for slot in busy], max(0.0, left_s))
             for slot in busy:
                 if slot.worker in ready:
                     self._receive(slot)
-                elif time.monotonic() - slot.since_s >= self._limit_s(slot):
+                elif time.monotonic() >= self._deadline_s(slot):
                     self._give_up(slot)
         self._assign()
         return self._answers.popleft()
@@ -209,41 +234,64 @@ class WorkerPool(Pool):
     def _has_ready(self) -> bool:
         return any(slot.is_ready for slot in self._slots)
 
-    def _limit_s(self, slot: _Slot) -> float:
-        if slot.job is None:
-            return START_TIMEOUT_S
-        return self._timeout_s if slot.job.timeout_s is None else slot.job.timeout_s
+    def _limit_s(self, job: Job) -> float:
+        return self._timeout_s if job.timeout_s is None else job.timeout_s
+
+    def _deadline_s(self, slot: _Slot) -> float:
+        """Return when a worker is given up."""
+        if not slot.is_ready:
+            return slot.began_s + START_TIMEOUT_S
+        return min(one.heard_s + self._limit_s(one.job) for one in slot.running.values())
 
     def _assign(self) -> None:
-        idle = [slot for slot in self._slots if slot.is_idle]
-        for slot in idle[: len(self._queue)]:
-            slot.job, slot.since_s = self._queue.popleft(), time.monotonic()
-            slot.worker.send(slot.job.text)
+        while self._queue and (slot := self._free_slot(self._queue[0])) is not None:
+            job = self._queue.popleft()
+            slot.running[job.key] = _Running(job, time.monotonic())
+            slot.worker.send(job.key, job.text)
         num_starting = sum(not slot.is_ready for slot in self._slots)
         num_missing = min(len(self._queue) - num_starting, self._num_workers - len(self._slots))
         if self._num_failed_starts >= MAX_FAILED_STARTS and self._has_ready:
             return
         self._slots += [_Slot(self._host.start()) for _ in range(num_missing)]
 
+    def _free_slot(self, job: Job) -> _Slot | None:
+        """Return the worker for the next job: the one with the fewest, which leaves the others their share."""
+        num_open = len(self._queue) + sum(len(slot.running) for slot in self._slots)
+        share = math.ceil(num_open / max(1, self._num_slots))
+        most = 1 if job.is_alone else max(1, min(self._jobs_at_once, share))
+        free = [slot for slot in self._slots if slot.is_ready and len(slot.running) < most and not slot.is_lent_whole]
+        return min(free, key=lambda slot: len(slot.running), default=None)
+
+    @property
+    def _num_slots(self) -> int:
+        """Number of workers that share the jobs: those that run, and those that may still be started."""
+        if self._num_failed_starts >= MAX_FAILED_STARTS:
+            return sum(slot.is_ready for slot in self._slots)
+        return self._num_workers
+
     def _receive(self, slot: _Slot) -> None:
         try:
-            kind, text = slot.worker.receive()
+            message = slot.worker.receive()
         except WorkerLostError as error:
             self._lose(slot, str(error))
             return
-        slot.since_s = time.monotonic()
-        if kind == "broken":
-            raise EngineError(f"workers do not start: {text.strip().splitlines()[-1]}")
-        if kind == "ready":
+        if message.kind == "broken":
+            raise EngineError(f"workers do not start: {message.text.strip().splitlines()[-1]}")
+        if message.kind == "ready":
             slot.is_ready = True
             self._num_failed_starts = 0
-        elif slot.job is not None and kind != "alive":
-            answer = _answer(slot.job.key, kind, text)
+            return
+        running = slot.running.get(message.key)
+        if running is None:
+            return
+        running.heard_s = time.monotonic()
+        if message.kind != "alive":
+            answer = _answer(message)
             self._answers.append(answer)
             if answer.is_end:
                 self._num_failed_starts = 0
                 self._losses.pop(answer.key, None)
-                slot.job = None
+                del slot.running[message.key]
 
     def _lose(self, slot: _Slot, message: str) -> None:
         self._close(slot)
@@ -251,21 +299,29 @@ class WorkerPool(Pool):
             self._num_failed_starts += 1
             if self._num_failed_starts >= MAX_FAILED_STARTS and not self._has_ready:
                 raise EngineError(f"workers do not start: {message}")
-        if slot.job is None:
-            return
-        self._losses[slot.job.key] += 1
-        if self._losses[slot.job.key] <= self._max_losses:
-            self._queue.appendleft(slot.job)
-        else:
-            del self._losses[slot.job.key]
-            self._answers.append(Answer(slot.job.key, failure="crash", detail=message))
+        for key, running in reversed(slot.running.items()):
+            self._losses[key] += 1
+            if self._losses[key] <= self._max_losses:
+                self._queue.appendleft(running.job)
+            else:
+                del self._losses[key]
+                is_shared = len(slot.running) > 1
+                self._answers.append(Answer(key, failure="crash", detail=message, is_shared=is_shared))
 
     def _give_up(self, slot: _Slot) -> None:
+        """End a worker with a job that was silent for too long."""
         self._close(slot)
-        if slot.job is None:
+        if not slot.is_ready:
             raise EngineError(f"a worker was not ready within {START_TIMEOUT_S:g} s")
-        detail = f"not done within {self._limit_s(slot):g} s"
-        self._answers.append(Answer(slot.job.key, failure="timeout", detail=detail))
+        now_s, is_shared = time.monotonic(), len(slot.running) > 1
+        for key, running in reversed(slot.running.items()):
+            limit_s = self._limit_s(running.job)
+            is_silent = now_s - running.heard_s >= limit_s
+            if is_silent:
+                detail = f"not done within {limit_s:g} s"
+                self._answers.append(Answer(key, failure="timeout", detail=detail, is_shared=is_shared))
+            else:
+                self._answers.append(Answer(key, is_shared=is_shared, is_displaced=True))
 
     def _close(self, slot: _Slot) -> None:
         slot.worker.close()
@@ -278,7 +334,7 @@ class WorkerPool(Pool):
         self._host.close()
 
 
-def _answer(key: int, kind: str, text: str) -> Answer:
-    if kind == "error":
-        return Answer(key, failure="error", detail=text)
-    return Answer(key, text, is_end=kind == "done")
+def _answer(message: Message) -> Answer:
+    if message.kind == "error":
+        return Answer(message.key, failure="error", detail=message.text)
+    return Answer(message.key, message.text, is_end=message.kind == "done")

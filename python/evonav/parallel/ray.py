@@ -10,7 +10,7 @@ from typing import Any
 
 from evonav.parallel.local import END_TIMEOUT_S, THREAD_VARIABLES
 from evonav.parallel.work import serve
-from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Worker, WorkerLostError, Workforce
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Message, Worker, WorkerLostError, Workforce
 
 
 class RayHost:
@@ -34,7 +34,7 @@ class RayHost:
         except ImportError as error:
             raise EngineError(f"engine ray needs Ray: pip install 'evonav[ray]' ({error})") from None
         self._ray: Any = ray
-        self._work, self._settings = work, settings
+        self._arguments = (work, settings, workforce.jobs_at_once > 1)
         self._is_owner = not ray.is_initialized()
         if self._is_owner:
             num_all = math.ceil(workforce.num_workers * num_cpus)
@@ -48,7 +48,8 @@ class RayHost:
             self.close()
             needs = f"{num_cpus:g} CPU" + (f", {num_gpus:g} GPU" if num_gpus else "")
             raise EngineError(f"the Ray cluster has too little for one worker ({needs})")
-        self._actor = ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_restarts=0)(_Actor)
+        # A message is always waited for, while jobs are begun.
+        self._actor = ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_restarts=0, max_concurrency=3)(_Actor)
 
     def _room_for(self, needed: dict[str, float]) -> int:
         """Return how many workers with these needs fit into the cluster."""
@@ -57,7 +58,7 @@ class RayHost:
 
     def start(self) -> "RayWorker":
         """Start another actor."""
-        return RayWorker(self._ray, self._actor.remote(self._work, self._settings))
+        return RayWorker(self._ray, self._actor.remote(*self._arguments))
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
         """Wait until a worker has a message, and return all that have one."""
@@ -79,58 +80,59 @@ class RayWorker:
     def __init__(self, ray: Any, actor: Any) -> None:  # noqa: ANN401 - Ray is not imported here
         """Ask the actor for its first message."""
         self._ray, self._actor = ray, actor
-        self._is_idle = False
+        self._num_open: int | None = None
+        """Number of its jobs; `None` before it is ready, and after it is closed."""
         self.message: Any = actor.next.remote()
 
-    def send(self, text: str) -> None:
+    def send(self, key: int, text: str) -> None:
         """Send a job."""
-        self._is_idle = False
-        self._actor.begin.remote(text)
-        self.message = self._actor.next.remote()
+        self._num_open = (self._num_open or 0) + 1
+        self._actor.begin.remote(key, text)
 
-    def receive(self) -> tuple[str, str]:
+    def receive(self) -> Message:
         """Return the next message."""
         try:
-            kind, text = self._ray.get(self.message, timeout=START_TIMEOUT_S)
+            message: Message = self._ray.get(self.message, timeout=START_TIMEOUT_S)
         except self._ray.exceptions.RayError as error:
             raise WorkerLostError(f"the Ray actor died ({type(error).__name__})") from None
-        self._is_idle = kind not in ("alive", "progress")
-        if not self._is_idle:
-            self.message = self._actor.next.remote()
-        return kind, text
+        if message.kind not in ("alive", "progress"):
+            self._num_open = 0 if self._num_open is None else self._num_open - 1
+        self.message = self._actor.next.remote()
+        return message
 
     def close(self) -> None:
         """End the actor; an idle one closes its work first."""
         with suppress(self._ray.exceptions.RayError):
-            if self._is_idle:
-                self._is_idle = False
+            if self._num_open == 0:
+                self._num_open = None
                 self._ray.get(self._actor.end.remote(), timeout=END_TIMEOUT_S)
             self._ray.kill(self._actor)
 
 
 class _Actor:
-    """An actor that runs jobs in a thread of its own, while calls fetch their messages."""
+    """An actor that runs jobs in threads of its own, while calls fetch their messages."""
 
-    def __init__(self, work: str, settings: str) -> None:
+    def __init__(self, work: str, settings: str, has_threads: bool) -> None:
         for name in THREAD_VARIABLES:
             os.environ.setdefault(name, "1")
-        self._jobs: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._messages: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._serve, args=(work, settings), daemon=True)
+        self._jobs: queue.SimpleQueue[tuple[int, str] | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._serve, args=(work, settings, has_threads), daemon=True)
         self._thread.start()
 
-    def begin(self, text: str) -> None:
-        self._jobs.put(text)
+    def begin(self, key: int, text: str) -> None:
+        self._jobs.put((key, text))
 
-    def next(self) -> tuple[str, str]:
+    def next(self) -> Message:
         return self._messages.get()
 
     def end(self) -> None:
         self._jobs.put(None)
         self._thread.join(END_TIMEOUT_S)
 
-    def _serve(self, name: str, settings: str) -> None:
+    def _serve(self, name: str, settings: str, has_threads: bool) -> None:
+        jobs = iter(self._jobs.get, None)
         try:
-            serve(name, settings, iter(self._jobs.get, None), lambda *message: self._messages.put(message))
+            serve(name, settings, jobs, self._messages.put, has_threads=has_threads)
         except BaseException:  # a job that ends its process also ends the actor
             os._exit(1)

@@ -1,13 +1,15 @@
 """Run the jobs of a worker: load its work, run its jobs, and send their messages and heartbeats."""
 
+import os
+import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
 
 from evonav.component import import_callable
 from evonav.parallel import profiling
+from evonav.parallel.worker import Message
 
 Work = Callable[[str], str | Generator[str, None, str]]
 """Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
@@ -48,45 +50,85 @@ def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
         yield "done", answer
 
 
-@dataclass(slots=True)
-class Heartbeat:
-    """A worker's `alive`: sends at most one heartbeat every `HEARTBEAT_S`."""
+class Heartbeat(threading.local):
+    """A worker's `alive`: for the job of each thread, sends at most one heartbeat every `HEARTBEAT_S`."""
 
-    send: Callable[[], None]
-    last_s: float = field(default_factory=time.monotonic)
+    def __init__(self, send: Callable[[Message], None]) -> None:
+        """Belong to no job yet."""
+        self._send = send
+        self.key: int | None = None
+        """Key of the job that this thread runs."""
+        self._last_s = time.monotonic()
 
     def __call__(self) -> None:
         """Send a heartbeat, if it is time."""
-        if time.monotonic() - self.last_s >= HEARTBEAT_S:
-            self.last_s = time.monotonic()
-            self.send()
+        if self.key is not None and time.monotonic() - self._last_s >= HEARTBEAT_S:
+            self._last_s = time.monotonic()
+            self._send(Message("alive", self.key))
 
 
-def serve(work_name: str, settings: str, jobs: Iterator[str], send: Callable[[str, str], None]) -> None:
-    """Be a worker: load the work, run all jobs, and send the messages that `Worker.receive` describes.
+def serve(
+    work_name: str,
+    settings: str,
+    jobs: Iterator[tuple[int, str]],
+    send: Callable[[Message], None],
+    *,
+    has_threads: bool = False,
+) -> None:
+    """Be a worker: load the work, run all jobs, and send their messages.
 
     Args:
         work_name: `module:factory`.
         settings: Text with which the factory is called.
-        jobs: The texts of the jobs; the next one is taken when the one before has ended.
-        send: Sends a message: its kind and its text.
+        jobs: Keys and texts of the jobs.
+        send: Sends a message.
+        has_threads: Run each job on a thread of its own, as it comes. Otherwise the next one is taken when the one
+            before has ended.
     """
+    lock = threading.Lock()
+
+    def send_whole(message: Message) -> None:
+        with lock:
+            send(message)
+
+    alive = Heartbeat(send_whole)
     try:
-        work = load_work(work_name, settings, Heartbeat(lambda: send("alive", "")))
+        work = load_work(work_name, settings, alive)
     except Exception:
-        send("broken", traceback.format_exc())
+        send(Message("broken", text=traceback.format_exc()))
         return
+
+    def run(key: int, text: str) -> None:
+        alive.key = key
+        for kind, message in steps(work, text):
+            if kind != "progress":
+                profiling.save()  # after its last job, a worker is ended at once
+            send_whole(Message(kind, key, message))
+
     try:
-        send("ready", "")
+        send(Message("ready"))
         with profiling.sampled("workers"):
-            for text in jobs:
-                for kind, message in steps(work, text):
-                    if kind != "progress":
-                        profiling.save()  # after its last job, a worker is ended at once
-                    send(kind, message)
+            for key, text in jobs:
+                if has_threads:
+                    threading.Thread(target=_run_or_end, args=(run, key, text), daemon=True).start()
+                else:
+                    run(key, text)
     finally:
         try:
             end_work(work)
         except SystemExit:  # the parent's signal came in the middle of it, or before its first line
             end_work(work)
             raise
+
+
+def _run_or_end(run: Callable[[int, str], None], key: int, text: str) -> None:
+    """Run a job on a thread; what ends a process that runs one job at a time ends this one, too."""
+    try:
+        run(key, text)
+    except OSError:  # the parent has closed the connection, and ends this process
+        pass
+    except SystemExit as error:
+        os._exit(error.code if isinstance(error.code, int) else 1)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from evonav.errors import EvonavError, InvalidArgumentError
 
@@ -30,12 +30,15 @@ class Workforce:
     """CPUs that Ray reserves for each worker."""
     num_gpus: float = 0.0
     """GPUs that Ray reserves for each worker; may be a fraction of one."""
+    jobs_at_once: int = 1
+    """Number of jobs that a worker runs at once, on threads; for work that waits and that threads may share."""
 
     def __post_init__(self) -> None:
         """Check the fields.
 
         Raises:
-            InvalidArgumentError: There are too few workers, an address is given without Ray, or workers have no CPU.
+            InvalidArgumentError: There are too few workers or jobs, an address is given without Ray, or workers have no
+                CPU.
         """
         if self.num_workers < (1 if self.engine == "ray" else 0):
             raise InvalidArgumentError(f"num_workers = {self.num_workers}: too few for engine {self.engine}")
@@ -43,24 +46,33 @@ class Workforce:
             raise InvalidArgumentError(f"a Ray address is for engine ray, not {self.engine}")
         if not (self.num_cpus > 0.0 and self.num_gpus >= 0.0):
             raise InvalidArgumentError(f"{self}: a worker needs num_cpus > 0 and num_gpus >= 0")
+        if self.jobs_at_once < 1 or (self.jobs_at_once > 1 and self.num_workers == 0):
+            raise InvalidArgumentError(f"jobs_at_once = {self.jobs_at_once}: must be 1 or more, and 1 without workers")
 
 
 class WorkerLostError(EngineError):
     """A worker ended by itself."""
 
 
+class Message(NamedTuple):
+    """A message of a worker."""
+
+    kind: str
+    """`ready`, or `broken` if the factory failed; of a job `alive` and `progress`, and at its end `done` or `error`."""
+    key: int = 0
+    """Key of the job."""
+    text: str = ""
+    """Progress, answer, or a traceback."""
+
+
 class Worker(Protocol):
     """The pool's side of a worker, which sends `ready` once and then the messages of its jobs."""
 
-    def send(self, text: str) -> None:
+    def send(self, key: int, text: str) -> None:
         """Send a job; if the worker is lost, `receive` raises."""
 
-    def receive(self) -> tuple[str, str]:
+    def receive(self) -> Message:
         """Return the next message; call only when there is one.
-
-        Returns:
-            `("ready", "")`; during a job `("alive", "")` and `("progress", text)`, and at its end `("done", answer)` or
-            `("error", traceback)`; `("broken", traceback)` if the factory failed.
 
         Raises:
             WorkerLostError: The worker ended.

@@ -130,7 +130,7 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     except ValidationError as error:
         raise InvalidArgumentError(_sentence(path, error)) from None
     _check(sweep, path)
-    return sweep
+    return sweep.with_episodes(sweep.decisions.values(), sweep.simulators.values())
 
 
 def sweep_schema() -> dict[str, Any]:

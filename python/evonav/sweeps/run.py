@@ -33,7 +33,8 @@ from evonav.tasks.listing import TaskFile, task_files
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1
-_HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "num_retries", "stage_timeout_s", "agent_timeout_s"}
+_HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "episodes_at_once", "num_retries"}
+_HOW |= {"stage_timeout_s", "agent_timeout_s"}
 """Entries of a sweep file that do not decide records."""
 
 
@@ -190,7 +191,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
     if sweep.decisions[run.cell.decision].asks_rules:
         return run
     resources = DecisionResources(
-        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, sweep.num_workers)
+        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_askers=sweep.num_episodes
     )
     try:
         config = config_of(sweep, run.cell, out, resources)

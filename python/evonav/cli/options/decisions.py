@@ -34,7 +34,7 @@ def decision_component(
     spending: "SpendingSettings",
     out: Path,
     seed: int,
-    num_workers: int,
+    num_askers: int,
     *,
     recorded: "Mapping[str, Any] | None" = None,
     dry_run: bool = False,
@@ -46,7 +46,7 @@ def decision_component(
         spending: Prices and limit.
         out: Folder of the run, which stores answers and costs.
         seed: The run's.
-        num_workers: Number of processes that ask the model.
+        num_askers: Number of episodes that may ask the model at once.
         recorded: Header of the parts of a run that is resumed.
         dry_run: Return a model that cannot be asked, for estimates.
 
@@ -63,7 +63,7 @@ def decision_component(
         flags = {"prices": spending.prices is not None, "max-cost": spending.max_cost is not None, "dry-run": dry_run}
         for flag in (name for name, is_given in flags.items() if is_given):
             raise typer.BadParameter(f"--{flag} is for --decision vlm")
-    resources = None if dry_run else DecisionResources.of_run(out, spending, num_workers)
+    resources = None if dry_run else DecisionResources.of_run(out, spending, num_askers)
     decision = decisions.component(seed, resources, recorded)
     if resources is not None and not decisions.asks_rules:
         check_decision(decision, seed)

@@ -135,6 +135,7 @@ def settings_options(name: str) -> Options:
 
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
     pool = ("workers", "engine", "ray_address")
+    evaluators = (*pool, "episodes_at_once", "worker_gpus")
     agents = ("isolation", "agent_timeout_s")
     return {
         "decisions": Options(
@@ -172,9 +173,9 @@ def settings_options(name: str) -> Options:
             RunSettings,
             WORKER_PANEL,
             names=run_names,
-            fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb", "shift_coordinates"),
+            fields=(*evaluators, "num_retries", *agents, "agent_memory_mb", "shift_coordinates"),
         ),
-        "changes": Options(RunSettings, WORKER_PANEL, fields=(*pool, "worker_gpus"), overrides=True),
+        "changes": Options(RunSettings, WORKER_PANEL, fields=evaluators, overrides=True),
     }[name]
 
 

@@ -108,13 +108,14 @@ def evaluate(
 
         check_terminal()
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
+    run = run.with_episodes([decisions], [simulation])
     workforce = run.workforce()
     recorded = recorded_backend(out)
     backend = Backend(
         simulator=simulation.component(recorded),
         perception=perception.component(),
         decision=decision_component(
-            decisions, spending, out, seed, run.num_workers, recorded=recorded, dry_run=dry_run
+            decisions, spending, out, seed, run.num_episodes, recorded=recorded, dry_run=dry_run
         ),
     )
     config = run.config(seed, backend, decisions)
@@ -246,7 +247,9 @@ def profiled(run: "RunSettings") -> "RunSettings":
         raise typer.BadParameter("--profile samples workers on this machine only: use --engine local")
     if run.isolation == "sandbox":
         raise typer.BadParameter("--profile needs agents that can write their samples: use --isolation process")
-    return run.model_copy(update={"isolation": run.isolation or "process"})
+    if (run.episodes_at_once or 1) > 1:
+        raise typer.BadParameter("--profile samples one thread of each worker: use --episodes-at-once 1")
+    return run.model_copy(update={"isolation": run.isolation or "process", "episodes_at_once": 1})
 
 
 def sampling(out: Path, is_profiled: bool) -> "AbstractContextManager[None]":

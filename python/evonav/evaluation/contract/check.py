@@ -158,8 +158,8 @@ class _Examination:
             run.records.append(record)
             if record.error is not None and record.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
                 break
-            used_mb = processes.process(self._name).memory_mb if record.num_rounds else None
-            run.memory_mb = used_mb or run.memory_mb
+            run.memory_mb = (agent.memory_mb if record.num_rounds else None) or run.memory_mb
+        agent.close()
         return run
 
     def _check_remote(self, run: _Run) -> Check:

@@ -4,7 +4,7 @@ An agent's failure costs its stage: the same agent goes on with the next one, or
 that remembers nothing. The records of later stages say so. A failure of anything else ends the episode.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from time import process_time
 
@@ -39,8 +39,10 @@ class Episode:
         observer: EpisodeObserver | None = None,
         *,
         perception_seed: int | None = None,
+        own_cpu_s: Callable[[], float] = process_time,
     ) -> None:
         self._spec = spec
+        self._own_cpu_s = own_cpu_s
         self._agent_name = agent_name
         self._context = EpisodeContext(
             spec,
@@ -114,8 +116,8 @@ class Episode:
         self._is_replaced = True
 
     def _cpu_s(self) -> float:
-        """Return the CPU time of this process and of the agent's own process."""
-        return process_time() + self._context.agent.cpu_s
+        """Return the CPU time of this process, or of what of it is the episode's, and of the agent's own process."""
+        return self._own_cpu_s() + self._context.agent.cpu_s
 
 
 def _hosted(agent: Agent | HostedAgent, spec: EpisodeSpec) -> tuple[HostedAgent, OracleBaseline | None]:

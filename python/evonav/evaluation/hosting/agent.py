@@ -126,7 +126,7 @@ class RemoteAgent(HostedAgent):
         """Start nothing yet.
 
         Args:
-            processes: Processes of agents; the agent's own is started or reused when it is needed.
+            processes: Processes of agents, which lend it one when it is needed, until `close`.
             name: Name of the agent.
             decision: Decision model, made in the agent's process.
             seed: Seed of the model.
@@ -149,6 +149,11 @@ class RemoteAgent(HostedAgent):
     def cpu_s(self) -> float:
         """CPU time that its processes have used."""
         return self._cpu_s
+
+    @property
+    def memory_mb(self) -> float | None:
+        """Peak resident memory of its process; `None` without one, or if the system does not report it."""
+        return None if self._process is None else self._process.memory_mb
 
     @property
     def is_lost(self) -> bool:
@@ -204,14 +209,21 @@ class RemoteAgent(HostedAgent):
         trusted = {} if self._process.relay is None else self._process.relay.costs()
         return {**{str(name): amount for name, amount in costs.items()}, **trusted}
 
+    def close(self) -> None:
+        """Give the process back; safe to call twice."""
+        if self._process is not None:
+            self._processes.take_back(self._process)
+        self._process = self._sensors = None
+
     def _make(self) -> None:
-        self._process = self._processes.process(self._name)
-        self._describe(self._label)
-        relay = self._process.relay
-        if relay is not None and is_relayed(self._decision):
-            options: Mapping[str, object] = relay.use(self._decision)
-        else:
-            options = self._decision.keywords
+        with self._processes.waiting():
+            self._process = self._processes.lend(self._name)
+            self._describe(self._label)
+            relay = self._process.relay
+            if relay is not None and is_relayed(self._decision):
+                options: Mapping[str, object] = relay.use(self._decision)
+            else:
+                options = self._decision.keywords
         self._sense(self._ask("make", self._decision.path, self._seed, options))
 
     def _sense(self, parts: Mapping[str, bytes]) -> None:
@@ -228,11 +240,12 @@ class RemoteAgent(HostedAgent):
         assert process is not None
         before_s = process.cpu_s
         try:
-            return process.ask(operation, *arguments)
+            with self._processes.waiting():
+                return process.ask(operation, *arguments)
         except AgentFailedError as error:
             self._is_lost = error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT)
             if self._is_lost or operation == "make":
-                self._process = self._sensors = None
+                self.close()
             raise
         finally:
             self._cpu_s += process.cpu_s - before_s

@@ -6,6 +6,7 @@ model of the run whatever it likes, within the run's limit of costs, and reach n
 
 import socket
 import threading
+import time
 from contextlib import suppress
 
 from pydantic import ValidationError
@@ -43,8 +44,12 @@ class ModelRelay:
         """Open the connection; `far_descriptor` is the end for the agent's process, to be closed here then."""
         self._near, self._far = socket.socketpair()
         self.far_descriptor = self._far.fileno()
+        self.agents_descriptor = self.far_descriptor
+        """Descriptor of that end in the agent's process."""
         self._client: VlmClient | None = None
         self._thread: threading.Thread | None = None
+        self.cpu_s = 0.0
+        """CPU time that it has used."""
 
     def use(self, decision: Component[DecisionModel]) -> dict[str, object]:
         """Make the client of a decision model, and return the options with which the agent's process makes its side.
@@ -57,7 +62,7 @@ class ModelRelay:
         if self._thread is None:
             self._thread = threading.Thread(target=self._serve, daemon=True)
             self._thread.start()
-        return {**decision.options, "mode": self._client.mode, "relay": self.far_descriptor}
+        return {**decision.options, "mode": self._client.mode, "relay": self.agents_descriptor}
 
     @property
     def is_open(self) -> bool:
@@ -84,7 +89,9 @@ class ModelRelay:
         # An end of the agent's process, or a message of an impossible size, after which no next one can be found.
         with self._near, suppress(OSError, InvalidArgumentError):
             while True:
-                write_message(descriptor, RESPONSE.dump_json(self._answer(read_message(descriptor))))
+                answer = RESPONSE.dump_json(self._answer(read_message(descriptor)))
+                self.cpu_s = time.thread_time()
+                write_message(descriptor, answer)
 
     def _answer(self, text: bytes) -> Response:
         try:

@@ -19,19 +19,23 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from evonav.agents.hosting import wire
+from evonav.agents.hosting import forking, wire
 from evonav.agents.hosting.error_text import clean
 from evonav.agents.hosting.sandbox import Policy, why_not
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
+from evonav.evaluation.hosting import fork_server
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
+from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
 from evonav.evaluation.hosting.model_relay import ModelRelay, why_not_shut_in
 from evonav.evaluation.records.schema import ErrorKind
@@ -44,8 +48,9 @@ LOAD_TIMEOUT_S = 300.0
 IS_SUPPORTED = os.name == "posix"
 """True where agents can have processes of their own; elsewhere they run in the evaluator's."""
 MAX_PROCESSES = 8
-"""Largest number of processes of a worker, one for each agent name; the least recently used one is ended."""
+"""Largest number of processes that a worker keeps; the one that was idle for longest is ended."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
+_STDERR = 2
 _PART_BYTES = 1 << 18
 _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
@@ -89,7 +94,7 @@ class AgentHosting:
     is_sandboxed: bool = False
     """Shut an agent's process in, so that it reads no file of a run or a task, and reaches no network (Linux)."""
     relays_model: bool = False
-    """Ask the decision model for processes in a sandbox, which have no network."""
+    """Ask the decision model for agents' processes: those in a sandbox have no network."""
     hidden: tuple[str, ...] = ()
     """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
     scratch: str | None = None
@@ -113,15 +118,19 @@ class AgentProcess:
     max_answer_bytes = MAX_ANSWER_BYTES
     """Largest answer."""
 
-    def __init__(self, name: str, hosting: AgentHosting) -> None:
+    def __init__(self, name: str, hosting: AgentHosting, fork_server: ForkServer | None = None) -> None:
         """Start the process and import the agent's module in it.
+
+        Args:
+            name: Name of the agent.
+            hosting: Settings of the process.
+            fork_server: Server that forks the process; default: a fresh one is started.
 
         Raises:
             AgentFailedError: The module cannot be imported in time, or the process died.
         """
         self.name = name
-        self.cpu_s = 0.0
-        """CPU time that the process reports."""
+        self._own_cpu_s = 0.0
         self._hosting = hosting
         self._ends = ExitStack()
         self._block = SharedBlock()
@@ -129,8 +138,8 @@ class AgentProcess:
         self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
         if self._scratch is not None:
             self._ends.callback(shutil.rmtree, self._scratch, ignore_errors=True)
-        self.relay = ModelRelay() if hosting.is_sandboxed and hosting.relays_model else None
-        """Asks the decision model for a process in a sandbox."""
+        self.relay = ModelRelay() if hosting.relays_model else None
+        """Asks the decision model for the process."""
         if self.relay is not None:
             self._ends.callback(self.relay.close)
         self._connection, far_end = socket.socketpair()
@@ -143,19 +152,13 @@ class AgentProcess:
         try:
             arguments = (far_end.fileno(), life, self._block.descriptor)
             inherited = arguments if self.relay is None else (*arguments, self.relay.far_descriptor)
-            shut_in = "" if self._scratch is None else _SHUT_IN
+            stderr = _STDERR if output is None else output.descriptor
             path = sys.path if self._scratch is None else search_path()
             with one_thread_each():
-                self._process = subprocess.Popen(  # noqa: S603 - ourselves
-                    [sys.executable, "-c", _START.format(shut_in, self.serving), *map(str, arguments), *path],
-                    pass_fds=inherited,
-                    cwd=self._scratch,
-                    env=None if self._scratch is None else environment(self._scratch),
-                    stdin=subprocess.DEVNULL,
-                    stdout=sys.__stderr__ if output is None else output.descriptor,
-                    stderr=None if output is None else output.descriptor,
-                    start_new_session=True,
-                )
+                self._process = self._started(fork_server, inherited, stderr, path)
+        except OSError as error:
+            self._ends.close()
+            raise AgentFailedError(ErrorKind.CRASH, f"the {self.noun}'s process does not start: {error}") from None
         finally:
             far_end.close()
             os.close(life)
@@ -163,6 +166,8 @@ class AgentProcess:
                 self.relay.close_far_end()
             if output is not None:
                 output.begin()
+        if isinstance(self._process, ForkedProcess):
+            self._ends.callback(self._process.close)
         self._watch = os.pidfd_open(self._process.pid) if hasattr(os, "pidfd_open") else None
         if self._watch is not None:
             self._ends.callback(os.close, self._watch)
@@ -182,6 +187,40 @@ class AgentProcess:
             self.close(is_at_once=True)
             raise
 
+    def _started(
+        self, fork_server: ForkServer | None, inherited: Sequence[int], stderr: int, path: Sequence[str]
+    ) -> AgentsOwn:
+        """Start the process.
+
+        Args:
+            fork_server: See above.
+            inherited: Its descriptors: of requests, life, memory, and of the model if it has one.
+            stderr: Descriptor of its output.
+            path: Its import path.
+        """
+        own_environment = None if self._scratch is None else environment(self._scratch)
+        if fork_server is not None:
+            if self.relay is not None:
+                self.relay.agents_descriptor = forking.RELAY
+            return fork_server.fork(
+                (stderr, stderr, *inherited),
+                folder=self._scratch,
+                environment=dict(os.environ) if own_environment is None else own_environment,
+                path=path,
+                is_sandboxed=self._scratch is not None,
+            )
+        start = _START.format("" if self._scratch is None else _SHUT_IN, self.serving)
+        return subprocess.Popen(  # noqa: S603 - ourselves
+            [sys.executable, "-c", start, *map(str, inherited[:3]), *path],
+            pass_fds=inherited,
+            cwd=self._scratch,
+            env=own_environment,
+            stdin=subprocess.DEVNULL,
+            stdout=stderr,
+            stderr=stderr,
+            start_new_session=True,
+        )
+
     def _shut_in(self, policy: Policy) -> None:
         data = json.dumps(asdict(policy)).encode()
         with suppress(OSError):  # a process that has ended already: the next request says so
@@ -192,6 +231,11 @@ class AgentProcess:
         """True if the process is alive and waits for a request."""
         is_relaying = self.relay is None or self.relay.is_open
         return is_relaying and not self._is_waiting and self._process.poll() is None
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that the process reports, and that of asking the model for it."""
+        return self._own_cpu_s + (0.0 if self.relay is None else self.relay.cpu_s)
 
     @property
     def memory_mb(self) -> float | None:
@@ -226,7 +270,7 @@ class AgentProcess:
             message = died or f"malformed response: {clean(str(error))}"
             raise AgentFailedError(ErrorKind.CRASH, message) from None
         self._is_waiting = False
-        self.cpu_s = cpu_s
+        self._own_cpu_s = cpu_s
         if (failure := parts.get("failure")) is not None:
             raise failure_of(failure, is_sandboxed=self._scratch is not None)
         return parts
@@ -303,33 +347,75 @@ class AgentProcess:
 
 
 class AgentProcesses:
-    """The agents' processes of a worker, by the name of the agent."""
+    """The agents' processes of a worker, each lent to one episode at a time. Any number of threads may use it."""
 
-    def __init__(self, hosting: AgentHosting) -> None:
-        """Remember the settings; processes start when they are needed."""
+    def __init__(
+        self, hosting: AgentHosting, waiting: Callable[[], AbstractContextManager[None]] = nullcontext
+    ) -> None:
+        """Remember the settings; processes start when they are needed.
+
+        Args:
+            hosting: The settings.
+            waiting: Lets other episodes compute while the block waits for a process.
+        """
         self.hosting = hosting
-        self._processes: dict[str, AgentProcess] = {}
+        self.waiting = waiting
+        self._fork_server = _new_fork_server(hosting)
+        self._lock = threading.Lock()
+        self._idle: list[AgentProcess] = []
+        """Those that were used last come last."""
+        self._lent: list[AgentProcess] = []
 
-    def process(self, name: str) -> AgentProcess:
-        """Return a process that waits for requests; start one if there is none.
+    def lend(self, name: str) -> AgentProcess:
+        """Return a process that waits for requests, until `take_back`; start one if none is idle.
 
         Raises:
             AgentFailedError: The process does not start.
         """
-        found = self._processes.pop(name, None)
-        if found is not None and not found.is_usable:
-            found.close(is_at_once=True)
-            found = None
-        while found is None and len(self._processes) >= MAX_PROCESSES:
-            self._processes.pop(next(iter(self._processes))).close()
-        self._processes[name] = process = found or AgentProcess(name, self.hosting)
+        with self._lock:
+            found = next((process for process in reversed(self._idle) if process.name == name), None)
+            if found is not None and found.is_usable:
+                self._idle.remove(found)
+                self._lent.append(found)
+                return found
+            ended = [process for process in self._idle if not process.is_usable]
+            num_over = len(self._idle) + len(self._lent) - len(ended) - MAX_PROCESSES + 1
+            usable = [process for process in self._idle if process not in ended]
+            ended += usable[: max(0, num_over)]
+            self._idle = [process for process in self._idle if process not in ended]
+        for process in ended:
+            process.close()
+        process = AgentProcess(name, self.hosting, self._fork_server)
+        with self._lock:
+            self._lent.append(process)
         return process
+
+    def take_back(self, process: AgentProcess) -> None:
+        """Keep a process for another episode, or end it if it cannot be used any more."""
+        with self._lock:
+            self._lent.remove(process)
+            if is_usable := process.is_usable:
+                self._idle.append(process)
+        if not is_usable:
+            process.close(is_at_once=True)
 
     def close(self) -> None:
         """End all processes; safe to call twice."""
-        for process in self._processes.values():
+        for process in (*self._idle, *self._lent):
             process.close()
-        self._processes.clear()
+        self._idle.clear()
+        if self._fork_server is not None:
+            self._fork_server.close()
+
+
+def _new_fork_server(hosting: AgentHosting) -> ForkServer | None:
+    """Return what forks processes; what they inherit of it holds nothing that an agent in a sandbox must not have."""
+    if not fork_server.IS_SUPPORTED:
+        return None
+    if not hosting.is_sandboxed:
+        return ForkServer(None, sys.path)
+    with one_thread_each():
+        return ForkServer(environment(Path(hosting.scratch or tempfile.gettempdir())), search_path())
 
 
 def check_importable(name: str, hosting: AgentHosting) -> None:

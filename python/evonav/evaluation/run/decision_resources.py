@@ -61,9 +61,10 @@ class DecisionResources:
     spending: SpendingSettings
     account: str | None = None
     """Name in the spending log; default: the model's."""
-    num_workers: int = 1
+    num_askers: int = 1
+    """Number of episodes that may ask at once."""
 
     @classmethod
-    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_workers: int) -> "DecisionResources":
+    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_askers: int) -> "DecisionResources":
         """Return the resources of a run that has a spending log of its own."""
-        return cls(run_dir, run_dir / LEDGER_NAME, spending, num_workers=num_workers)
+        return cls(run_dir, run_dir / LEDGER_NAME, spending, num_askers=num_askers)

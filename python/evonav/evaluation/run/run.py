@@ -91,6 +91,7 @@ def evaluate(
     *,
     config: RunConfig | None = None,
     num_workers: int = 1,
+    episodes_at_once: int = 1,
     num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
@@ -103,6 +104,7 @@ def evaluate(
         run_dir: Holds `records.sqlite` and `summary.json`.
         config: Must be the run's own when the folder already holds one.
         num_workers: Processes of this machine; 0 runs everything in this process.
+        episodes_at_once: Episodes that each of them runs at once, with agents in processes of their own.
         num_retries: Number of retries of a stage, see `evaluate_all`.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called after every recorded stage.
@@ -118,7 +120,7 @@ def evaluate(
     request = RunRequest(tuple(agents), tuple(tasks), run_dir, config or RunConfig())
     (summaries,) = evaluate_all(
         [request],
-        Workforce(num_workers),
+        Workforce(num_workers, jobs_at_once=episodes_at_once),
         num_retries=num_retries,
         retry_errored=retry_errored,
         on_progress=lambda _, progress: on_progress(progress),
@@ -154,7 +156,7 @@ def evaluate_all(
         EngineError: Workers do not start.
     """
     num_workers = workforce.num_workers
-    _check_requests(requests, num_workers)
+    _check_requests(requests, workforce)
     for request in requests:
         if not (request.run_dir / FILE_NAME).exists():  # a run that cannot begin leaves no folder behind
             request.config.backend.check_perception(request.agents)
@@ -163,13 +165,13 @@ def evaluate_all(
         runs: list[RunJobs] = []
         for index, request in enumerate(requests):
             stack.enter_context(writing(request.run_dir))
-            runs.append(stack.enter_context(closing(_begin(request, num_workers, num_retries, retry_errored))))
+            runs.append(stack.enter_context(closing(_begin(request, workforce, num_retries, retry_errored))))
             on_progress(index, runs[-1].progress(None))
         if num_jobs := sum(len(run.jobs) for run in runs):
             schedule = Schedule(runs, num_retries)
             with open_pool(
                 WORK,
-                "",
+                str(workforce.jobs_at_once),
                 replace(workforce, num_workers=min(num_workers, num_jobs)),
                 timeout_s=max(run.limit_s for run in runs),
                 max_losses=0,  # the schedule counts them
@@ -180,7 +182,7 @@ def evaluate_all(
         return [run.summaries or run.summarise() for run in runs]
 
 
-def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> RunJobs:
+def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_errored: bool) -> RunJobs:
     """Claim a run's folder and return the jobs that are left."""
     with RunStore(request.run_dir, create=True) as store:
         request = _as_begun(request, store)
@@ -191,7 +193,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         states = store.states()
         floor_plans = store.floor_plan_keys()
     config = request.config
-    hosting = _hosting(request, num_workers)
+    hosting = _hosting(request, workforce)
     worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
     # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
@@ -219,7 +221,7 @@ def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     if jobs:
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)
-            note_session(store, num_workers, isolation_facts(hosting.isolation))
+            note_session(store, workforce.num_workers, isolation_facts(hosting.isolation))
     return RunJobs(request.run_dir, worker_config, limit_s, request.agents, request.tasks, jobs, states)
 
 
@@ -244,13 +246,15 @@ def _with_scratch(requests: Sequence[RunRequest], stack: ExitStack) -> Sequence[
     return [replace(one, config=config) for one, config in zip(requests, configs, strict=True)]
 
 
-def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
+def _hosting(request: RunRequest, workforce: Workforce) -> AgentHosting:
     hosting = request.config.hosting
     return replace(
         hosting,
-        is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
+        is_in_process=hosting.is_in_process or workforce.num_workers == 0 or not IS_SUPPORTED,
         hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
-        relays_model=hosting.is_sandboxed and is_relayed(request.config.backend.decision),
+        # Many processes would each need the memory of what asks the model.
+        relays_model=(hosting.is_sandboxed or workforce.jobs_at_once > 1)
+        and is_relayed(request.config.backend.decision),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
 
@@ -273,7 +277,7 @@ def perception_seed(seed: int, task_id: str) -> int:
     return agent_seed(seed, "", task_id)
 
 
-def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
+def _check_requests(requests: Sequence[RunRequest], workforce: Workforce) -> None:
     if len({request.run_dir.absolute() for request in requests}) != len(requests):
         raise InvalidArgumentError("two runs have the same folder")
     checked: set[tuple[str, str]] = set()
@@ -284,7 +288,10 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
             raise InvalidArgumentError(f"an agent is named twice: {', '.join(request.agents)}")
         if not request.tasks:
             raise InvalidArgumentError("no task to evaluate on")
-        hosting = _hosting(request, num_workers)
+        hosting = _hosting(request, workforce)
+        if hosting.is_in_process and workforce.jobs_at_once > 1:
+            message = "several episodes at once need agents in processes of their own"
+            raise InvalidArgumentError(f"episodes_at_once = {workforce.jobs_at_once}: {message}")
         if hosting.is_sandboxed:
             check_sandbox(hosting, request.config.backend.decision)
         elif any(task.was_sealed for task in request.tasks):
@@ -294,7 +301,7 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
-            if num_workers and name.startswith("__main__:"):
+            if workforce.num_workers and name.startswith("__main__:"):
                 raise InvalidArgumentError(
                     f"`{name}`: a worker cannot import the script that is running; move it to a module of its own, "
                     "or use num_workers=0"

@@ -1,6 +1,7 @@
 """Declare the options of a run's workers, limits and retries, once for Python, sweep files and commands."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import Field
 
@@ -13,7 +14,12 @@ from evonav.parallel.worker import EngineName, Workforce
 if TYPE_CHECKING:
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
-    from evonav.evaluation.run.settings import DecisionSettings
+    from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
+
+SettingsT = TypeVar("SettingsT", bound="RunSettings")
+
+VLM_EPISODES_AT_ONCE = 16
+"""Episodes that a worker runs at once where a server is asked, which takes most of the time."""
 
 
 class RunSettings(Settings):
@@ -21,6 +27,9 @@ class RunSettings(Settings):
 
     workers: int | None = Field(default=None, ge=0)
     """Number of worker processes; 0 runs in this process. Default: one per core."""
+    episodes_at_once: int | None = Field(default=None, ge=1, le=1000)
+    """Number of episodes that each worker runs at once, so that one computes while others wait for a model.
+    Default: 1, with a VLM 16."""
     engine: EngineName = "local"
     """Run workers as local processes or as Ray actors."""
     ray_address: str | None = None
@@ -46,17 +55,48 @@ class RunSettings(Settings):
         """The number of workers: the given one, or one per core."""
         return num_cores() if self.workers is None else self.workers
 
+    @property
+    def num_episodes(self) -> int:
+        """Number of episodes that are run at once, 1 or more; 1 a worker before `with_episodes`."""
+        return max(1, self.num_workers) * (self.episodes_at_once or 1)
+
+    def with_episodes(
+        self: SettingsT, decisions: "Iterable[DecisionSettings]", simulators: "Iterable[SimulatorSettings]"
+    ) -> SettingsT:
+        """Return these settings with a number of episodes at once: the given one, or the default.
+
+        Args:
+            decisions: The decision models that these workers use.
+            simulators: Their simulators; AI2-THOR's has a process for each episode, so only one runs by default.
+        """
+        from evonav.evaluation.hosting.process import IS_SUPPORTED
+
+        if self.episodes_at_once is not None:
+            return self
+        waits = any(decision.kind == "vlm" for decision in decisions)
+        is_light = all(simulator.kind == "embedded" for simulator in simulators)
+        has_processes = IS_SUPPORTED and self.num_workers > 0 and self.isolation != "none"
+        number = VLM_EPISODES_AT_ONCE if waits and is_light and has_processes else 1
+        return self.model_copy(update={"episodes_at_once": number})
+
     def workforce(self) -> Workforce:
         """Return the workers.
 
         Raises:
-            SettingError: An option is of Ray, and the workers are not.
+            SettingError: An option is of Ray, and the workers are not; or agents without processes of their own are to
+                run several episodes at once.
             InvalidArgumentError: There are too few workers.
         """
         for key in ("ray_address", "worker_gpus"):
             if getattr(self, key) and self.engine != "ray":
                 raise SettingError(type(self), key, "is for engine ray")
-        return Workforce(self.num_workers, self.engine, self.ray_address, num_gpus=self.worker_gpus)
+        at_once = self.episodes_at_once or 1
+        if at_once > 1 and (self.num_workers == 0 or self.isolation == "none"):
+            reason = f"{at_once}: needs workers, and agents in processes of their own"
+            raise SettingError(type(self), "episodes_at_once", reason)
+        return Workforce(
+            self.num_workers, self.engine, self.ray_address, num_gpus=self.worker_gpus, jobs_at_once=at_once
+        )
 
     def config(
         self, seed: int, backend: "Backend", decisions: "DecisionSettings", protocol: ProtocolConfig | None = None

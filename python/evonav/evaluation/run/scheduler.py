@@ -159,6 +159,8 @@ class _Episode:
     job: EpisodeJob
     stage: int = 1
     """Stage that this attempt runs."""
+    is_alone: bool = False
+    """Run it on a worker that runs no other episode."""
     num_tried: Counter[int] = field(default_factory=Counter)
     """Number of failed attempts by stage."""
 
@@ -189,7 +191,7 @@ class Schedule:
             episode, number = self._waiting.popleft(), next(self._numbers)
             self._under_way[number] = episode
             run = self._runs[episode.index]
-            pool.submit(Job(number, episode.job.text(run.config_text), run.limit_s))
+            pool.submit(Job(number, episode.job.text(run.config_text), run.limit_s, episode.is_alone))
         return bool(self._under_way)
 
     def take(self, answer: Answer) -> Iterator[tuple[int, EncodedStage]]:
@@ -199,6 +201,10 @@ class Schedule:
             Index of the run, and a stage that was committed.
         """
         episode = self._under_way.pop(answer.key) if answer.is_end else self._under_way[answer.key]
+        if answer.is_displaced:  # another episode's fault, which costs this one no retry
+            episode.stage = 1
+            self._waiting.appendleft(episode)
+            return
         run = self._runs[episode.index]
         event = _event_of(answer, run)
         stages: Iterable[EncodedStage] = ()
@@ -207,7 +213,7 @@ class Schedule:
             stages = (event,)
         elif event is not None:
             failure = replace(event, stage=event.stage or episode.stage)
-            is_repeated = answer.is_end and self._is_repeated(episode, failure)
+            is_repeated = answer.is_end and self._is_repeated(episode, failure, is_shared=answer.is_shared)
             if is_repeated or not answer.is_end:  # before its end, the worker tries again itself
                 run.store.add_retry(episode.job.agent, episode.job.task_id, failure)
                 episode.stage = 1
@@ -222,12 +228,19 @@ class Schedule:
         if answer.is_end:
             run.end_job()
 
-    def _is_repeated(self, episode: _Episode, failure: StageFailure) -> bool:
-        """Return true if a retry of the stage is left, and use it up."""
-        if failure.kind not in RETRIED or episode.num_tried[failure.stage] >= self._num_retries:
+    def _is_repeated(self, episode: _Episode, failure: StageFailure, *, is_shared: bool) -> bool:
+        """Return true if a retry of the stage is left, and use it up.
+
+        A lost worker that ran several episodes does not tell which of them was the cause. So none of them fails by it:
+        one without a retry left runs once more, alone.
+        """
+        if failure.kind not in RETRIED:
             return False
-        episode.num_tried[failure.stage] += 1
-        return True
+        if episode.num_tried[failure.stage] < self._num_retries:
+            episode.num_tried[failure.stage] += 1
+            return True
+        episode.is_alone = episode.is_alone or is_shared
+        return is_shared
 
 
 def _event_of(answer: Answer, run: RunJobs) -> EncodedStage | StageFailure | None:

@@ -311,7 +311,7 @@ class DecisionSettings(Settings):
         if resources.account:
             host_options["account"] = resources.account
         if self.kind == "vlm":
-            host_options["server"] = self._server(resources.num_workers)
+            host_options["server"] = self._server(resources.num_askers)
             host_options |= resources.spending.host_options(options["model"])
         return Component(path, options, host_options)
 
@@ -321,9 +321,9 @@ class DecisionSettings(Settings):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise SettingError(type(self), name, f"is of no use where {self.kind} decides")
 
-    def _server(self, num_workers: int) -> dict[str, Any]:
-        """Return how the server is reached; each worker has an equal share of the rate limits."""
-        share = max(1, num_workers)
+    def _server(self, num_askers: int) -> dict[str, Any]:
+        """Return how the server is reached; each episode that runs has an equal share of the rate limits."""
+        share = max(1, num_askers)
         requests, tokens = self.requests_per_minute, self.tokens_per_minute
         return _given(
             base_url=self.base_url,

@@ -7,11 +7,18 @@ A stage that was lost to the machine is retried: its episode runs from the begin
 seed. This brings a deterministic agent to the state in which it began the stage, which no snapshot would do for every
 agent; for another agent, the newer rollout replaces the older. The worker retries after a lost simulator, a lost agent
 process or a failure of the harness; `evonav.evaluation.run.scheduler` retries after a lost worker.
+
+A worker may run several episodes at once, each on a thread. One of them computes at a time; the others wait for their
+agents, which are in processes of their own and wait for a model most of the time. So nothing here, nor a simulator, a
+perception or a reader of tasks, has to expect two threads at once.
 """
 
 import json
+import threading
+import time
 from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -39,7 +46,9 @@ WORK = "evonav.evaluation.run.worker:EpisodeWork"
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, *LOSSES)
 """Failures that a retry may avoid; an exception of an agent or simulator would be the same again."""
 MAX_CONTEXTS = 2
-"""Largest number of contexts of a worker; the least recently used one is closed."""
+"""Largest number of contexts of a worker; the least recently used one is closed, unless an episode uses it."""
+END_TIMEOUT_S = 1.0
+"""Time that a worker which ends gives the episode that computes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,34 +96,89 @@ EVENT: TypeAdapter[EncodedStage | StageFailure | None] = TypeAdapter(EncodedStag
 """Writes and reads an event of a job as JSON: a finished stage, a failure, or `None` at an end without either."""
 
 
-class WorkerContext:
-    """Runs episodes one after another with one simulator and one set of agent processes, which are slow to start."""
+class Turns:
+    """Lets one of several threads compute at a time."""
 
-    def __init__(self, config: WorkerConfig, alive: Callable[[], None]) -> None:
-        """Store the configuration; the simulator starts with the first episode."""
+    def __init__(self) -> None:
+        """Let the first thread begin."""
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def turn(self) -> Iterator[None]:
+        """Wait for a turn, and compute."""
+        with self._lock:
+            yield
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Let others compute while the block waits for something."""
+        self._lock.release()
+        try:
+            yield
+        finally:
+            self._lock.acquire()
+
+    def end(self, timeout_s: float) -> None:
+        """Let nobody begin another turn, and give the current one some time to end."""
+        self._lock.acquire(timeout=timeout_s)
+
+
+class WorkerContext:
+    """Runs episodes of one configuration, and keeps simulators and agents' processes, which are slow to start."""
+
+    def __init__(
+        self,
+        config: WorkerConfig,
+        alive: Callable[[], None],
+        waiting: Callable[[], AbstractContextManager[None]] = nullcontext,
+    ) -> None:
+        """Store the configuration; simulators start with the first episodes.
+
+        Args:
+            config: The configuration.
+            alive: Shows that an episode continues.
+            waiting: Lets other episodes compute while the block waits for an agent.
+        """
         hosting = config.hosting
         self.config = config
+        self.num_users = 0
+        """Number of episodes that use it."""
         # An agent in this process has one time limit for a whole stage.
         self._on_round = (lambda: None) if hosting.is_in_process else alive
-        self._simulator: Simulator | None = None
-        self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
+        # What an agent's own process and its model use is added; other threads are other episodes.
+        self._own_cpu_s = time.process_time if hosting.is_in_process else time.thread_time
+        self._idle: list[Simulator] = []
+        self._busy: list[Simulator] = []
+        self._processes = None if hosting.is_in_process else AgentProcesses(hosting, waiting)
 
-    def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Iterator[StageOutcome]:
-        """Run an episode from its beginning, with a fresh agent."""
+    def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Generator[StageOutcome]:
+        """Run an episode from its beginning, with a fresh agent; if it does not end, its simulator is closed."""
         perception = self.config.backend.perception.create()
-        if self._simulator is None:
-            self._simulator = self.config.backend.simulator.create()
-        return Episode(
-            spec,
-            job.agent,
-            self._agent(job),
-            self._simulator,
-            perception,
-            self.config.protocol,
-            job.seed,
-            _Heartbeat(self._on_round),
-            perception_seed=job.perception_seed,
-        ).run()
+        simulator = self._idle.pop() if self._idle else self.config.backend.simulator.create()
+        self._busy.append(simulator)
+        is_whole = False
+        try:
+            agent = self._agent(job)
+            with closing(agent) if isinstance(agent, RemoteAgent) else nullcontext():
+                yield from Episode(
+                    spec,
+                    job.agent,
+                    agent,
+                    simulator,
+                    perception,
+                    self.config.protocol,
+                    job.seed,
+                    _Heartbeat(self._on_round),
+                    perception_seed=job.perception_seed,
+                    own_cpu_s=self._own_cpu_s,
+                ).run()
+            is_whole = True
+        finally:
+            self._busy.remove(simulator)
+            if is_whole:
+                self._idle.append(simulator)
+            else:
+                simulator.close()
 
     def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
@@ -136,15 +200,11 @@ class WorkerContext:
         with post_mortem():
             return DebuggedAgent(make_agent(job.agent, self.config.backend.decision.create(job.seed)))
 
-    def close_simulator(self) -> None:
-        """Close the simulator, as after an episode that did not end; the next episode starts another one."""
-        if self._simulator is not None:
-            self._simulator.close()
-        self._simulator = None
-
     def close(self) -> None:
-        """Close the simulator and end the agents' processes; safe to call twice."""
-        self.close_simulator()
+        """Close the simulators and end the agents' processes; safe to call twice."""
+        for simulator in (*self._idle, *self._busy):
+            simulator.close()
+        self._idle.clear()
         if self._processes is not None:
             self._processes.close()
 
@@ -196,9 +256,11 @@ class _Retries:
 class EpisodeWork:
     """The work of `evonav.parallel.pool`. Cells of a sweep share a worker: each configuration has a context."""
 
-    def __init__(self, _settings: str, alive: Callable[[], None]) -> None:
+    def __init__(self, num_at_once: str, alive: Callable[[], None]) -> None:
         self._alive = alive
         self._contexts: dict[str, WorkerContext] = {}
+        # A single episode runs on the main thread, where a signal may come at any moment: it takes no turns.
+        self._turns = Turns() if int(num_at_once) > 1 else None
 
     def __call__(self, text: str) -> Generator[str, None, str]:
         """Run the episode of `EpisodeJob.text`; yield and return events, as `EVENT` writes them.
@@ -206,7 +268,15 @@ class EpisodeWork:
         After a failure that costs only the attempt, the failure is an event, and the stages from stage 1 on come again.
         """
         head, _, config_text = text.partition("\n")
-        job, context = EpisodeJob(**json.loads(head)), self._context(config_text)
+        with nullcontext() if self._turns is None else self._turns.turn():
+            context = self._context(config_text)
+            context.num_users += 1
+            try:
+                return (yield from self._run(EpisodeJob(**json.loads(head)), context))
+            finally:
+                context.num_users -= 1
+
+    def _run(self, job: EpisodeJob, context: WorkerContext) -> Generator[str, None, str]:
         num_left = _Retries(context.config.num_retries)
         try:
             shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
@@ -215,28 +285,33 @@ class EpisodeWork:
             is_whole = False
             while not is_whole:
                 is_whole = True
-                for outcome in context.attempt(spec, job):
-                    if outcome.failure is not None and num_left.take(outcome.failure):
-                        yield _text(outcome.failure)
-                        is_whole = False
-                        context.close_simulator()
-                        break
-                    yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
+                with closing(context.attempt(spec, job)) as outcomes:
+                    for outcome in outcomes:
+                        if outcome.failure is not None and num_left.take(outcome.failure):
+                            yield _text(outcome.failure)
+                            is_whole = False
+                            break
+                        yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
         except Exception as error:
-            context.close_simulator()
             message = f"{type(error).__name__}: {error}"
             return _text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
         return _text(None)
 
     def _context(self, config_text: str) -> WorkerContext:
         found = self._contexts.pop(config_text, None)
-        while found is None and len(self._contexts) >= MAX_CONTEXTS:
-            self._contexts.pop(next(iter(self._contexts))).close()
-        self._contexts[config_text] = context = found or WorkerContext(CONFIG.validate_json(config_text), self._alive)
-        return context
+        unused = [key for key, context in self._contexts.items() if context.num_users == 0]
+        while found is None and unused and len(self._contexts) >= MAX_CONTEXTS:
+            self._contexts.pop(unused.pop(0)).close()
+        if found is None:
+            waiting = nullcontext if self._turns is None else self._turns.waiting
+            found = WorkerContext(CONFIG.validate_json(config_text), self._alive, waiting)
+        self._contexts[config_text] = found
+        return found
 
     def close(self) -> None:
-        """Close all contexts."""
+        """Close all contexts, also those of episodes on threads that have not ended."""
+        if self._turns is not None:
+            self._turns.end(END_TIMEOUT_S)
         for context in self._contexts.values():
             context.close()
         self._contexts.clear()
