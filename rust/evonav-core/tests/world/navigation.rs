@@ -175,6 +175,28 @@ proptest! {
         prop_assert!((length_m - field_m).abs() < 1e-9);
     }
 
+    /// Distances asked for together, one by one from a field, and one by one from fresh houses: what
+    /// earlier questions leave behind changes no bit. Each is the length of the path.
+    #[test]
+    fn distances_do_not_depend_on_what_was_asked_before(
+        boxes in arb_boxes(),
+        start_m in [0.3..4.7, 0.3..4.7],
+        targets_m in prop::collection::vec([-0.5..5.5, -0.5..5.5], 1..30),
+    ) {
+        let nav = navigation(&boxes);
+        let together_m = nav.distances_m(start_m, &targets_m);
+        let field = nav.field(start_m);
+        for (&target_m, &together_m) in targets_m.iter().zip(&together_m) {
+            let alone_m = navigation(&boxes).distances_m(start_m, &[target_m])[0];
+            prop_assert_eq!(together_m.to_bits(), alone_m.to_bits());
+            let field_m = field.as_ref().map(|field| nav.field_distance_m(field, target_m));
+            prop_assert_eq!(field_m.unwrap_or(f64::INFINITY).to_bits(), alone_m.to_bits());
+            let path_m = navigation(&boxes).shortest_path(start_m, target_m);
+            let path_m = path_m.map_or(f64::INFINITY, |path_m| path_length_m(&path_m));
+            prop_assert!(path_m == together_m || (path_m - together_m).abs() < 1e-9);
+        }
+    }
+
     /// The nearest free centre, found by trying all, and whatever moves between centres join to it,
     /// found by asking all pairs of neighbours until nothing changes.
     #[test]

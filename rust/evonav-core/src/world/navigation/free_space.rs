@@ -1,6 +1,6 @@
 //! The free space of a scene: where an agent can stand, how it can move, and shortest paths.
 
-use std::sync::OnceLock;
+use std::{cell::Cell, sync::OnceLock};
 
 use crate::{
     Error,
@@ -8,7 +8,9 @@ use crate::{
     grid::{GridSpec, MAX_CELLS},
     world::{
         footprint::footprint,
-        navigation::{AgentBody, DistanceField, Obstacle, Obstacles, VisibilityGraph},
+        navigation::{
+            AgentBody, DistanceField, Obstacle, Obstacles, VisibilityGraph, obstacles::NONE,
+        },
         scene::{BodyKind, Scene},
     },
 };
@@ -236,10 +238,7 @@ impl Navigation {
             return vec![f64::INFINITY; targets_m.len()];
         };
         let snapped: Vec<Option<Vec2>> = targets_m.iter().map(|&t| self.snap(t)).collect();
-        let free: Vec<Vec2> = snapped.iter().copied().flatten().collect();
-        let mut lengths = self.graph().distances_m(&self.obstacles, start_m, &free).into_iter();
-        let length_of = |target: Option<Vec2>| target.and_then(|_| lengths.next());
-        snapped.into_iter().map(length_of).map(|l| l.unwrap_or(f64::INFINITY)).collect()
+        self.graph().distances_m(&self.obstacles, start_m, &snapped)
     }
 
     /// Compute the shortest distances from a point (snapped) to everywhere, for
@@ -252,7 +251,7 @@ impl Navigation {
     /// Return the length of the shortest path between a field's source and a point (snapped), as
     /// [`Self::distances_m`]; infinite if there is none.
     pub fn field_distance_m(&self, field: &DistanceField, point_m: Vec2) -> f64 {
-        let to = |point_m| self.graph().distance_m(&self.obstacles, field, point_m);
+        let to = |point_m| field.distance_m(&self.obstacles, point_m, f64::INFINITY);
         self.snap(point_m).map_or(f64::INFINITY, to)
     }
 
@@ -322,8 +321,12 @@ impl Navigation {
     }
 
     fn graph(&self) -> &VisibilityGraph {
-        self.graph
-            .get_or_init(|| VisibilityGraph::build(&self.obstacles, |point| self.is_free(point)))
+        self.graph.get_or_init(|| {
+            let blocker = Cell::new(NONE);
+            VisibilityGraph::build(&self.obstacles, |point_m| {
+                self.obstacles.is_clear_after(point_m, &blocker) && self.is_indoors(point_m)
+            })
+        })
     }
 }
 

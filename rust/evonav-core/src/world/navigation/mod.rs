@@ -1,6 +1,7 @@
 //! Navigation: obstacles, the free space of an agent, and shortest paths.
 
 mod agent_body;
+mod distance_field;
 mod free_space;
 pub(crate) mod obstacle;
 mod obstacles;
@@ -8,7 +9,8 @@ mod tangents;
 mod visibility_graph;
 
 pub use agent_body::AgentBody;
+pub use distance_field::DistanceField;
 pub use free_space::{Navigation, NavigationConfig, map_spec};
 pub use obstacle::Obstacle;
 pub use obstacles::Obstacles;
-pub use visibility_graph::{DistanceField, VisibilityGraph, path_length_m};
+pub use visibility_graph::{VisibilityGraph, path_length_m};

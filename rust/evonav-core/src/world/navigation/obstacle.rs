@@ -1,5 +1,7 @@
 //! One obstacle: a convex polygon on the ground plane and the distance to keep from it.
 
+use std::cell::OnceCell;
+
 use crate::{
     Error,
     geometry::{Vec2, bounds_2d_m, outline::distance_squared},
@@ -13,6 +15,8 @@ use crate::{
 /// Largest distance of the tangents that replace an obstacle's rounded corner from the outline's
 /// corner, in radii ([`crate::world::navigation::visibility_graph`]).
 const HUG: f64 = 1.02;
+/// Margin of tests by boxes, far above rounding: a metre of a move adds another.
+const HAIR_M: f64 = 1e-9;
 
 /// A convex polygon that the agent's axis must keep `radius_m` away from.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,21 +73,128 @@ fn drop_covered(obstacles: &mut Vec<Obstacle>) {
 pub(crate) struct Sweep {
     a: Vec2,
     b: Vec2,
+    /// From `a` to `b`.
+    leg_m: Vec2,
+    /// Smallest and largest corner of the box of both ends.
+    extent_m: [Vec2; 2],
+    frame: OnceCell<Frame>,
+}
+
+/// The length of a move, and its direction: any unit vector if it has no length.
+#[derive(Debug, Clone, Copy)]
+struct Frame {
     length_m: f64,
-    /// Unit vector from `a` to `b`; any unit vector if they are equal.
     along: Vec2,
 }
 
 impl Sweep {
     /// Create the move from `a` to `b`.
     pub(crate) fn new(a: Vec2, b: Vec2) -> Self {
-        let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
-        let along = [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m];
-        Self { a, b, length_m, along: if length_m > 0.0 { along } else { [1.0, 0.0] } }
+        let leg_m = [b[0] - a[0], b[1] - a[1]];
+        let extent_m = [[a[0].min(b[0]), a[1].min(b[1])], [a[0].max(b[0]), a[1].max(b[1])]];
+        Self { a, b, leg_m, extent_m, frame: OnceCell::new() }
+    }
+
+    /// Return length and direction, which only few tests need.
+    fn frame(&self) -> Frame {
+        *self.frame.get_or_init(|| {
+            let length_m = self.leg_m[0].hypot(self.leg_m[1]);
+            let along = self.leg_m.map(|v| v / length_m);
+            Frame { length_m, along: if length_m > 0.0 { along } else { [1.0, 0.0] } }
+        })
+    }
+
+    /// Return whether this move surely crosses the segment from `p` to `q`.
+    fn crosses(&self, [p, q]: [Vec2; 2]) -> bool {
+        let [leg_m, side_m] = [self.leg_m, [q[0] - p[0], q[1] - p[1]]];
+        let aside = |along: Vec2, from: Vec2, to: Vec2| {
+            along[0] * (to[1] - from[1]) - along[1] * (to[0] - from[0])
+        };
+        let are_apart = |one: f64, other: f64, along: Vec2| {
+            let hair = HAIR_M * (along[0].abs() + along[1].abs());
+            one.min(other) < -hair && one.max(other) > hair
+        };
+        are_apart(aside(leg_m, self.a, p), aside(leg_m, self.a, q), leg_m)
+            && are_apart(aside(side_m, p, self.a), aside(side_m, p, self.b), side_m)
+    }
+}
+
+/// The upright box around an obstacle's outline and two of the outline's diagonals, which decide most
+/// tests of points and moves without a look at all corners.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gist {
+    centre_m: Vec2,
+    half_m: Vec2,
+    radius_m: f64,
+    /// Whether the outline is the box, up to rounding.
+    is_upright: bool,
+    diagonals_m: [[Vec2; 2]; 2],
+}
+
+impl Gist {
+    /// Return whether a move surely touches the obstacle: it crosses a diagonal.
+    pub(super) fn is_crossed_by(&self, sweep: &Sweep) -> bool {
+        self.diagonals_m.iter().any(|&diagonal_m| sweep.crosses(diagonal_m))
+    }
+
+    /// Return whether the agent's axis at a point is too close, where the box tells.
+    pub(super) fn blocks(&self, point_m: Vec2) -> Option<bool> {
+        self.is_within(point_m, self.radius_m)
+    }
+
+    /// Return [`Obstacle::hugs`], where the box tells.
+    pub(super) fn hugs(&self, point_m: Vec2) -> Option<bool> {
+        self.is_within(point_m, HUG * self.radius_m)
+    }
+
+    fn is_within(&self, point_m: Vec2, reach_m: f64) -> Option<bool> {
+        let [x, z] =
+            [0, 1].map(|i| ((point_m[i] - self.centre_m[i]).abs() - self.half_m[i]).max(0.0));
+        let gap_m2 = x * x + z * z;
+        if gap_m2 > (reach_m + HAIR_M).powi(2) {
+            return Some(false);
+        }
+        let is_surely_near = reach_m > HAIR_M && gap_m2 < (reach_m - HAIR_M).powi(2);
+        (self.is_upright && is_surely_near).then_some(true)
+    }
+
+    /// Return whether a move surely stays clear: its box is apart from the obstacle's, or the
+    /// obstacle lies on one side of its line.
+    pub(super) fn is_clear_of(&self, sweep: &Sweep) -> bool {
+        let Sweep { a, leg_m, extent_m: [low_m, high_m], .. } = sweep;
+        let is_apart = |i: usize| {
+            let reach_m = self.half_m[i] + (self.radius_m + HAIR_M);
+            low_m[i] - self.centre_m[i] > reach_m || self.centre_m[i] - high_m[i] > reach_m
+        };
+        if is_apart(0) || is_apart(1) {
+            return true;
+        }
+        let [x, z] = [0, 1].map(|i| self.centre_m[i] - a[i]);
+        let aside_m2 = (leg_m[0] * z - leg_m[1] * x).abs();
+        let half_m2 = leg_m[1].abs() * self.half_m[0] + leg_m[0].abs() * self.half_m[1];
+        let length_m = (leg_m[0] * leg_m[0] + leg_m[1] * leg_m[1]).sqrt();
+        aside_m2 > half_m2 + length_m * (self.radius_m + HAIR_M * (1.0 + length_m))
     }
 }
 
 impl Obstacle {
+    /// Return what decides most tests of this obstacle.
+    pub(super) fn gist(&self) -> Gist {
+        let [low_m, high_m] = bounds_2d_m(self.outline_m.iter().copied());
+        let centre_m = [0, 1].map(|i| 0.5 * (low_m[i] + high_m[i]));
+        // Measured from the rounded centre, so that no corner is outside.
+        let half_m = [0, 1].map(|i| (high_m[i] - centre_m[i]).max(centre_m[i] - low_m[i]));
+        let num_corners = self.outline_m.len();
+        let corner = |quarters: usize| self.outline_m[quarters * num_corners / 4];
+        let diagonals_m = [[corner(0), corner(2)], [corner(1), corner(3)]];
+        let is_at_corner = |p: &Vec2| {
+            let gap_m = |i: usize| ((p[i] - centre_m[i]).abs() - half_m[i]).abs();
+            gap_m(0) < 0.1 * HAIR_M && gap_m(1) < 0.1 * HAIR_M
+        };
+        let is_upright = num_corners == 4 && self.outline_m.iter().all(is_at_corner);
+        Gist { centre_m, half_m, radius_m: self.radius_m, is_upright, diagonals_m }
+    }
+
     /// Create an obstacle: the footprint grown by `radius_m`.
     pub(super) fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
         let [low_m, high_m] = bounds_2d_m(footprint.outline_m.iter().copied());
@@ -123,12 +234,12 @@ impl Obstacle {
     /// segment or at a corner of the polygon.
     pub(crate) fn blocks_sweep(&self, sweep: &Sweep) -> bool {
         let reach = self.radius_m;
-        let Sweep { a, b, length_m, along } = *sweep;
-        let is_near =
-            (0..2).all(|i| self.min_m[i] < a[i].max(b[i]) && a[i].min(b[i]) < self.max_m[i]);
+        let &Sweep { a, b, extent_m: [low_m, high_m], .. } = sweep;
+        let is_near = (0..2).all(|i| self.min_m[i] < high_m[i] && low_m[i] < self.max_m[i]);
         if !is_near {
             return false;
         }
+        let Frame { length_m, along } = sweep.frame();
         // Corners in the frame of the move: distance along it, distance to its left.
         let in_frame = |p: Vec2| {
             let w = [p[0] - a[0], p[1] - a[1]];

@@ -8,13 +8,15 @@
 //! nearly all parts are, and on the safe side for tapering parts. There is no cell size, so no gap
 //! becomes too narrow or too wide by a cell.
 
+use std::cell::Cell;
+
 use crate::{
     Error,
     geometry::{Vec2, bounds_2d_m},
     world::{
         navigation::{
             AgentBody,
-            obstacle::{Obstacle, Sweep, obstacles_of},
+            obstacle::{Gist, Obstacle, Sweep, obstacles_of},
         },
         scene::{Body, BodyKind},
     },
@@ -26,11 +28,15 @@ const BUCKET_M: f64 = 0.5;
 const MAX_BUCKETS: f64 = 1024.0;
 /// Margin of bucket look-ups, far above rounding and far below any geometry.
 const HAIR_M: f64 = 1e-7;
+/// In place of an obstacle's number where none has blocked anything yet.
+pub(super) const NONE: u32 = u32::MAX;
 
 /// All obstacles of an agent, indexed for exact queries.
 #[derive(Debug, Clone)]
 pub struct Obstacles {
     obstacles: Vec<Obstacle>,
+    /// What is tested of each obstacle before its outline.
+    gists: Vec<Gist>,
     corner_m: Vec2,
     bucket_m: f64,
     shape: [usize; 2],
@@ -65,37 +71,87 @@ impl Obstacles {
 
     /// Return whether the agent fits at a point.
     pub fn is_clear(&self, point_m: Vec2) -> bool {
+        self.is_clear_after(point_m, &Cell::new(NONE))
+    }
+
+    /// As [`Self::is_clear`], for points near each other: the obstacle that blocked the last one is
+    /// tested first.
+    pub(super) fn is_clear_after(&self, point_m: Vec2, blocker: &Cell<u32>) -> bool {
+        let blocks = |i: u32| {
+            let told = self.gists[i as usize].blocks(point_m);
+            told.unwrap_or_else(|| self.obstacles[i as usize].blocks(point_m))
+        };
+        if blocker.get() != NONE && blocks(blocker.get()) {
+            return false;
+        }
         let Some([row, col]) = self.bucket_of(point_m) else { return true };
-        self.bucket(row, col).iter().all(|&i| !self.obstacles[i as usize].blocks(point_m))
+        let Some(&found) = self.bucket(row, col).iter().find(|&&i| blocks(i)) else { return true };
+        blocker.set(found);
+        false
     }
 
     /// Return whether a point is in collision or so close to it that it may lie between a rounded
     /// corner and the corner's tangents.
     pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {
         let Some([row, col]) = self.bucket_of(point_m) else { return false };
-        self.bucket(row, col).iter().any(|&i| self.obstacles[i as usize].hugs(point_m))
+        self.bucket(row, col).iter().any(|&i| {
+            let told = self.gists[i as usize].hugs(point_m);
+            told.unwrap_or_else(|| self.obstacles[i as usize].hugs(point_m))
+        })
     }
 
     /// Return whether the agent can slide straight from one point to the other.
     ///
     /// The answer is the same in both directions.
     pub fn is_clear_between(&self, from_m: Vec2, to_m: Vec2) -> bool {
-        self.first_between(from_m, to_m).is_none()
+        self.first_between(from_m, to_m, NONE).is_none()
     }
 
     /// Return the index in the scene of a body that a straight move touches; `None` if it touches
     /// none.
     pub fn blocker_between(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
-        self.first_between(from_m, to_m).map(|obstacle| obstacle.body)
+        let blocker = self.first_between(from_m, to_m, NONE)?;
+        Some(self.obstacles[blocker as usize].body)
     }
 
-    fn first_between(&self, from_m: Vec2, to_m: Vec2) -> Option<&Obstacle> {
+    /// As [`Self::is_clear_between`], for moves near each other: the obstacle that blocked the last
+    /// one is tested first.
+    pub(super) fn is_clear_between_after(
+        &self,
+        from_m: Vec2,
+        to_m: Vec2,
+        blocker: &Cell<u32>,
+    ) -> bool {
+        let found = self.first_between(from_m, to_m, blocker.get());
+        if let Some(found) = found {
+            blocker.set(found);
+        }
+        found.is_none()
+    }
+
+    /// Return whether an obstacle blocks a move, if that is told by its diagonals; false for
+    /// [`NONE`].
+    pub(super) fn surely_blocks(&self, obstacle: u32, from_m: Vec2, to_m: Vec2) -> bool {
+        let gist = self.gists.get(obstacle as usize);
+        gist.is_some_and(|gist| gist.is_crossed_by(&Sweep::new(from_m, to_m)))
+    }
+
+    /// Return an obstacle that blocks a move: `likely` if it does, else the first along the move.
+    pub(super) fn first_between(&self, from_m: Vec2, to_m: Vec2, likely: u32) -> Option<u32> {
         let (a, b) = if from_m <= to_m { (from_m, to_m) } else { (to_m, from_m) };
         let sweep = Sweep::new(a, b);
+        let blocks = |&i: &u32| {
+            !self.gists[i as usize].is_clear_of(&sweep)
+                && (self.gists[i as usize].is_crossed_by(&sweep)
+                    || self.obstacles[i as usize].blocks_sweep(&sweep))
+        };
+        let crosses = |i: u32| self.gists[i as usize].is_crossed_by(&sweep);
+        if likely != NONE && (crosses(likely) || blocks(&likely)) {
+            return Some(likely);
+        }
         let mut hit = None;
         self.buckets_along(a, b, |bucket| {
-            let mut obstacles = bucket.iter().map(|&i| &self.obstacles[i as usize]);
-            hit = obstacles.find(|obstacle| obstacle.blocks_sweep(&sweep));
+            hit = bucket.iter().copied().find(blocks);
             hit.is_none()
         });
         hit
@@ -105,7 +161,7 @@ impl Obstacles {
     /// did.
     fn buckets_along(&self, a: Vec2, b: Vec2, mut visit: impl FnMut(&[u32]) -> bool) -> bool {
         let cell = |value: f64, axis: usize| {
-            (((value - self.corner_m[axis]) / self.bucket_m).floor()).max(0.0) as usize
+            ((value - self.corner_m[axis]) / self.bucket_m).max(0.0) as usize
         };
         let is_outside = (0..2).any(|i| a[i].max(b[i]) < self.corner_m[i]);
         if is_outside || self.obstacles.is_empty() {
@@ -141,8 +197,8 @@ impl Obstacles {
         let bucket_m = BUCKET_M.max(extent_m / MAX_BUCKETS);
         let count = |axis: usize| ((far_m[axis] - corner_m[axis]) / bucket_m) as usize + 1;
         let shape = [count(1), count(0)];
-        let mut built =
-            Self { obstacles, corner_m, bucket_m, shape, starts: Vec::new(), items: Vec::new() };
+        let (gists, starts, items) = (Vec::new(), Vec::new(), Vec::new());
+        let mut built = Self { obstacles, gists, corner_m, bucket_m, shape, starts, items };
         built.fill_buckets();
         built
     }
@@ -185,7 +241,7 @@ impl Obstacles {
     }
 
     fn bucket_of(&self, point_m: Vec2) -> Option<[usize; 2]> {
-        let cell = [1, 0].map(|i| ((point_m[i] - self.corner_m[i]) / self.bucket_m).floor());
+        let cell = [1, 0].map(|i| (point_m[i] - self.corner_m[i]) / self.bucket_m);
         let is_inside = (0..2).all(|i| cell[i] >= 0.0 && cell[i] < self.shape[i] as f64);
         is_inside.then_some(cell.map(|v| v as usize))
     }
@@ -207,5 +263,6 @@ impl Obstacles {
         let mut keep = keep.into_iter();
         self.obstacles.retain(|_| keep.next().unwrap_or(true));
         self.fill_buckets();
+        self.gists = self.obstacles.iter().map(Obstacle::gist).collect();
     }
 }

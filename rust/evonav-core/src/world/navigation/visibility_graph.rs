@@ -14,13 +14,15 @@
 //! polyhedral obstacles", CACM 1979; tangent pruning as in Oh & Leong, "Edge N-Level Sparse
 //! Visibility Graphs", SoCS 2017.
 
-use std::{cmp::Ordering, collections::BinaryHeap, sync::OnceLock};
+use std::{cell::Cell, cmp::Ordering, collections::BinaryHeap, sync::OnceLock};
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
     world::navigation::{
         Obstacles,
-        tangents::{Node, corner_nodes},
+        distance_field::{DistanceField, Reached},
+        obstacles::NONE,
+        tangents::{Fans, Node},
     },
 };
 
@@ -40,15 +42,6 @@ struct Edge {
 pub struct VisibilityGraph {
     nodes: Vec<Node>,
     edges: Vec<OnceLock<Box<[Edge]>>>,
-}
-
-/// Shortest distances from one point, computed by [`VisibilityGraph::field`].
-///
-/// It is valid only with the graph that computed it.
-#[derive(Debug)]
-pub struct DistanceField {
-    start_m: Vec2,
-    search: Search,
 }
 
 /// An entry of the open list. The smallest bound comes first, then the smallest node, so that ties
@@ -83,14 +76,20 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
+/// By how much farther than from the point before it a point may be, beyond the way between them,
+/// for [`VisibilityGraph::distances_m`] to look among few nodes first.
+const DETOUR_M: f64 = 0.02;
+
 /// Parent of the nodes that a search reaches directly from its start.
 const START: u32 = u32::MAX;
 
 impl VisibilityGraph {
     /// Build the graph: nodes around every obstacle where `is_free` allows the agent to stand.
     pub fn build(obstacles: &Obstacles, is_free: impl Fn(Vec2) -> bool) -> Self {
-        let nodes: Vec<Node> =
-            obstacles.iter().flat_map(|obstacle| corner_nodes(obstacle, &is_free)).collect();
+        let (mut nodes, mut fans) = (Vec::new(), Fans::default());
+        for obstacle in obstacles.iter() {
+            fans.push_corner_nodes(obstacle, &is_free, &mut nodes);
+        }
         let edges = nodes.iter().map(|_| OnceLock::new()).collect();
         Self { nodes, edges }
     }
@@ -121,12 +120,15 @@ impl VisibilityGraph {
         let ahead_m = |node: u32| distance_2d_m(self.nodes[node as usize].point_m, target_m);
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, ahead_m);
+        let blocker = Cell::new(NONE);
+        let sees_target =
+            |node: &Node| obstacles.is_clear_between_after(node.point_m, target_m, &blocker);
         let leads_to_target = Self::leads_to(obstacles, target_m);
         while let Some(node) = search.pop(self, obstacles, start_m) {
             let here = &self.nodes[node as usize];
             // Nodes are expanded in the order of the shortest path that may lead over them, so the
             // first node that sees the target is on the shortest path.
-            if leads_to_target(here) && obstacles.is_clear_between(here.point_m, target_m) {
+            if leads_to_target(here) && sees_target(here) {
                 return Some(self.trace(&search, node, start_m, target_m));
             }
             let cost_m = search.cost_m[node as usize];
@@ -138,15 +140,27 @@ impl VisibilityGraph {
     }
 
     /// Return the shortest distances from a free point to many free points; infinite where there is
-    /// no path.
+    /// no path, or no point.
+    ///
+    /// # Complexity
+    /// That of [`Self::field`]; a point costs less the nearer it is to the one before it.
     pub fn distances_m(
         &self,
         obstacles: &Obstacles,
         start_m: Vec2,
-        targets_m: &[Vec2],
+        targets_m: &[Option<Vec2>],
     ) -> Vec<f64> {
         let field = self.field(obstacles, start_m);
-        targets_m.iter().map(|&target_m| self.distance_m(obstacles, &field, target_m)).collect()
+        let mut before: Option<(Vec2, f64)> = None;
+        let mut distance_m = |target_m: Vec2| {
+            let likely_m = before.map_or(f64::INFINITY, |(point_m, length_m)| {
+                length_m + distance_2d_m(point_m, target_m) + DETOUR_M
+            });
+            let length_m = field.distance_m(obstacles, target_m, likely_m);
+            before = Some((target_m, length_m));
+            length_m
+        };
+        targets_m.iter().map(|target| target.map_or(f64::INFINITY, &mut distance_m)).collect()
     }
 
     /// Compute the shortest distances from a free point to all places where paths may bend.
@@ -163,34 +177,8 @@ impl VisibilityGraph {
                 search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
             }
         }
-        DistanceField { start_m, search }
-    }
-
-    /// Return the shortest distance from a field's start to a free point; infinite if there is no
-    /// path.
-    ///
-    /// # Complexity
-    /// O(n), and one visibility test for each node that may be the last before the point.
-    pub fn distance_m(&self, obstacles: &Obstacles, field: &DistanceField, target_m: Vec2) -> f64 {
-        let DistanceField { start_m, search } = field;
-        if obstacles.is_clear_between(*start_m, target_m) {
-            return distance_2d_m(*start_m, target_m);
-        }
-        let leads_to_target = Self::leads_to(obstacles, target_m);
-        let to_open = |(i, node): (usize, &Node)| {
-            let cost_m = search.cost_m[i];
-            let bound_m = cost_m + distance_2d_m(node.point_m, target_m);
-            Open { bound_m, cost_m, node: i as u32, parent: START }
-        };
-        let is_open = |&(i, node): &(usize, &Node)| search.is_closed[i] && leads_to_target(node);
-        let mut open: BinaryHeap<Open> =
-            self.nodes.iter().enumerate().filter(is_open).map(to_open).collect();
-        while let Some(Open { bound_m, node, .. }) = open.pop() {
-            if obstacles.is_clear_between(self.nodes[node as usize].point_m, target_m) {
-                return bound_m;
-            }
-        }
-        f64::INFINITY
+        let nodes = self.nodes.iter().enumerate().filter(|&(i, _)| search.is_closed[i]);
+        DistanceField::new(start_m, nodes.map(|(i, &node)| Reached::new(node, search.cost_m[i])))
     }
 
     fn edges_of(&self, obstacles: &Obstacles, node: u32) -> &[Edge] {
@@ -203,12 +191,14 @@ impl VisibilityGraph {
     }
 
     fn seen_from_node(&self, obstacles: &Obstacles, node: u32, here: Node) -> Vec<Edge> {
-        let mut edges = Vec::new();
+        let (mut edges, blocker) = (Vec::new(), Cell::new(NONE));
         for (i, other) in self.nodes.iter().enumerate() {
             let is_candidate = i != node as usize
                 && here.is_tangent_to(other.point_m)
                 && other.is_tangent_to(here.point_m);
-            if is_candidate && obstacles.is_clear_between(here.point_m, other.point_m) {
+            if is_candidate
+                && obstacles.is_clear_between_after(here.point_m, other.point_m, &blocker)
+            {
                 let length_m = distance_2d_m(here.point_m, other.point_m);
                 edges.push(Edge { to: i as u32, length_m });
             }
@@ -236,6 +226,8 @@ struct Search {
     parents: Vec<u32>,
     is_closed: Vec<bool>,
     open: BinaryHeap<Open>,
+    /// The obstacle that last hid a node from the start.
+    blocker: Cell<u32>,
 }
 
 impl Search {
@@ -245,6 +237,7 @@ impl Search {
             parents: vec![START; num_nodes],
             is_closed: vec![false; num_nodes],
             open: BinaryHeap::new(),
+            blocker: Cell::new(NONE),
         }
     }
 
@@ -289,7 +282,12 @@ impl Search {
             // the start is known to see the node.
             let is_stale = self.is_closed[i] || cost_m > self.cost_m[i];
             if is_stale
-                || parent == START && !obstacles.is_clear_between(start_m, graph.nodes[i].point_m)
+                || parent == START
+                    && !obstacles.is_clear_between_after(
+                        start_m,
+                        graph.nodes[i].point_m,
+                        &self.blocker,
+                    )
             {
                 continue;
             }
