@@ -73,7 +73,7 @@ fn drop_covered(obstacles: &mut Vec<Obstacle>) {
 pub(crate) struct Sweep {
     a: Vec2,
     b: Vec2,
-    /// From `a` to `b`.
+    /// The vector from `a` to `b`.
     leg_m: Vec2,
     /// Smallest and largest corner of the box of both ends.
     extent_m: [Vec2; 2],
@@ -137,12 +137,12 @@ impl Gist {
         self.diagonals_m.iter().any(|&diagonal_m| sweep.crosses(diagonal_m))
     }
 
-    /// Return whether the agent's axis at a point is too close, where the box tells.
+    /// Return whether the agent's axis at a point is too close, if its box decides that.
     pub(super) fn blocks(&self, point_m: Vec2) -> Option<bool> {
         self.is_within(point_m, self.radius_m)
     }
 
-    /// Return [`Obstacle::hugs`], where the box tells.
+    /// Return [`Obstacle::hugs`], if its box decides that.
     pub(super) fn hugs(&self, point_m: Vec2) -> Option<bool> {
         self.is_within(point_m, HUG * self.radius_m)
     }

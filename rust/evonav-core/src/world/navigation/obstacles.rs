@@ -28,14 +28,14 @@ const BUCKET_M: f64 = 0.5;
 const MAX_BUCKETS: f64 = 1024.0;
 /// Margin of bucket look-ups, far above rounding and far below any geometry.
 const HAIR_M: f64 = 1e-7;
-/// In place of an obstacle's number where none has blocked anything yet.
+/// The number that stands for no obstacle, before any has blocked something.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// All obstacles of an agent, indexed for exact queries.
 #[derive(Debug, Clone)]
 pub struct Obstacles {
     obstacles: Vec<Obstacle>,
-    /// What is tested of each obstacle before its outline.
+    /// The boxes and diagonals that are tested before the outlines.
     gists: Vec<Gist>,
     corner_m: Vec2,
     bucket_m: f64,
@@ -74,12 +74,12 @@ impl Obstacles {
         self.is_clear_after(point_m, &Cell::new(NONE))
     }
 
-    /// As [`Self::is_clear`], for points near each other: the obstacle that blocked the last one is
-    /// tested first.
+    /// Return [`Self::is_clear`] for one of several points near each other: the obstacle that
+    /// blocked the last one is tested first.
     pub(super) fn is_clear_after(&self, point_m: Vec2, blocker: &Cell<u32>) -> bool {
         let blocks = |i: u32| {
-            let told = self.gists[i as usize].blocks(point_m);
-            told.unwrap_or_else(|| self.obstacles[i as usize].blocks(point_m))
+            let by_box = self.gists[i as usize].blocks(point_m);
+            by_box.unwrap_or_else(|| self.obstacles[i as usize].blocks(point_m))
         };
         if blocker.get() != NONE && blocks(blocker.get()) {
             return false;
@@ -95,8 +95,8 @@ impl Obstacles {
     pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {
         let Some([row, col]) = self.bucket_of(point_m) else { return false };
         self.bucket(row, col).iter().any(|&i| {
-            let told = self.gists[i as usize].hugs(point_m);
-            told.unwrap_or_else(|| self.obstacles[i as usize].hugs(point_m))
+            let by_box = self.gists[i as usize].hugs(point_m);
+            by_box.unwrap_or_else(|| self.obstacles[i as usize].hugs(point_m))
         })
     }
 
@@ -114,8 +114,8 @@ impl Obstacles {
         Some(self.obstacles[blocker as usize].body)
     }
 
-    /// As [`Self::is_clear_between`], for moves near each other: the obstacle that blocked the last
-    /// one is tested first.
+    /// Return [`Self::is_clear_between`] for one of several moves near each other: the obstacle that
+    /// blocked the last one is tested first.
     pub(super) fn is_clear_between_after(
         &self,
         from_m: Vec2,
@@ -129,7 +129,7 @@ impl Obstacles {
         found.is_none()
     }
 
-    /// Return whether an obstacle blocks a move, if that is told by its diagonals; false for
+    /// Return whether an obstacle blocks a move, if a diagonal of it decides that; false for
     /// [`NONE`].
     pub(super) fn surely_blocks(&self, obstacle: u32, from_m: Vec2, to_m: Vec2) -> bool {
         let gist = self.gists.get(obstacle as usize);

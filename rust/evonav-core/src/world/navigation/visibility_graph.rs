@@ -76,8 +76,8 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// By how much farther than from the point before it a point may be, beyond the way between them,
-/// for [`VisibilityGraph::distances_m`] to look among few nodes first.
+/// The length that [`VisibilityGraph::distances_m`] allows for beyond the distance of the point
+/// before and the way between both, before it looks among all nodes.
 const DETOUR_M: f64 = 0.02;
 
 /// Parent of the nodes that a search reaches directly from its start.
