@@ -38,11 +38,12 @@ CREDIT = (
 )
 PROPERTIES = {"CanPickup": "pickupable", "Moveable": "moveable", "Receptacle": "receptacle", "CanOpen": "openable"}
 ROOMS = {"Kitchen": "inKitchens", "LivingRoom": "inLivingRooms", "Bedroom": "inBedrooms", "Bathroom": "inBathrooms"}
+GROUP_ROOMS = {"Kitchen": "kitchens", "LivingRoom": "livingRooms", "Bedroom": "bedrooms", "Bathroom": "bathrooms"}
 WHERE = {"corner": "inCorner", "middle": "inMiddle", "edge": "onEdge", "floor": "onFloor", "wall": "onWall"}
 
 
 def main() -> None:
-    """Reads DATA, writes `assets.json`, `categories.json`, `groups.json` and `materials.json`."""
+    """Reads DATA, writes `assets.json`, `categories.json`, `groups.json`, `materials.json` and `openings.json`."""
     parser = argparse.ArgumentParser(description="Build evonav's asset catalogue.")
     parser.add_argument("data", type=Path, help="directory with procthor-databases/ and house files")
     parser.add_argument("--out", type=Path, default=Path("rust/evonav-core/data"))
@@ -64,6 +65,9 @@ def main() -> None:
     groups = [group_row(path.stem, read(path)) for path in sorted((databases / "asset_groups").glob("*.json"))]
     write(arguments.out / "groups.json", "groups", groups)
     write(arguments.out / "materials.json", "materials", [[name, to_hex(rgb)] for name, rgb in materials.items()])
+    holes = read(databases / "wall-holes.json")
+    openings = [asset for asset in rows if asset["objectType"] in ("Doorway", "Doorframe", "Window")]
+    write(arguments.out / "openings.json", "openings", [opening_row(asset, holes) for asset in openings])
 
 
 def read(path: Path) -> Any:  # noqa: ANN401
@@ -207,6 +211,7 @@ def group_row(name: str, group: Json) -> Json:
     In the frame of the first member, seen from above: x right, z forward. `anchor` is the side of the parent's box that
     a member is at (-1, 0, 1 along x and z), `align` the side of that line on which its own box lies, `offset_m` is
     added; `turn_deg` is its yaw, give or take `spread_deg`. ProcTHOR mirrors x when it reads its files, and so do we.
+    Members of one `name` are the same asset, one of the `assets` that the first of them lists.
     """
     members: list[Json] = []
 
@@ -214,6 +219,9 @@ def group_row(name: str, group: Json) -> Json:
         facts = group["assetMetadata"][str(node["instanceId"])]
         place = facts["position"]
         row: Json = {"category": next(iter(facts["assetIds"])), "spread_deg": facts["randomness"]["dtheta"]}
+        row["name"] = facts["name"]
+        if all(facts["name"] != member["name"] for member in members):
+            row["assets"] = sorted(asset for assets in facts["assetIds"].values() for asset in assets)
         if parent is not None:
             anchor = int(place["relativeAnchorToParent"])
             row |= {
@@ -231,11 +239,33 @@ def group_row(name: str, group: Json) -> Json:
 
     for node in group["treeData"]:
         add(node, None)
-    location = group["groupProperties"]["location"]
+    properties = group["groupProperties"]
+    location = properties["location"]
     return {
         "name": name,
+        "rooms": {room: properties["roomWeights"][key] for room, key in GROUP_ROOMS.items()},
+        "allows_duplicates": properties["properties"]["allowDuplicates"],
         "where": [place for place in ("corner", "middle", "edge") if location[place]],
         "members": members,
+    }
+
+
+def opening_row(asset: Json, holes: dict[str, Json]) -> Json:
+    """The space that a door or window takes: `open_m`, the edges x and z of its box when open, and its hole in a wall.
+
+    The hole begins at the wall's own origin of the asset, less `offset_m` along the wall and upwards. A door's hole is
+    as large as its box, a window's is given. Doorframes share the offsets of the doors of the same number.
+    """
+    name = str(asset["assetId"])
+    box = asset["boundingBox"]
+    hole = holes[name.replace("Doorframe", "Doorway")]
+    cut = hole["max"] if asset["objectType"] == "Window" else box
+    is_open = asset.get("states", {}).get("open", {}).get("boundingBox", box)
+    return {
+        "id": name,
+        "open_m": [round(is_open[axis], 4) for axis in ("x", "z")],
+        "hole_m": [round(cut[axis], 4) for axis in ("x", "y")],
+        "offset_m": [round(hole["offset"][axis] + 0.0, 4) for axis in ("x", "y")],
     }
 
 

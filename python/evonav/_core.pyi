@@ -623,6 +623,25 @@ def generate_task(
     given_json: str = "{}",
 ) -> tuple[str, list[str], list[bytes]]: ...
 
+# houses from seeds
+
+@final
+class HouseMaker:
+    """Makes ProcTHOR houses from seeds; it has no state, so threads may share one."""
+
+    def __new__(cls, parameters_json: str) -> HouseMaker:
+        """Read parameters (JSON); what is left out has its default. `InvalidArgumentError` names a wrong field."""
+
+    def make(self, seed: int, index: int) -> str:
+        """Make the house of a seed and a number, as ProcTHOR JSON of schema 1.0.0: the same one on every call.
+
+        Raises:
+            SimulationError: No house passes the checks: the rooms of the parameters hardly fit.
+        """
+
+def default_house_parameters() -> str:
+    """Return ProcTHOR's parameters of houses (JSON)."""
+
 # validation
 
 def inspect_house(source: House, stage: House, *, touch_m: float, rest_m: float, allow_unknown_assets: bool) -> str:

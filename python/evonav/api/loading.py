@@ -88,7 +88,7 @@ def load_houses(
 
     Args:
         source: `"bundled"`, a file of houses (JSON, JSONL, either with `.gz`), a folder of such files, a fetched split
-            (`"procthor-10k:val"`), or a list of these.
+            (`"procthor-10k:val"`), houses from a seed (`"endless:7"`), or a list of these.
         limit: Number of houses to take, from the first. Default: all.
         assets: File of sizes for assets that the catalogue lacks (docs/houses.md); they become part of the houses.
         start: `"auto"` gives a house without a start a free place to start from.
@@ -107,7 +107,10 @@ def load_houses(
     """
     sources = [source] if isinstance(source, str | Path) else list(source)
     options = HouseOptions.of(None if assets is None else Path(assets), start)
-    texts = (text for one in sources for text in _house_texts(one, options))
+    opened = [_house_texts(one, options) for one in sources]
+    for one in opened:
+        one.check_end(limit)
+    texts = (text for one in opened for text in one)
     return LazyList(tuple(islice(texts, limit)), lambda text: House(text.text, name=text.name))
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress
     from evonav.generation.dataset import GenerationProgress
+    from evonav.house.making import MakingProgress
     from evonav.report.tables.table import Table
 
 
@@ -217,6 +218,31 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
     with bars.Progress(*bar_columns(), console=console) as bar:
         houses = bar.add_task("starting", total=1.0)
         yield lambda state: bar.update(houses, completed=state.share, description=_counts(state))
+
+
+@contextmanager
+def house_progress(count: int) -> "Iterator[Callable[[MakingProgress], None]]":
+    """Show a progress bar over houses that are made on a terminal, else print a line each minute."""
+    from rich import progress as bars
+    from rich.console import Console
+
+    from evonav.api.progress import bar_columns
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        printed_s = time.monotonic()
+
+        def tell(state: "MakingProgress") -> None:
+            nonlocal printed_s
+            if time.monotonic() - printed_s >= LINE_EVERY_S:
+                printed_s = time.monotonic()
+                typer.echo(f"{state.num_houses} of {counted(count, 'house')}", err=True)
+
+        yield tell
+        return
+    with bars.Progress(*bar_columns(), console=console) as bar:
+        houses = bar.add_task("houses", total=float(count))
+        yield lambda state: bar.update(houses, completed=float(state.num_houses))
 
 
 def _counts(state: "GenerationProgress") -> str:

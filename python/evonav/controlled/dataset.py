@@ -232,4 +232,4 @@ def _sources(source: Path | str) -> tuple[SourceFile, ...]:
         return tuple(
             SourceFile(name=root.name, sha256=sha256_of_file(root / "task.json")) for root in task_roots(Path(source))
         )
-    return tuple(SourceFile(name=file.name, sha256=sha256_of_file(file)) for file in HouseTexts(source).files)
+    return tuple(SourceFile(name=name, sha256=sha256) for name, sha256 in HouseTexts(source).checksums())

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav._core import __version__
-from evonav.errors import HouseError, InvalidArgumentError, TaskError
+from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation.house_order import checked_subset, house_order
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import (
@@ -29,7 +29,7 @@ from evonav.generation.worker import (
     outcome_of,
 )
 from evonav.house.files import HouseTexts
-from evonav.parallel.folders import sha256_of_file, writing
+from evonav.parallel.folders import writing
 from evonav.parallel.pool import Answer, Job, Pool, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import DATASET_NAME, DatasetRecord, SourceFile, read_dataset, write_dataset
@@ -112,7 +112,8 @@ def generate_dataset(
     dataset, split = inherited_names(texts)
     options, workforce = options or GenerationOptions(dataset=dataset, split=split), workforce or Workforce()
     wanted = None if subset is None else checked_subset(subset, options.split, limit)
-    sources = _sources(texts)
+    texts.check_end(limit)
+    sources = tuple(SourceFile(name=name, sha256=sha256) for name, sha256 in texts.checksums())
     identity = {
         "evonav": __version__,
         "houses": {source.name: source.sha256 for source in sources},
@@ -324,18 +325,3 @@ def _check_tasks(record: DatasetRecord, journal: Journal) -> None:
         counts = ", ".join(f"{count} {reason}" for reason, count in record.num_rejected.most_common())
         first = f"; the first: {record.rejections[0].detail}" if record.rejections else ""
         raise TaskError(f"{record.sources[0].name}: no house gives a task ({counts or 'no house'}){first}")
-
-
-def _sources(houses: HouseTexts) -> tuple[SourceFile, ...]:
-    """Return the names and checksums of the files of houses.
-
-    Raises:
-        HouseError: A file cannot be read.
-    """
-    try:
-        return tuple(
-            SourceFile(name=houses.name if houses.published else file.name, sha256=sha256_of_file(file))
-            for file in houses.files
-        )
-    except OSError as error:
-        raise HouseError(f"{houses.name}: cannot be read: {error}") from error

@@ -13,6 +13,8 @@ from typing import IO, TYPE_CHECKING, NamedTuple, Protocol
 
 from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
+from evonav.house.generated import ENDLESS, EndlessHouses
+from evonav.parallel.folders import sha256_of_file
 
 if TYPE_CHECKING:
     from evonav.house.procthor10k import HouseSet
@@ -28,13 +30,14 @@ def stream_houses(path: str | Path, limit: int | None = None) -> Iterator[House]
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; or `bundled`, for the
-            houses that come with evonav. `bundled:3` and `houses.jsonl:3` are the third house.
+            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; `endless:SEED`, for
+            houses that are made as they are read, without end; or `bundled`, for the houses that come with evonav.
+            `bundled:3`, `endless:7:3` and `houses.jsonl:3` are the third house.
         limit: Number of houses after which to stop.
 
     Yields:
         Each house, checked; its `name` is `file:line`, for lists `file:line[index]`,
-        of a split `procthor-10k:val:line`, of the bundled ones `bundled:line`.
+        of a split `procthor-10k:val:line`, of the bundled ones `bundled:line`, of endless ones `endless:seed:number`.
 
     Raises:
         HouseError: A file cannot be read or a house is malformed; it names file, line, object and field.
@@ -85,6 +88,7 @@ class HouseTexts:
         """The published split that is read; `None` for a file or a directory."""
         self.completion = completion
         self._path = Path(path)
+        self._endless: EndlessHouses | None = None
         self._number: int | None = None
         """Number of the one house that is read; `None` for all."""
         if str(path).partition(":")[0] == BUNDLED and not self._path.exists():
@@ -100,13 +104,43 @@ class HouseTexts:
             self.published = house_set(path)
             self._path = split_path(self.published)
             self.name = str(path)
+        elif str(path).partition(":")[0] == ENDLESS and not self._path.exists():
+            self._endless = EndlessHouses(str(path))
+            self.name = str(path)
         else:
             self.name = str(self._path)
-        self.files = files_of(self._path)
+        self.files = [] if self._endless is not None else files_of(self._path)
         """The files to read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
         self._num_bytes_before = 0
         self._raw: IO[bytes] | None = None
+
+    @property
+    def is_endless(self) -> bool:
+        """Return whether there is no last house."""
+        return self._endless is not None and self._endless.number is None
+
+    def check_end(self, limit: int | None) -> None:
+        """Check that no more houses are asked for than can be read.
+
+        Raises:
+            InvalidArgumentError: The houses are endless, and there is no limit.
+        """
+        if limit is None and self.is_endless:
+            raise InvalidArgumentError(f"{self.name}: there is no last house; say how many to take (--limit, `limit`)")
+
+    def checksums(self) -> list[tuple[str, str]]:
+        """Return a name and a SHA-256 for everything that the houses are read from or made of.
+
+        Raises:
+            HouseError: A file cannot be read.
+        """
+        if self._endless is not None:
+            return [(self.name, self._endless.sha256())]
+        try:
+            return [(self.name if self.published else file.name, sha256_of_file(file)) for file in self.files]
+        except OSError as error:
+            raise HouseError(f"{self.name}: cannot be read: {error}") from error
 
     @property
     def share_read(self) -> float:
@@ -130,6 +164,8 @@ class HouseTexts:
             raise HouseError(f"{self.name}:{self._number}: {self.name} has fewer houses")
 
     def _read(self) -> Iterator[HouseText]:
+        if self._endless is not None:
+            yield from (HouseText(*house) for house in self._endless)
         self._num_bytes_before = 0
         for file in self.files:
             name = self.name if file == self._path else str(file)

@@ -12,6 +12,7 @@ pub mod generation;
 pub mod geometry;
 pub mod grid;
 pub mod house;
+pub mod house_generation;
 pub mod memory;
 pub mod perception;
 pub mod rng;

@@ -6,6 +6,7 @@ mod camera;
 mod error;
 mod generation;
 mod house;
+mod house_generation;
 mod inspection;
 mod memory;
 mod perception;
@@ -28,6 +29,7 @@ mod _core {
         },
         generation::{default_generation_parameters, generate_task},
         house::{House, HouseObject, Opening, Room, Wall, assets},
+        house_generation::{HouseMaker, default_house_parameters},
         inspection::inspect_house,
         memory::{
             objects::{ObjectEntry, ObjectMap},

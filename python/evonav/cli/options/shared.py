@@ -89,7 +89,7 @@ PlotFile = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Write a plot: .svg, .png or .pdf. It needs the extra `viz`."),
 ]
-HOUSES = "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, or bundled"
+HOUSES = "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, endless:SEED, or bundled"
 Houses = Annotated[
     Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}. Default: use --tasks.")
 ]

@@ -1,25 +1,35 @@
-"""`evonav houses`: list, show, check and download houses."""
+"""`evonav houses`: list, show, check, make, compare and download houses."""
 
+from itertools import chain, islice
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from evonav.cli.display import status
+from evonav.cli.display import house_progress, interruptible, show_tables, status
 from evonav.cli.group import HELP_NAMES, Command, Group, new_app
+from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     BUNDLED,
     HOUSES,
     AnyAsset,
     AssetFile,
     Limit,
+    Seed,
     StartOfHouses,
     listed,
     read_houses,
 )
 from evonav.counted import counted
 
+if TYPE_CHECKING:
+    from evonav.evaluation.run.run_settings import RunSettings
+    from evonav.generation.house_statistics import HouseComparison
+    from evonav.report.tables.table import Table
+
 EXIT_WRONG = 1
+LEVEL = 0.05
+"""Largest adjusted p at which two sets of houses differ in a feature."""
 
 
 class _ListByDefault(Group):
@@ -31,7 +41,7 @@ class _ListByDefault(Group):
         return super().parse_args(ctx, args)
 
 
-houses_app = new_app(help="List, show and check houses, or download published ones.", cls=_ListByDefault)
+houses_app = new_app(help="List, show, check, make and compare houses, or download published ones.", cls=_ListByDefault)
 
 
 @houses_app.command(name="list", cls=Command)
@@ -41,10 +51,13 @@ def list_houses(
 ) -> None:
     """List houses with their rooms, floor areas and objects."""
     from evonav.generation.house_view import area_of_m2
-    from evonav.house import stream_houses
+    from evonav.house import House
+    from evonav.house.files import HouseTexts
 
+    texts = HouseTexts(path or BUNDLED)
+    texts.check_end(limit)
     typer.echo("rooms   area m2  objects  house")
-    for house in stream_houses(path or BUNDLED, limit):
+    for house in (House(text, name=name) for name, text in islice(texts, limit)):
         area_m2 = sum(area_of_m2(room.polygon_m) for room in house.rooms)
         typer.echo(f"{len(house.rooms):5}  {area_m2:8.1f}  {len(house.objects):7}  {house.name}")
 
@@ -109,14 +122,14 @@ def check_houses(
     only_wrong: Annotated[bool, typer.Option("--only-wrong", help="Leave out notes and houses that are fine.")] = False,
 ) -> None:
     """Check houses, a line each, and name what is wrong; exit code 1 if a house is."""
-    from itertools import chain, islice
-
     from evonav.generation.house_check import check_house
     from evonav.generation.house_view import summary_of
 
     num_houses = num_wrong = 0
-    texts = chain.from_iterable(read_houses(one, assets, start) for one in houses)
-    for name, text in islice(texts, limit):
+    opened = [read_houses(one, assets, start) for one in houses]
+    for one in opened:
+        one.check_end(limit)
+    for name, text in islice(chain.from_iterable(opened), limit):
         found = check_house(name, text, allow_unknown_assets=allow_unknown_assets)
         num_houses, num_wrong = num_houses + 1, num_wrong + (not found.is_fine)
         if not only_wrong or not found.is_fine:
@@ -128,6 +141,88 @@ def check_houses(
     typer.echo(f"{num_wrong} of {counted(num_houses, 'house')} wrong")
     if num_wrong:
         raise typer.Exit(EXIT_WRONG)
+
+
+@houses_app.command(name="make", cls=Command)
+@with_settings("pool")
+def make(
+    pool: "RunSettings",
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FILE", help="File of the houses, .jsonl or .jsonl.gz; a part is resumed."),
+    ],
+    count: Annotated[int, typer.Option(min=1, metavar="N", help="Number of houses.")] = 100,
+    seed: Seed = 0,
+    first: Annotated[int, typer.Option(min=0, metavar="N", help="Number of the first house of the seed.")] = 0,
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="TOML file of parameters: rooms, sizes, furniture. Default: ProcTHOR's."),
+    ] = None,
+) -> None:
+    """Make houses from a seed, as ProcTHOR does; run again to resume."""
+    from evonav.house.generated import read_house_parameters
+    from evonav.house.making import make_houses
+
+    parameters = read_house_parameters(config)
+    with interruptible(out), house_progress(count) as show:
+        made = make_houses(
+            out,
+            count,
+            seed=seed,
+            first=first,
+            parameters=parameters,
+            workforce=pool.workforce(),
+            on_progress=show,
+        )
+    rate = f", {made.num_new / made.seconds:.1f} houses/s" if made.num_new else ""
+    typer.echo(f"{counted(made.num_houses, 'house')} in {out}; {made.num_new} new{rate}")
+
+
+@houses_app.command(name="stats", cls=Command)
+def stats(
+    a: Annotated[str, typer.Argument(metavar="A", help=f"Houses: {HOUSES}.")],
+    b: Annotated[str, typer.Argument(metavar="B", help="Houses to compare them with.")],
+    limit: Limit = None,
+    every: Annotated[bool, typer.Option("--all", help="Print all features, not only those that differ.")] = False,
+) -> None:
+    """Set two sets of houses side by side, and test in what they differ.
+
+    Houses are compared with those of the same room spec.
+    """
+    from evonav.generation.house_statistics import compare_houses, sample_of
+
+    samples = []
+    for name in (a, b):
+        texts = read_houses(name, None, "file")
+        texts.check_end(limit)
+        with status(f"Reading {name}"):
+            samples.append([sample_of(text) for text in islice(texts, limit)])
+    found = compare_houses(*samples)
+    show_tables([comparison_table(found, (a, b), every=every)])
+
+
+def comparison_table(found: "HouseComparison", names: tuple[str, str], *, every: bool) -> "Table":
+    """Return the table of `evonav houses stats`: features that differ by more than chance, or all."""
+    from evonav.report.tables.table import Table
+
+    rows = [
+        (one.name, f"{one.mean_a:.2f}", f"{one.mean_b:.2f}", f"{one.effect:+.2f}", f"{one.p:.3g}", f"{one.holm:.3g}")
+        for one in sorted(found.features, key=lambda one: -abs(one.effect))
+        if every or one.holm <= LEVEL or not one.name.startswith("number of")
+    ]
+    num_differing = sum(one.holm <= LEVEL for one in found.features)
+    counts = " and ".join(counted(number, "house") for number in found.num_houses)
+    return Table(
+        title="Houses side by side",
+        columns=("mean a house", "A", "B", "effect", "p", "Holm"),
+        rows=tuple(rows),
+        notes=(
+            f"A: {names[0]}. B: {names[1]}. {counts} of {counted(len(found.strata), 'room spec')} that both have; "
+            f"{found.num_left_out[0]} and {found.num_left_out[1]} of other specs are left out.",
+            "Means and tests are within room specs. Effect: the difference in standard deviations within a spec.",
+            f"{num_differing} of {len(found.features)} features differ (Holm at most {LEVEL:g}).",
+        ),
+    )
 
 
 @houses_app.command(name="fetch", cls=Command)

@@ -1,6 +1,6 @@
 //! Facts about one asset.
 
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::geometry::Vec3;
 
@@ -53,7 +53,7 @@ pub(super) fn rgb(hex: &str) -> [u8; 3] {
 }
 
 /// A split of ProcTHOR's assets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Split {
     /// Assets of training houses.

@@ -5,7 +5,10 @@ use std::{collections::HashMap, sync::OnceLock};
 use serde::Deserialize;
 
 use crate::{
-    assets::{Asset, asset::rgb, group_definition::GroupDefinition, placement_rule::PlacementRule},
+    assets::{
+        Asset, OpeningSpace, asset::rgb, group_definition::GroupDefinition,
+        placement_rule::PlacementRule,
+    },
     geometry::Vec3,
 };
 
@@ -16,6 +19,7 @@ pub struct Catalogue {
     categories: HashMap<String, Category>,
     materials: HashMap<String, [u8; 3]>,
     groups: Vec<GroupDefinition>,
+    openings: HashMap<String, OpeningSpace>,
 }
 
 /// Facts about a category.
@@ -37,6 +41,7 @@ struct DataFile {
     categories: Vec<CategoryRow>,
     groups: Vec<GroupDefinition>,
     materials: Vec<(String, String)>,
+    openings: Vec<OpeningSpace>,
 }
 
 #[derive(Deserialize)]
@@ -63,6 +68,7 @@ impl Catalogue {
                 categories: read(include_str!("../../data/categories.json")).categories,
                 groups: read(include_str!("../../data/groups.json")).groups,
                 materials: read(include_str!("../../data/materials.json")).materials,
+                openings: read(include_str!("../../data/openings.json")).openings,
             })
         })
     }
@@ -84,7 +90,14 @@ impl Catalogue {
                 median_size(category.asset_ids.iter().filter_map(|id| assets.get(id)));
         }
         let colours = data.materials.into_iter().map(|(name, hex)| (name, rgb(&hex)));
-        Self { assets, categories: by_name, materials: colours.collect(), groups: data.groups }
+        let openings = data.openings.into_iter().map(|space| (space.id.clone(), space)).collect();
+        Self {
+            assets,
+            categories: by_name,
+            materials: colours.collect(),
+            groups: data.groups,
+            openings,
+        }
     }
 
     /// Return the facts about an asset; `None` if the catalogue does not hold it.
@@ -136,6 +149,11 @@ impl Catalogue {
     /// Return whether a category was ever recorded on or in another.
     pub fn can_rest_on(&self, child_category: &str, parent_category: &str) -> bool {
         self.rest_probability(child_category, parent_category) > 0.0
+    }
+
+    /// Return the space that a door, doorframe or window takes; `None` for any other asset.
+    pub fn opening(&self, asset_id: &str) -> Option<&OpeningSpace> {
+        self.openings.get(asset_id)
     }
 
     /// Return the mean albedo of a material, sRGB.

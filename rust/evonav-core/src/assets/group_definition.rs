@@ -1,5 +1,7 @@
 //! ProcTHOR's asset groups: their members, and how the members are arranged.
 
+use std::collections::HashMap;
+
 use serde::Deserialize;
 
 use crate::{
@@ -15,6 +17,10 @@ pub struct GroupDefinition {
     /// Places in a room where the group may stand.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
+    /// Weight by room type, as [`crate::assets::placement_rule::PlacementRule::room_weight`].
+    rooms: HashMap<String, f64>,
+    /// Whether a room may have several of these groups.
+    pub allows_duplicates: bool,
     /// Members; each comes after its parent. The first has no parent.
     pub members: Vec<GroupMember>,
 }
@@ -24,6 +30,11 @@ pub struct GroupDefinition {
 pub struct GroupMember {
     /// Category of the member.
     pub category: String,
+    /// Name of the member's asset: members of one name are the same asset.
+    pub name: String,
+    /// Ids of the assets that the member may be; empty if an earlier member has the same name.
+    #[serde(default)]
+    pub assets: Vec<String>,
     /// Index of the member to which its place is relative; `None` for the first.
     #[serde(default)]
     pub parent: Option<usize>,
@@ -54,7 +65,7 @@ pub struct MemberPose {
     /// Yaw.
     pub yaw_deg: f64,
     /// Edge lengths of the axis-aligned box around the member's turned box.
-    extent_m: Vec2,
+    pub extent_m: Vec2,
 }
 
 impl GroupDefinition {
@@ -93,6 +104,11 @@ impl GroupDefinition {
             poses.push(pose);
         }
         poses
+    }
+
+    /// Return 0 if the group is not placed in rooms of this type.
+    pub fn room_weight(&self, room_type: &str) -> f64 {
+        self.rooms.get(room_type).copied().unwrap_or(0.0)
     }
 
     /// Return the categories of the members that stand on the floor, in the members' order.

@@ -21,7 +21,7 @@ impl House {
         Self::from_document(name, document::parse(name, json)?)
     }
 
-    pub(super) fn from_document(name: &str, document: serde_json::Value) -> Result<Self, Error> {
+    pub(crate) fn from_document(name: &str, document: serde_json::Value) -> Result<Self, Error> {
         let house = parse::view(name, document)?;
         validate::check(&house)?;
         Ok(house)
