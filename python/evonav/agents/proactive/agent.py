@@ -214,7 +214,8 @@ class Proactive(NavigatorAgent):
     def _chosen(self, posterior: Posterior, around: Surroundings, observation: Observation) -> Option | None:
         """Return where to go; `None` if nothing is left."""
         config, here = self.config, (observation.pose.x_m, observation.pose.z_m)
-        entries = [self._entry_option(entry_id, posterior.entries[entry_id]) for entry_id in posterior.entries]
+        likely = sorted(posterior.entries, key=lambda one: (-posterior.entries[one], one))[: config.num_entries]
+        entries = [self._entry_option(entry_id, posterior.entries[entry_id]) for entry_id in likely]
         frontiers = self._navigator.explorer.frontiers
         gains = frontier_gains(posterior, self._searched.coarse, around.cells, frontiers)
         options = [Option("frontier", one.id, one.position_m, one.position_m, gains[one.id], 0.0) for one in frontiers]

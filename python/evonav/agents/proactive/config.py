@@ -77,6 +77,8 @@ class ProactiveConfig:
     """Factor of the weight that a place to search from has promised, once the agent has been there."""
     abandoned: float = 0.5
     """Factor of a place or frontier for each time that the agent turned away from it before it was there."""
+    num_entries: int = 8
+    """Largest number of entries to go to that are compared."""
     num_places: int = 64
     """Largest number of places to search from that are compared."""
     navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS))

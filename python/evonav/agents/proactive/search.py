@@ -40,10 +40,6 @@ class Option:
     is_reached: bool = True
     """Whether known floor leads there."""
 
-    def rate(self, near_m: float) -> float:
-        """Return the gain a metre."""
-        return self.gain / (self.way_m + near_m)
-
 
 def frontier_gains(
     posterior: Posterior, coarse: CoarseFrame, cells: NDArray[np.uint8], frontiers: Sequence[Frontier]
@@ -101,12 +97,12 @@ def places_to_search(
     others = np.nonzero(weights > 0.0)
     centres_m = coarse.centres_m()
     eyes_m, seen_m = centres_m[rows, cols], centres_m[others]
-    offsets_m = seen_m[None] - eyes_m[:, None]
-    shown = (offsets_m**2).sum(axis=2) <= config.search_radius_m**2
-    shown &= (room[others][None] == room[rows, cols][:, None]) | (room[others][None] < 0)
+    dx_m, dz_m = (seen_m[None, :, axis] - eyes_m[:, None, axis] for axis in (0, 1))
+    shown = dx_m * dx_m + dz_m * dz_m <= config.search_radius_m**2
+    shown &= (room[others][None] == room[rows, cols][:, None]) | (room[others][None] == NO_ROOM)
     gains = shown * weights[others][None]
     sums = gains.sum(axis=1)
-    middles = (gains[:, :, None] * seen_m[None]).sum(axis=1) / np.maximum(sums, 1e-300)[:, None]
+    middles = np.einsum("es,sk->ek", gains, seen_m) / np.maximum(sums, 1e-300)[:, None]
     numbers = (rows * coarse.frame.cols + cols).tolist()
     return [
         (number, (eye[0], eye[1]), (middle[0], middle[1]), gain)
@@ -154,7 +150,7 @@ def best_option(
     def rate(one: Option) -> float:
         bonus = 1.0 + config.keep if config.keeps_choice and is_same(one, last) else 1.0
         malus = config.abandoned ** sum(is_same(one, other) for other in abandoned) if config.keeps_choice else 1.0
-        return one.rate(config.near_m) * bonus * malus
+        return one.gain / (one.way_m + config.near_m) * bonus * malus
 
     return max(options, key=lambda one: (rate(one), -one.way_m, -one.key), default=None)
 
