@@ -37,13 +37,13 @@ pub fn largest_cluster(
     min_points: usize,
 ) -> Option<Cow<'_, [Point]>> {
     let labels = dbscan(points, radius_m, min_points);
+    if !labels.is_empty() && labels.iter().all(|&label| label == 0) {
+        return Some(Cow::Borrowed(points));
+    }
     let num = labels.iter().max().map_or(0, |&last| (last + 1) as usize);
     let mut sizes = vec![0_usize; num];
     labels.iter().filter(|&&label| label != NOISE).for_each(|&label| sizes[label as usize] += 1);
     let largest = (0..num).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
-    if sizes[largest] == points.len() {
-        return Some(Cow::Borrowed(points));
-    }
     let is_inside = |&(_, &label): &(&Point, &i32)| label == largest as i32;
     Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
 }
@@ -248,12 +248,10 @@ impl<'a> Grid<'a> {
 
     /// Return whether a core point of one cell is near a core point of another.
     fn are_joined(&self, cell: usize, other: usize) -> bool {
+        let points = self.fours(cell).iter().flat_map(|four| (0..4).map(|place| four.point(place)));
+        let mut cores = points.filter(|point| point[0] != f32::INFINITY);
         let others = self.fours(other);
-        self.fours(cell).iter().any(|four| {
-            (0..4)
-                .map(|place| four.point(place))
-                .any(|point| others.iter().any(|four| four.num_near(point, self.radius2) > 0))
-        })
+        cores.any(|point| others.iter().any(|four| four.num_near(point, self.radius2) > 0))
     }
 
     /// Join the parts that touching cells leave separate. It is enough to start from cells outside

@@ -113,7 +113,8 @@ impl<T> Blocks<T> {
     /// Return the value of a voxel's block, which is `new` if there was none, and the voxel's
     /// [`place`].
     pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
-        let block = block_of(voxel);
+        let voxel = clamped(voxel);
+        let block = voxel.map(|i| i >> 2);
         if block != self.last.0 {
             let (&mut index, is_new) = self.index.entry(block, self.values.len() as u32);
             if is_new {
@@ -121,13 +122,18 @@ impl<T> Blocks<T> {
             }
             self.last = (block, index as usize);
         }
-        (&mut self.values[self.last.1], place(voxel))
+        (&mut self.values[self.last.1], place_in_block(voxel))
     }
 }
 
 /// Return the position of a voxel in its block: 0 to 63.
 pub(crate) fn place(voxel: Voxel) -> usize {
-    let [x, y, z] = clamped(voxel).map(|i| (i & 3) as usize);
+    place_in_block(clamped(voxel))
+}
+
+/// Return the same as [`place`] for a voxel within the bounds.
+fn place_in_block(voxel: Voxel) -> usize {
+    let [x, y, z] = voxel.map(|i| (i & 3) as usize);
     x << 4 | y << 2 | z
 }
 
@@ -290,7 +296,7 @@ pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
                 blocks.push([FREE_INDEX; 64]);
             }
         }
-        let average = &mut blocks[last.1][place(voxel)];
+        let average = &mut blocks[last.1][place_in_block(voxel)];
         if *average == FREE_INDEX {
             *average = averages.len() as u32;
             averages.push(point);
