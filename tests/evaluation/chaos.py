@@ -21,10 +21,19 @@ from pathlib import Path
 
 from processes import children
 
+from evonav.agents.hosting import forking
+from evonav.decision.vlm.mock_answers import mock_answer
+from evonav.decision.vlm.mock_server import MockServer, serving
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.parallel.local import PROCESS_NAME
 
-VICTIMS = {"driver": None, "worker": PROCESS_NAME, "agent": "evonav.agents.hosting.serving"}
+VICTIMS = {
+    "driver": None,
+    "worker": PROCESS_NAME,
+    "agent": forking.PROCESS_NAME,
+    "fork server": forking.SERVER_NAME,
+}
+"""Names of processes."""
 
 
 def num_recorded(run_dir):
@@ -60,7 +69,9 @@ def disturb(command, run_dir, num_stages, num_kills, seed, environment=None):
             victim = draw.choice(sorted(VICTIMS))
             part = VICTIMS[victim]
             among = (
-                [driver.pid] if part is None else [pid for pid, line in children(driver.pid).items() if part in line]
+                [driver.pid]
+                if part is None
+                else [pid for pid, line in children(driver.pid).items() if line.startswith(f"{part}\n")]
             )
             if not among or driver.poll() is not None:
                 victim, among = "driver", [driver.pid]
@@ -89,13 +100,26 @@ def main():
     parser.add_argument("--agents", default="fu")
     parser.add_argument("--limit", type=int, default=60)
     parser.add_argument("--workers", default="2")
+    parser.add_argument("--episodes-at-once", type=int, default=1)
+    parser.add_argument("--latency", type=float, help="of a mock model that decides, in seconds; default: rules decide")
+    parser.add_argument("--retries", default="5", help="enough that no stage uses them up")
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
+    server = MockServer(lambda request: {"text": mock_answer(request), "hang_s": options.latency or 0.0})
+    server.requests = None
+    with serving(server):
+        campaign(options, [] if options.latency is None else ["--decision", "vlm", "--model", "mock"], server.url)
+
+
+def campaign(options, decision, url):
+    """Makes both runs, and tells how they differ."""
     evonav = str(Path(sys.executable).with_name("evonav"))
     command = [evonav, "evaluate", "--agent", options.agents, "--tasks", options.tasks, "--limit", str(options.limit)]
-    command += ["--workers", options.workers, "--out"]
+    command += ["--workers", options.workers, "--episodes-at-once", str(options.episodes_at_once)]
+    command += [*decision, "--base-url", url] if decision else []
+    command += ["--retries", options.retries, "--out"]
     whole, disturbed = options.out / "whole", options.out / "disturbed"
     began_s = time.monotonic()
     subprocess.run([*command, str(whole)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

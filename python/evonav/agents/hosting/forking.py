@@ -26,8 +26,8 @@ STATE = struct.Struct("<?q")
 MAX_REQUEST_BYTES = 1 << 17
 SOCKET, LIFE, BLOCK, RELAY = 3, 4, 5, 6
 """Descriptors of a child, after its output; the last one is there only if a model is asked for it."""
-PROCESS_NAME = "evonav-agent"
-"""Name of a child in `ps` and `top`."""
+PROCESS_NAME, SERVER_NAME = "evonav-agent", "evonav-forks"
+"""Names of a child and of this process in `ps` and `top`."""
 
 
 class Child(NamedTuple):
@@ -47,6 +47,7 @@ def main(control: int) -> None:
     """
     from evonav.agents.hosting import serving
 
+    _call_oneself(SERVER_NAME)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     serving.preload()
     gc.collect()
@@ -106,6 +107,11 @@ def _serve(requests: socket.socket) -> Child | None:
                     del pids[watched]
 
 
+def _call_oneself(name: str) -> None:
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text(name)
+
+
 def _exit_code(pid: int) -> int:
     """Return how a child has ended, without reaping it."""
     found = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
@@ -135,8 +141,7 @@ def _become(child: Child) -> None:
         os.dup2(copy, number, inheritable=number < SOCKET)
     os.closerange(len(copies), os.sysconf("SC_OPEN_MAX"))
     gc.enable()
-    with suppress(OSError):
-        Path("/proc/self/comm").write_text(PROCESS_NAME)
+    _call_oneself(PROCESS_NAME)
     os.environ.clear()
     os.environ.update(child.request["environment"])
     if child.request["folder"] is not None:
