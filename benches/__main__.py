@@ -26,6 +26,7 @@ SECTIONS = {
     "perception": "Perception",
     "rendering": "Rendering",
     "thor": "AI2-THOR engine",
+    "waiting": "Many episodes at once",
 }
 """Title by module. A module has `NOTES` (Markdown) and `run()`, which gives a list of `Row` or a table, or
 `measure(Sampling)`, which yields rows."""

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -18,6 +18,8 @@ END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""
 THREAD_VARIABLES = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Environment variables that limit the threads of a process."""
+SPARING = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "262144", "MALLOC_TRIM_THRESHOLD_": "1048576"}
+"""Environment variables by which glibc gives memory back at once, where many jobs share the machine's memory."""
 PROCESS_NAME = "evonav-worker"
 """Name of a worker's process in `ps` and `top`, on Linux."""
 
@@ -57,12 +59,12 @@ class ProcessHost:
 class WorkerProcess:
     """A process that runs jobs until its parent closes the connection or dies."""
 
-    def __init__(self, *arguments: str | bool) -> None:
+    def __init__(self, work: str, settings: str, has_threads: bool) -> None:
         """Start the process with the arguments of `ProcessHost`."""
         context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
-        with one_thread_each(), _without_main():
-            self._process = context.Process(target=_serve, args=(far_end, *arguments), daemon=True)
+        with one_thread_each(), _variables(SPARING if has_threads else {}), _without_main():
+            self._process = context.Process(target=_serve, args=(far_end, work, settings, has_threads), daemon=True)
             self._process.start()
         far_end.close()
 
@@ -168,8 +170,15 @@ def end_process(process: multiprocessing.process.BaseProcess, connection: Connec
 @contextmanager
 def one_thread_each() -> Iterator[None]:
     """Give children that are started inside one thread each: the parallelism is over jobs."""
-    added = [name for name in THREAD_VARIABLES if name not in os.environ]
-    os.environ.update(dict.fromkeys(added, "1"))
+    with _variables(dict.fromkeys(THREAD_VARIABLES, "1")):
+        yield
+
+
+@contextmanager
+def _variables(values: Mapping[str, str]) -> Iterator[None]:
+    """Give children that are started inside environment variables, unless the user has set them."""
+    added = [name for name in values if name not in os.environ]
+    os.environ.update({name: values[name] for name in added})
     try:
         yield
     finally:

@@ -79,7 +79,10 @@ class CachingClient(ABC):
 
     def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
         """Ask the model, and store the outcome if the mode and `keeps_failures` require it."""
-        images = {image_name(picture.pixels): png_of(picture.pixels) for picture in prompt.pictures}
+        images: dict[str, bytes] = {}
+        for picture in prompt.pictures:
+            name = image_name(picture.pixels)
+            images[name] = images.get(name) or self._stored_png(name) or png_of(picture.pixels)
         outcome: JsonObject | Failure
         try:
             outcome = self._ask_model(prompt, attempt, images)
@@ -94,6 +97,10 @@ class CachingClient(ABC):
         if self.mode == "record" and not isinstance(outcome, Failure) and not self._is_malformed(outcome):
             self.store.put(cached, images if self.keeps_images else {}, outcome)
         return outcome
+
+    def _stored_png(self, name: str) -> bytes | None:
+        """Return an image's file if an earlier question had it: agents show most images several times."""
+        return None if self.store is None or self.mode == "live" else self.store.image(name)
 
     def _is_malformed(self, outcome: JsonObject | Failure) -> bool:
         """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""

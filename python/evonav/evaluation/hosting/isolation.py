@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from evonav.agents.hosting.sandbox import Policy, landlock_abi, why_not
-from evonav.parallel.local import THREAD_VARIABLES
+from evonav.parallel.local import SPARING, THREAD_VARIABLES
 from evonav.perception.weights import MODELS_VARIABLE
 
 Isolation = Literal["none", "process", "sandbox"]
@@ -45,6 +45,7 @@ _VARIABLES = (
     "PYTHONHASHSEED",
     "TZ",
     MODELS_VARIABLE,
+    *SPARING,
     *THREAD_VARIABLES,
 )
 """Environment variables that a process in a sandbox is given."""
