@@ -18,8 +18,9 @@ import pytest
 import evonav
 from evonav.generation import GenerationParameters, generate_task
 from evonav.tasks import write_task
-from evonav.tasks.bundled import FORMER, FORMER_IMAGES
+from evonav.tasks.bundled import FORMER_IMAGES
 
+FORMER = f"the bundled tasks with their {FORMER_IMAGES}"
 DATA = Path(__file__).with_name("data")
 OPTIONS = ("--limit", 1, "--noise", "wrong=0.2", "--perception", "noisy:good", "--isolation", "none")
 

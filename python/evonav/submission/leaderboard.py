@@ -12,7 +12,7 @@ from evonav.submission.archive import SubmissionError
 from evonav.submission.file import SUFFIX, Submission, SubmissionFile
 from evonav.submission.packed_setup import PackedSetup, packed_setup
 from evonav.submission.verify import Verdict, brief, read_records, verify
-from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
+from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
 
 
@@ -140,7 +140,7 @@ def rank(
         except (SubmissionError, InvalidArgumentError) as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
-        images = FORMER_IMAGES if any(is_former(task.task_id, task.digest) for task in header.tasks) else ""
+        images = next(filter(None, (former_images(task.task_id, task.digest) for task in header.tasks)), "")
         is_in_room = ProtocolConfig.from_header(header.config["protocol"]).reference_in_room
         end = "" if is_in_room else "to the nearest free point, also behind a wall"
         conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, images, end)
@@ -175,8 +175,7 @@ def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
 
 def _digests(task: TaskFile) -> set[str]:
     """Return the digests under which a task is known."""
-    former = former_digest(task)
-    return {task.digest} if former is None else {task.digest, former}
+    return {task.digest, *former_digests(task)}
 
 
 def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -> Unranked | None:

@@ -5,6 +5,7 @@ No file can show that an agent chose its actions by itself: for that, the agent 
 
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import groupby
@@ -29,7 +30,7 @@ from evonav.submission.file import PackedRecords, Submission, SubmissionFile, fi
 from evonav.submission.pack import packed_summary
 from evonav.submission.packed_setup import camera_of
 from evonav.submission.recorded_path import TOLERANCE, path_findings
-from evonav.tasks.bundled import FORMER_IMAGES, former_digest, is_former
+from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
@@ -279,7 +280,7 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         there = known.get(task.task_id)
         if there is None:
             yield f"{task.task_id} is not among the tasks to verify with"
-        elif there.num_stages != task.num_stages or task.digest not in (there.digest, former_digest(there)):
+        elif there.num_stages != task.num_stages or task.digest not in (there.digest, *former_digests(there)):
             yield f"{task.task_id} is another task than the one of this name"
     names = [task.task_id for task in header.tasks]
     if names != sorted(set(names)):
@@ -294,8 +295,8 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
 
 
 def _known_tasks(header: Submission) -> str:
-    num_former = sum(is_former(task.task_id, task.digest) for task in header.tasks)
-    return f"{len(header.tasks)}, all known" + (f"; {num_former} with {FORMER_IMAGES}" if num_former else "")
+    former = Counter(filter(None, (former_images(task.task_id, task.digest) for task in header.tasks)))
+    return "; ".join([f"{len(header.tasks)}, all known", *(f"{num} with {images}" for images, num in former.items())])
 
 
 def _target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:

@@ -1,17 +1,20 @@
 """Find the tasks that come with evonav, and recognise them as they were with their former reference images."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import TypedDict
 
 from evonav.tasks.listing import TaskFile
 from evonav.tasks.records import sha256_of
 
 FORMER_IMAGES = "former reference images, drawn in the style outlined"
-FORMER = f"the bundled tasks with their {FORMER_IMAGES}"
+FORMER_DEFAULT_IMAGES = "former reference images, drawn in the style default before its objects changed"
+_IMAGES = (FORMER_IMAGES, FORMER_DEFAULT_IMAGES)
+"""The images of each of the digests in `former_tasks.json`, the oldest first."""
 
 
 def bundled_tasks() -> AbstractContextManager[Path]:
@@ -19,26 +22,32 @@ def bundled_tasks() -> AbstractContextManager[Path]:
     return as_file(files("evonav") / "data" / "tasks")
 
 
-def is_former(task_id: str, digest: str) -> bool:
-    """Return whether a digest is that of a bundled task with its former reference images."""
-    return task_id in _former() and _former()[task_id]["sha256"] == digest
+def former_images(task_id: str, digest: str) -> str:
+    """Return which former reference images a bundled task with a digest has, in words; empty if it is no such task."""
+    digests = _former().get(task_id, {}).get("sha256", [])
+    return _IMAGES[digests.index(digest)] if digest in digests else ""
 
 
-def former_digest(task: TaskFile) -> str | None:
-    """Return the digest that a bundled task had with its former reference images; `None` for other tasks.
+def former_digests(task: TaskFile) -> Sequence[str]:
+    """Return the digests that a bundled task had with its former reference images, the oldest first; none for others.
 
-    The present task must be equal to the former one in all but these images and their style.
+    The present task must be equal to the former ones in all but these images and their style.
     """
     former = _former().get(task.task_id)
     if former is None or _without_images(task.path / "task.json") != former["without_images"]:
-        return None
+        return ()
     return former["sha256"]
 
 
+class _Former(TypedDict, total=False):
+    sha256: list[str]
+    without_images: str
+
+
 @cache
-def _former() -> Mapping[str, Mapping[str, str]]:
+def _former() -> Mapping[str, _Former]:
     data = (files("evonav") / "data" / "former_tasks.json").read_bytes()
-    former: dict[str, dict[str, str]] = json.loads(data)
+    former: dict[str, _Former] = json.loads(data)
     return former
 
 

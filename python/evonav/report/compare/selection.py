@@ -12,7 +12,7 @@ from evonav.evaluation.records.store import FILE_NAME
 from evonav.json_diff import json_differences
 from evonav.report.run import RecordedRun, load_run
 from evonav.report.tables.run_metadata import task_digests
-from evonav.tasks.bundled import FORMER, is_former
+from evonav.tasks.bundled import former_images
 
 
 @dataclass(frozen=True)
@@ -127,5 +127,6 @@ def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[st
 
 def _about_images(run: RecordedRun) -> str:
     """Say whether a run's tasks are the bundled ones as they were before their reference images were drawn anew."""
-    is_any_former = any(is_former(task_id, digest) for task_id, digest in task_digests(run).items())
-    return f" ({FORMER})" if is_any_former else ""
+    found = (former_images(task_id, digest) for task_id, digest in task_digests(run).items())
+    images = next(filter(None, found), "")
+    return f" (the bundled tasks with their {images})" if images else ""

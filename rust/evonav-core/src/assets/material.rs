@@ -86,8 +86,10 @@ kinds! {
     Smooth: Plain, gloss 0.15, variants 1;
     /// Polished things: porcelain, enamel, varnish.
     Ceramic: Plain, gloss 0.6, variants 1;
-    /// Glass.
+    /// Glass of bottles and other small things.
     Glass: Plain, gloss 0.9, variants 1;
+    /// Glass that is seen through.
+    Pane: Plain, gloss 0.9, variants 1;
     /// Painted plaster.
     Plaster: Repeated([1.6, 1.6]), gloss 0.05, variants 2;
     /// Floorboards.

@@ -37,7 +37,7 @@ pub fn planks(u: f32, v: f32, seed: u32) -> Texel {
     let joint = line(du * 1.2, 0.005).max(line(dv * 0.15, 0.005));
     let shift = random(row, board, seed + 5);
     let g = grain(fract(u + shift), fract(v + shift), seed + hash(row, board, 3) % 3);
-    let light = (g + 0.11 * tone) * (1.0 - 0.3 * joint);
+    let light = (g + 0.1 * tone) * (1.0 - 0.25 * joint);
     [light * (1.0 + 0.03 * tone), light, light * (1.0 - 0.04 * tone), 1.0 - 0.5 * joint]
 }
 
@@ -50,7 +50,7 @@ pub fn parquet(u: f32, v: f32, seed: u32) -> Texel {
     let edge = |t: f32| fract(t).min(1.0 - fract(t));
     let joint = line(edge(4.0 * along) * 0.24, 0.005).max(line(edge(16.0 * across) * 0.06, 0.004));
     let g = grain(fract(along + 0.3 * tone), fract(across + 0.3 * tone), seed);
-    grey((g + 0.12 * tone) * (1.0 - 0.22 * joint))
+    grey((g + 0.1 * tone) * (1.0 - 0.19 * joint))
 }
 
 /// Return tiles in a grid of `columns` x `rows`, with joints of a share of a tile's height;
@@ -86,22 +86,22 @@ fn tile(tile: &Tile, spread: f32, grout: f32) -> Texel {
 pub fn slabs(u: f32, v: f32, seed: u32) -> Texel {
     let place = grid(u, v, [4, 4], 0.022, 0.0, seed);
     let stone = marble(fract(u + place.tone), fract(v - place.tone), seed);
-    let drawn = tile(&place, 0.04, 0.8);
+    let drawn = tile(&place, 0.04, 0.85);
     std::array::from_fn(|i| drawn[i] * mix(stone[i], 1.0, 0.4 + 0.6 * place.joint))
 }
 
 pub fn tiles(u: f32, v: f32, seed: u32) -> Texel {
     let mottled = 1.0 + 0.05 * (fractal(u, v, [8, 8], 3, seed) - 0.5);
-    let drawn = tile(&grid(u, v, [4, 4], 0.05, 0.0, seed), 0.05, 0.88);
+    let drawn = tile(&grid(u, v, [4, 4], 0.05, 0.0, seed), 0.05, 0.91);
     drawn.map(|channel| channel * mottled)
 }
 
 pub fn mosaic(u: f32, v: f32, seed: u32) -> Texel {
-    tile(&grid(u, v, [8, 8], 0.11, 0.0, seed), 0.13, 0.88)
+    tile(&grid(u, v, [8, 8], 0.11, 0.0, seed), 0.1, 0.9)
 }
 
 pub fn subway(u: f32, v: f32, seed: u32) -> Texel {
-    tile(&grid(u, v, [4, 8], 0.08, 0.5, seed), 0.03, 0.82)
+    tile(&grid(u, v, [4, 8], 0.08, 0.5, seed), 0.03, 0.87)
 }
 
 pub fn checkerboard(u: f32, v: f32, seed: u32) -> Texel {
@@ -125,7 +125,7 @@ pub fn hexagons(u: f32, v: f32, seed: u32) -> Texel {
     let reach = dx.abs().max(0.5 * dx.abs() + 0.866_025_4 * dy.abs());
     let cell = |c: f32, count: i32| ((2.0 * c + 0.5) as i32).rem_euclid(count) as u32;
     let tone = random(cell(cx, 12), cell(cy / 0.866_025_4, 12), seed) - 0.5;
-    grey(mix(1.0 + 0.07 * tone, 0.8, line(0.5 - reach, 0.05)))
+    grey(mix(1.0 + 0.07 * tone, 0.86, line(0.5 - reach, 0.05)))
 }
 
 /// Return the distances to the nearest and second nearest of random points, and the number of the

@@ -49,7 +49,7 @@ fn draw(kind: MaterialKind, variant: u32) -> Texture {
     use MaterialKind as Kind;
     let flat: Pattern = |_, _, _| [1.0; 4];
     let (log2_size, pattern): (u32, Pattern) = match kind {
-        Kind::Smooth | Kind::Ceramic | Kind::Glass => (0, flat),
+        Kind::Smooth | Kind::Ceramic | Kind::Glass | Kind::Pane => (0, flat),
         Kind::Plaster => (7, building::plaster),
         Kind::Planks => (8, building::planks),
         Kind::Parquet => (8, building::parquet),

@@ -3,7 +3,10 @@
 use std::ops::Range;
 
 use crate::{
-    assets::part::{Part, Primitive},
+    assets::{
+        material::MaterialKind,
+        part::{Part, Primitive},
+    },
     geometry::{Aabb, Vec3, add, rotate, sub},
     world::{
         scene::{BodyKind, Scene},
@@ -51,6 +54,8 @@ pub(crate) struct PartMesh {
     pub faces: Range<usize>,
     pub body: u32,
     pub aabb: Aabb,
+    /// Whether it is glass that is seen through.
+    pub is_pane: bool,
 }
 
 /// All surfaces of a scene, in the order of its bodies and their parts.
@@ -142,6 +147,11 @@ impl SceneMesh {
         })
     }
 
+    /// Return whether a face is glass that is seen through.
+    pub(crate) fn is_pane(&self, face: usize) -> bool {
+        self.skins[face].material.kind == MaterialKind::Pane
+    }
+
     /// Return a face's vertex indices, counted from its part's first vertex.
     pub(crate) fn corners_of(&self, face: &Face) -> &[u32] {
         let first = face.first_corner as usize;
@@ -177,6 +187,7 @@ impl SceneMesh {
             faces: first_face..self.faces.len(),
             body,
             aabb: Aabb::of_points(self.vertices_m[first_vertex..].iter().copied()),
+            is_pane: part.material.kind == MaterialKind::Pane,
         })
     }
 

@@ -79,7 +79,8 @@ fn sources(house: &House, scene: &Scene, rooms: &[usize], point_m: Vec3, normal:
         if is_here([x, z]) {
             let way_m = sub(lamp.position_m, point_m);
             let cosine = dot(way_m, normal) / dot(way_m, way_m).sqrt();
-            let share = (0.25 + 0.75 * cosine).max(0.0) / (1.0 + dot(way_m, way_m) / 9.0);
+            let facing = (0.25 + 0.75 * cosine).max(0.0);
+            let share = 1.06 * facing / (1.0 + dot(way_m, way_m) / 6.5);
             light = std::array::from_fn(|i| light[i] + share * f64::from(lamp.power[i]));
         }
     }

@@ -2,6 +2,11 @@
 //! light, dark corners and smooth edges.
 
 use evonav_core::{
+    assets::{
+        material::{Material, MaterialKind},
+        part::{Part, Primitive},
+    },
+    geometry::IDENTITY,
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Style, Want, render},
@@ -56,7 +61,7 @@ impl Picture<'_> {
         };
         let shade = |sum: f64| {
             let bend = 0.5 * (0.5 * sum - centre) / centre * self.focal_px / REACH as f64;
-            0.2 * (bend / 0.7).clamp(0.0, 1.0) * (1.8 - bend).clamp(0.0, 1.0)
+            0.08 * (bend / 0.7).clamp(0.0, 1.0) * (1.8 - bend).clamp(0.0, 1.0)
         };
         1.0 - shade(level).max(shade(upright))
     }
@@ -176,6 +181,54 @@ proptest! {
                     (f64::from(found[i]) - expected[i]).abs() < slack,
                     "{found:?} at {place:?}, not {expected:?}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn glass_shows_what_is_behind_it_in_colours_alone(
+        parts in vec(cuboid_ahead(), 1..6),
+        half_m in [0.1..3.0_f64, 0.1..3.0_f64],
+        centre_m in [-0.4..0.4_f64, -0.4..0.4_f64],
+    ) {
+        let pane = Part {
+            primitive: Primitive::Cuboid { half_m: [half_m[0], half_m[1], 0.01] },
+            centre_m: [centre_m[0], centre_m[1], 0.5],
+            rotation: IDENTITY,
+            colour: [90, 60, 30],
+            material: Material { kind: MaterialKind::Pane, variant: 0 },
+        };
+        let board = Part { material: Material::default(), ..pane };
+        let camera = Camera {
+            width_px: 53,
+            height_px: 40,
+            vertical_fov_rad: 1.2,
+            position_m: [0.0; 3],
+            yaw_rad: 0.0,
+            horizon_rad: 0.0,
+        };
+        // The same buffer for all: nothing is left of the picture before.
+        let mut buffer = FrameBuffer::default();
+        let mut picture = |front: Option<Part>| {
+            let all: Vec<Part> = parts.iter().copied().chain(front).collect();
+            let want = Want { rgb: Some(Style::Default), instances: true };
+            render(&SceneMesh::build(&scene_of(&all)), &camera, want, &mut buffer).unwrap();
+            buffer.take()
+        };
+        let (glazed, opaque, open) = (picture(Some(pane)), picture(Some(board)), picture(None));
+        prop_assert_eq!(&glazed.0, &opaque.0, "depth");
+        prop_assert_eq!(&glazed.2, &opaque.2, "instances");
+        // Where glass fills the picture, no line around it reaches into it.
+        if glazed.2.iter().any(|&body| body != parts.len() as i32 + 1) {
+            return Ok(());
+        }
+        let pixels = glazed.1.chunks_exact(3).zip(open.1.chunks_exact(3));
+        for (index, (seen, behind)) in pixels.enumerate() {
+            let is_ground = open.2[index] == 0 && index / camera.width_px >= 20;
+            let lawn = [116, 146, 86];
+            for i in 0..3 {
+                let behind = if is_ground { lawn[i] } else { u16::from(behind[i]) };
+                prop_assert_eq!(u16::from(seen[i]), (14 * behind + 2 * [206, 220, 224][i]) / 16);
             }
         }
     }

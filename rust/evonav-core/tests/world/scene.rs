@@ -3,11 +3,12 @@
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,
-        part::{Part, Primitive},
+        material::MaterialKind,
+        part::{Part, Primitive, aabb_of},
     },
     geometry::{Vec2, Vec3, add, polygon_contains, rotate, sub},
     house::{House, HouseDelta, ObjectMove},
-    world::scene::{BodyKind, Scene},
+    world::scene::{Body, BodyKind, Scene},
 };
 use proptest::{collection::vec, prelude::*};
 
@@ -107,6 +108,32 @@ fn the_leaf_stands_in_the_room_that_the_generator_keeps_free() {
     // wall0 runs towards -z; its left is +x.
     assert!(door.aabb.max_m[0] > 4.8 && door.aabb.min_m[0] > 3.8, "{:?}", door.aabb);
     assert_eq!(door.category, "Doorway");
+}
+
+#[test]
+fn glazed_doors_are_solid_as_wooden_ones_and_have_bars() {
+    for openness in ["0", "0.4"] {
+        let [glazed, wooden] = ["Doorway_3", "Doorway_1"].map(|door| {
+            let (_, scene) = two_rooms(door, openness, false);
+            scene.bodies.into_iter().find(|b| b.kind == BodyKind::Door).expect("a door")
+        });
+        let solids = |door: &Body| -> Vec<_> {
+            door.parts.iter().map(|part| (part.primitive, part.centre_m, part.rotation)).collect()
+        };
+        assert_eq!(solids(&glazed), solids(&wooden));
+        let num_panes = |door: &Body| {
+            door.parts.iter().filter(|part| part.material.kind == MaterialKind::Pane).count()
+        };
+        // The board and both panels, but not frame and handle.
+        assert_eq!([num_panes(&glazed), num_panes(&wooden)], [3, 0]);
+        // Two sides, foot and head, two bars upright and four across.
+        assert_eq!([glazed.trim.len(), wooden.trim.len()], [10, 0]);
+        let bounds = aabb_of(&glazed.trim);
+        for axis in 0..3 {
+            assert!(bounds.min_m[axis] >= glazed.aabb.min_m[axis] - 0.01, "{bounds:?}");
+            assert!(bounds.max_m[axis] <= glazed.aabb.max_m[axis] + 0.01, "{bounds:?}");
+        }
+    }
 }
 
 #[test]

@@ -44,7 +44,11 @@ pub fn toilet(s: &mut Sketch<'_>) {
         s.column(pool[0], [rim, rim + 0.008], pool[1], 1.0, 12, water);
         let bowl = [between(x, 0.12, 0.88), between(z, 0.2, 1.0)];
         let neck = [rim - 0.034, rim - 0.028];
-        s.column(bowl[0], neck, bowl[1], 1.0, 16, shade(white, 0.45));
+        s.column(bowl[0], neck, bowl[1], 1.0, 24, shade(white, 0.45));
+        // Rounder than the solid parts, which they enclose.
+        s.column(bowl[0], [0.5 * rim, rim - 0.034], bowl[1], 1.5, 24, white);
+        let seat = [between(x, 0.1, 0.9), between(z, 0.22, 1.0)];
+        s.column(seat[0], [rim - 0.028, rim + 0.002], seat[1], 1.0, 24, shade(white, 0.95));
         let lever = [between(x, 0.1, 0.26), [h - 0.1, h - 0.075], between(z, 0.26, 0.285)];
         s.cuboid(lever[0], lever[1], lever[2], STEEL);
     });
@@ -114,9 +118,20 @@ pub fn sink(s: &mut Sketch<'_>) {
     }
     let floor = bottom[1];
     s.trim(|s| {
-        let hole = (0.06 * w.min(d)).min(0.03);
-        s.pole([0.0, 0.0], hole, [floor, floor + 0.003], 12, STEEL);
-        s.pole([0.0, 0.0], 0.6 * hole, [floor, floor + 0.004], 12, DARK);
+        // The drain, and a soft lip around a basin that has room above it.
+        let hole = (0.07 * w.min(d)).min(0.04);
+        s.pole([0.0, 0.0], hole, [floor, floor + 0.004], 16, STEEL);
+        s.pole([0.0, 0.0], 0.7 * hole, [floor, floor + 0.006], 16, DARK);
+        if h <= 0.4 {
+            return;
+        }
+        let lip = [rim - 0.02, rim + 0.012];
+        for x in ends(x, side + 0.004, 0.0) {
+            s.pad(x, lip, z, 0.012, white);
+        }
+        for z in [[back[0], back[1] + 0.5 * side], front] {
+            s.pad(inside(x, side), lip, z, 0.012, white);
+        }
     });
 }
 

@@ -72,7 +72,7 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
         inside(x, 0.02),
         [top - 0.7 * depth, top - 0.012],
         length,
-        rgb(235, 232, 225).of(MaterialKind::Fabric),
+        rgb(235, 232, 225).of(MaterialKind::Pillow),
     );
     s.cuboid(inside(x, 0.008), [top - 0.6 * depth, top], blanket, linen.of(MaterialKind::Duvet));
     let width = x[1] - x[0];
@@ -83,17 +83,23 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [Paint; 2], top: f64, x: Span) {
         let along = between(length, 0.03, 0.2);
         s.cuboid(side, [top - 0.012, top + 0.07], along, linen_white);
         s.trim(|s| {
-            let plump = [inside(side, -0.015), [top - 0.01, top + 0.11], inside(along, -0.025)];
+            // A plump body with a round top.
+            let plump = [inside(side, -0.015), [top - 0.01, top + 0.095], inside(along, -0.025)];
             s.pad(plump[0], plump[1], plump[2], 0.045, linen_white);
+            let crown = [inside(side, 0.02), [top + 0.01, top + 0.14], inside(along, 0.01)];
+            s.ellipsoid(crown[0], crown[1], crown[2], linen_white);
         });
     }
     s.trim(|s| {
+        // The duvet, its turned edge and the shadow of that: each wider than the one below it, so
+        // that their sides do not lie in one plane.
         let duvet = linen.of(MaterialKind::Duvet);
-        let [over, fold] = [[top - 0.62 * depth, top + 0.035], [top - 0.5 * depth, top + 0.055]];
-        s.pad(x, over, blanket, 0.03, duvet);
-        let turned = rgb(240, 238, 232).of(MaterialKind::Fabric);
-        s.pad(x, fold, between(length, 0.27, 0.39), 0.025, turned);
-        s.pad(x, [over[0], top + 0.05], between(length, 0.39, 0.43), 0.02, shade(linen, 0.85));
+        let [over, fold] = [[top - 0.62 * depth, top + 0.035], [top - 0.52 * depth, top + 0.06]];
+        s.pad(inside(x, 0.005), over, blanket, 0.03, duvet);
+        let below = [over[0] + 0.01, top + 0.045];
+        s.pad(inside(x, 0.003), below, between(length, 0.385, 0.41), 0.02, shade(linen, 0.75));
+        let turned = rgb(240, 238, 232).of(MaterialKind::Pillow);
+        s.pad(x, fold, between(length, 0.265, 0.39), 0.028, turned);
         // The shadow under the mattress.
         let shadow = [top - 0.7 * depth, top - 0.7 * depth + 0.006];
         s.cuboid(x, shadow, length, shade(wood, 0.4));
@@ -134,8 +140,7 @@ pub fn pillow(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let [w, h, d] = s.size();
     s.trim(|s| {
-        // One soft body in place of a step.
-        let edge = 0.35 * h.min(w).min(d);
-        s.pad(x, between(y, 0.1, 0.85), z, edge, fabric);
+        // One soft body in place of steps: its cut edges touch the edges of the upper one.
+        s.pad(x, y, z, (0.05 * w.min(d)).min(0.25 * h), fabric);
     });
 }

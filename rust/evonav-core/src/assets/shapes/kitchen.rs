@@ -123,6 +123,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
         s.tint(0, s.choose(&[rgb(215, 217, 220), rgb(235, 235, 232), rgb(160, 163, 167)], STEEL));
     let door = shade(steel, 1.06).of(MaterialKind::Appliance);
     let grip = shade(steel, 0.55).of(MaterialKind::Metal);
+    let metal = s.tint(2, grip).of(MaterialKind::Metal);
     let (body, inner) = ([z[0], z[1] - 0.11], shade(steel, 0.9));
     let wall = 0.05;
     for side in ends(x, wall, 0.0) {
@@ -141,8 +142,22 @@ pub fn fridge(s: &mut Sketch<'_>) {
     s.detail("door", 2);
     s.trim(|s| {
         // The gap between the doors, and the grille under them.
-        s.cuboid(x, [split - 0.012, split + 0.012], [z[1] - 0.112, z[1] - 0.07], shade(steel, 0.2));
+        s.cuboid(
+            x,
+            [split - 0.014, split + 0.014],
+            [z[1] - 0.112, z[1] - 0.058],
+            shade(steel, 0.2),
+        );
         s.cuboid(inside(x, 0.02), [0.0, 0.05], [z[1] - 0.11, z[1] - 0.08], shade(steel, 0.25));
+        // The gasket around each door, and the covers of the hinges.
+        s.cuboid(
+            inside(x, 0.003),
+            [0.04, h - 0.012],
+            [z[1] - 0.111, z[1] - 0.098],
+            shade(steel, 0.2),
+        );
+        let hinge = [z[1] - 0.17, z[1] - 0.05];
+        s.pad(between(x, 0.88, 0.97), [h - 0.03, h], hinge, 0.008, shade(steel, 0.5));
     });
     for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
         let pivot_m = [x[1], 0.0, z[1] - 0.06];
@@ -153,12 +168,22 @@ pub fn fridge(s: &mut Sketch<'_>) {
             let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
             s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
             s.trim(|s| {
-                s.pad(x, y, [z[1] - 0.1, z[1] - 0.052], 0.008, door);
-                // Two brackets and a bar.
+                // A door with round edges, that stand back to its front at the gasket.
+                s.pad(x, inside(y, 0.006), [z[1] - 0.1, z[1] - 0.036], 0.024, door);
+                // A round bar on two brackets.
                 for end in ends([low, low + reach], 0.04, 0.0) {
-                    s.cuboid(handle, end, [z[1] - 0.055, z[1]], shade(grip, 0.7));
+                    let wide = inside(handle, -0.002);
+                    s.cuboid(wide, end, [z[1] - 0.058, z[1]], shade(metal, 0.7));
                 }
-                s.pad(handle, [low, low + reach], [z[1] - 0.02, z[1]], 0.008, shade(steel, 0.8));
+                let bar = [inside(handle, -0.004), [low, low + reach], [z[1] - 0.03, z[1]]];
+                s.column(bar[0], bar[1], bar[2], 1.0, 12, shade(metal, 1.15));
+                let core = [z[1] - 0.058, z[1] - 0.015];
+                s.cuboid(inside(handle, -0.001), bar[1], core, metal);
+                if is_upper {
+                    // The maker's badge.
+                    let badge = [between(x, 0.42, 0.58), between(y, 0.82, 0.87)];
+                    s.cuboid(badge[0], badge[1], [z[1] - 0.037, z[1] - 0.033], STEEL);
+                }
             });
         });
     }

@@ -4,7 +4,7 @@ use crate::assets::{
     material::MaterialKind,
     shapes::{
         colour::{DARK, FABRICS, STEEL, WOODS, shade},
-        sketch::{Sketch, between, ends, inside, piece},
+        sketch::{Along, Sketch, between, ends, inside, piece},
     },
 };
 
@@ -130,6 +130,7 @@ pub fn sofa(s: &mut Sketch<'_>) {
     let feet = s.tint(1, WOODS[4]);
     s.legs([0.0, foot], 0.05, 0.03, feet);
     let pad = (0.3 * seat).min(0.14);
+    let is_rolled = s.choose(&[true, false, true], true);
     // Only the arms fill the box: a recorded robot stood in the box, close to the cushions.
     let front = z[1] - 0.03;
     s.cuboid(inner, [foot, seat - pad], [back[1], front - 0.02], fabric);
@@ -140,11 +141,21 @@ pub fn sofa(s: &mut Sketch<'_>) {
     s.detail("seat cushion", count);
     s.detail("armrest", 2);
     s.trim(|s| {
-        // Rolled arms, a roll along the back, and shadows under and between the cushions.
-        let [cap, roll] = [[arm_top - 0.07, arm_top + 0.03], [h - 0.09, h]];
-        s.pad([left[0], left[1] + 0.015], cap, z, 0.03, shade(fabric, 1.05));
-        s.pad([right[0] - 0.015, right[1]], cap, z, 0.03, shade(fabric, 1.05));
-        s.pad(inner, roll, [back[0], back[1] + 0.015], 0.03, shade(fabric, 1.05));
+        // Padded arms, a roll along the back, and shadows under and between the cushions.
+        let padding = shade(fabric, 1.05);
+        for arm_x in [[left[0], left[1] + 0.02], [right[0] - 0.02, right[1]]] {
+            if is_rolled {
+                // The roll is widest at the height of the arm, whose edges it covers.
+                let rise = (0.4 * arm).min(0.06).min(h - arm_top);
+                let roll = [arm_x, [arm_top - rise, arm_top + rise], z];
+                s.round(Along::Z, 1.0, 16, roll, padding);
+                let face = roll.map(|span| inside(span, 0.012));
+                s.round(Along::Z, 1.0, 16, [face[0], face[1], z], shade(fabric, 0.85));
+            } else {
+                s.pad(arm_x, [arm_top - 0.07, arm_top + 0.035], z, 0.035, padding);
+            }
+        }
+        s.pad(inner, [h - 0.09, h], [back[0], back[1] + 0.015], 0.03, padding);
         let dark = shade(fabric, 0.4);
         s.cuboid(inner, [seat - pad - 0.014, seat - pad], [back[1], front - 0.01], dark);
         s.cuboid(inner, [foot, foot + 0.012], [back[1], front - 0.015], dark);
@@ -154,8 +165,8 @@ pub fn sofa(s: &mut Sketch<'_>) {
             s.cuboid([seam - 0.007, seam + 0.007], tall, [back[1], front + 0.015], dark);
         }
         if !is_sofa {
-            let lean = [seat, seat + 0.88 * (h - seat)];
-            s.pad(inside(inner, 0.01), lean, [back[1], back[1] + 0.04], 0.03, soft);
+            let lean = [seat, seat + 0.94 * (h - seat)];
+            s.pad(inside(inner, 0.01), lean, [back[1], back[1] + 0.06], 0.04, soft);
         }
     });
     for i in 0..count {
@@ -167,8 +178,9 @@ pub fn sofa(s: &mut Sketch<'_>) {
             let tall = [seat, seat + 0.75 * (h - seat)];
             s.cuboid(inside(cushion, 0.01), tall, lean, soft);
             s.trim(|s| {
-                let plump = [lean[0], lean[1] + 0.03];
-                s.pad(cushion, [seat, tall[1] + 0.02], plump, 0.04, soft);
+                // They hide most of the back, which is a beam.
+                let high = [seat, (seat + 0.93 * (h - seat)).max(tall[1])];
+                s.pad(cushion, high, [lean[0], lean[1] + 0.035], 0.05, soft);
             });
         }
     }

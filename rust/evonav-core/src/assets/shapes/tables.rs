@@ -1,10 +1,14 @@
 //! Shapes of tables and desks: a top, legs or a pedestal, and lower boards where objects were
 //! recorded on them.
 
-use crate::assets::shapes::{
-    colour::{Paint, WOODS, shade},
-    sketch::{Motion, Sketch, Span, between, ends, inside},
-    storage,
+use crate::assets::{
+    Asset,
+    material::MaterialKind,
+    shapes::{
+        colour::{Paint, WOODS, shade},
+        sketch::{Motion, Sketch, Span, between, ends, inside},
+        storage,
+    },
 };
 
 /// Round tables, identified by their names and by recorded children that leave the corners free.
@@ -50,7 +54,13 @@ pub fn table(s: &mut Sketch<'_>) {
         return;
     }
     let thick = (0.05 * w.min(d)).clamp(0.02, 0.08);
-    s.cuboid(x, [h - top, h], z, wood);
+    let is_glass = has_glass_top(s);
+    s.cuboid(x, [h - top, h], z, if is_glass { wood.of(MaterialKind::Pane) } else { wood });
+    if is_glass {
+        // The frame around the pane, a little under its surface.
+        let frame = [x, [h - top, h], z];
+        s.trim(|s| s.rim(frame, [0, 2], 1.4 * thick, wood));
+    }
     s.legs([0.0, h - top], thick, 0.02 * w.min(d), support);
     let num_lower = s.levels().iter().filter(|&&y| y > 0.04 && y < h - 0.06).count();
     s.detail("lower shelf", num_lower);
@@ -75,6 +85,17 @@ pub fn table(s: &mut Sketch<'_>) {
             s.cuboid(inside(x, thick), [level - 0.02, level], inside(z, thick), wood);
         }
     }
+}
+
+/// Return whether a table's top is clear glass.
+fn has_glass_top(s: &Sketch<'_>) -> bool {
+    let Asset { materials, made_of, .. } = s.asset();
+    made_of.iter().any(|substance| substance == "glass")
+        && materials.iter().any(|name| {
+            ["Glass_Detailed_Tinted", "Glass_Detailed_White"]
+                .iter()
+                .any(|clear| name.starts_with(clear))
+        })
 }
 
 /// Desks whose drawers and boards are on the right (+x); on all others they are on the left.

@@ -61,6 +61,11 @@ impl Canvas {
         self.drawn = [rows, blocks];
     }
 
+    /// Draw only on some rows and blocks until the canvas is cleared.
+    pub fn draw_within(&mut self, rows: Range<usize>, blocks: Range<usize>) {
+        self.drawn = [rows, blocks];
+    }
+
     pub fn blocks_per_row(&self) -> usize {
         self.width_px.div_ceil(LANES)
     }

@@ -3,6 +3,7 @@
 mod canvas;
 mod lens;
 mod light;
+mod panes;
 mod render;
 mod shader;
 mod style;

@@ -13,6 +13,7 @@ use crate::{
             canvas::{Canvas, LANES},
             lens::{Lens, Optics, Scratch},
             light::Light,
+            panes::{self, Panes},
             shader::Shader,
             style::Style,
         },
@@ -40,6 +41,7 @@ pub struct FrameBuffer {
     pub rgb: Vec<u8>,
     pub(super) canvas: Canvas,
     shader: Shader,
+    pub(super) panes: Panes,
     pub(super) scratch: Scratch,
 }
 
@@ -102,29 +104,51 @@ pub fn render_lit(
     if let Some(style) = want.rgb {
         out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
-    draw_parts(mesh, &mesh.parts, &lens, want, out);
+    draw_parts(mesh, &mesh.parts, &lens, want, out, |_| true);
     resolve(mesh, &lens, want, out);
     if let Some(style) = want.rgb {
         if style == Style::Default {
-            draw_parts(mesh, &mesh.trim, &lens, want, out);
+            draw_parts(mesh, &mesh.trim, &lens, want, out, |_| true);
+            see_through(mesh, view, &lens, want, out);
         }
         out.shader.shade(style, mesh, light, &lens, &out.canvas, &mut out.rgb);
+        out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
     }
     Ok(())
 }
 
-/// Draw the parts in view, nearest first.
+/// Draw what is behind glass in its place.
+fn see_through(mesh: &SceneMesh, view: &View, lens: &Lens, want: Want, out: &mut FrameBuffer) {
+    panes::forget(out);
+    let mut all = mesh.parts.iter().chain(&mesh.trim);
+    if !all.any(|part| part.is_pane && lens.may_see(&part.aabb)) {
+        return;
+    }
+    let Some((rows, blocks)) = panes::clear(mesh, lens.far_nearness(), out) else { return };
+    let mut narrow = Lens::new(view);
+    let columns = blocks.start * LANES..(blocks.end * LANES).min(out.canvas.width_px);
+    narrow.narrow(&columns, &rows, view.clip_m[1]);
+    out.canvas.draw_within(rows, blocks);
+    for parts in [&mesh.parts, &mesh.trim] {
+        draw_parts(mesh, parts, &narrow, want, out, |part| !part.is_pane);
+    }
+}
+
+/// Draw some of the parts in view, nearest first.
 fn draw_parts(
     mesh: &SceneMesh,
     parts: &[PartMesh],
     lens: &Lens,
     want: Want,
     out: &mut FrameBuffer,
+    is_drawn: impl Fn(&PartMesh) -> bool,
 ) {
     lens.collect_visible(parts, &mut out.scratch.visible);
     for index in 0..out.scratch.visible.len() {
         let part = &parts[out.scratch.visible[index].1 as usize];
-        draw_part(mesh, part, lens, want, out);
+        if is_drawn(part) {
+            draw_part(mesh, part, lens, want, out);
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::{
             change::Surfaces,
             subject::{PartOfHouse, Subject},
         },
-        scene::{Body, door_parts},
+        scene::{Body, door_shape},
     },
 };
 
@@ -65,8 +65,9 @@ impl<'a> Painter<'a> {
                 Some(Shape { parts, trim: body.trim.iter().map(finish_part).collect() })
             }
             PartOfHouse::Door(index) => self.donor(change, &body.category, draws).map(|donor| {
-                let parts = door_parts(self.house, &self.house.doors[index], Some(donor));
-                Shape { parts, trim: Vec::new() }
+                // A leaf of glass stays one, with its bars.
+                let is_glazed = !body.trim.is_empty();
+                door_shape(self.house, &self.house.doors[index], Some(donor), is_glazed)
             }),
             PartOfHouse::Object(index) => self
                 .donor(change, &body.category, draws)

@@ -13,7 +13,7 @@ use crate::{
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
     house::{House, Object, Opening, Room, Wall},
     world::scene::{
-        openings::{door_parts, window_parts},
+        openings::{door_shape, is_glazed, window_parts},
         resting::fall_m,
         structure::{Openings, SLAB_M, room_height_m, slab_parts, wall_parts},
     },
@@ -268,8 +268,10 @@ fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
     let door = |door: &Opening| {
         let has_leaf = !door.asset_id.starts_with("Doorframe");
         let category = if has_leaf { "Doorway" } else { "Doorframe" };
-        let parts = door_parts(house, door, catalogue.get(&door.asset_id));
-        Body::fixed(&door.id, category, BodyKind::Door, parts)
+        let asset = catalogue.get(&door.asset_id);
+        let is_glazed = asset.is_some_and(is_glazed);
+        let Shape { parts, trim } = door_shape(house, door, asset, is_glazed);
+        Body { trim, ..Body::fixed(&door.id, category, BodyKind::Door, parts) }
     };
     let window = |window: &Opening| {
         let parts = window_parts(house, window, catalogue.get(&window.asset_id));

@@ -6,4 +6,4 @@ mod resting;
 mod structure;
 
 pub use bodies::{Body, BodyKind, OrientedBox, Scene};
-pub(crate) use openings::door_parts;
+pub(crate) use openings::door_shape;

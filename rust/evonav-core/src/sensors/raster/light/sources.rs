@@ -11,6 +11,10 @@ const SKY: [f32; 3] = [0.95, 1.0, 1.08];
 /// Share of lamplight and skylight in a room without either.
 const AMBIENT: [f32; 3] = [0.50, 0.49, 0.48];
 
+/// Factor of the light of lamps, and squared distance at which half of it is left.
+const LAMP: f64 = 1.06;
+const HALVED_M2: f64 = 6.5;
+
 /// A window as a small bright surface.
 struct Pane {
     centre_m: Vec3,
@@ -90,7 +94,7 @@ impl Sources {
         for lamp in &space.lamps {
             let (cosine, squared_m2) = towards(point_m, normal, lamp.position_m);
             let facing = (0.25 + 0.75 * cosine).max(0.0);
-            let share = (facing / (1.0 + squared_m2 / 9.0)) as f32;
+            let share = (LAMP * facing / (1.0 + squared_m2 / HALVED_M2)) as f32;
             light = std::array::from_fn(|i| light[i] + share * lamp.power[i]);
         }
         for pane in &space.panes {

@@ -46,7 +46,7 @@ impl Sun {
         for part in &mesh.parts {
             lens.transform(&mesh.vertices_m[part.vertices.clone()], &mut scratch);
             let first = part.faces.start;
-            if mesh.skins[first].material.kind == MaterialKind::Outdoors {
+            if part.is_pane || mesh.skins[first].material.kind == MaterialKind::Outdoors {
                 continue;
             }
             for face in &mesh.faces[part.faces.clone()] {

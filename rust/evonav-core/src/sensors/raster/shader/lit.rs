@@ -28,7 +28,7 @@ const SKY: [u8; 3] = [204, 222, 236];
 const GROUND: [u8; 3] = [46, 44, 42];
 
 /// Darkness of corners, most of which is in the light.
-const CORNER_SHADE: f32 = 0.20;
+const CORNER_SHADE: f32 = 0.08;
 /// The root of the light in views without a house around them.
 const EVEN: f32 = 0.85;
 
