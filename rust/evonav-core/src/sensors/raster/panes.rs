@@ -55,7 +55,7 @@ pub(super) fn clear(
 ) -> Option<(Range<usize>, Range<usize>)> {
     let FrameBuffer { canvas, panes, .. } = frame;
     panes.pixels.clear();
-    let (mut rows, mut blocks) = (usize::MAX..0, usize::MAX..0);
+    let (mut rows, mut blocks) = (canvas.height_px..0, canvas.blocks_per_row()..0);
     for row in 0..canvas.height_px {
         for (block, index) in canvas.row_blocks(row).enumerate() {
             let (tags, nearness) = (&mut canvas.tags[index], &mut canvas.nearness[index]);
