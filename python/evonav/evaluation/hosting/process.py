@@ -132,6 +132,7 @@ class AgentProcess:
         self.name = name
         self._own_cpu_s = 0.0
         self._hosting = hosting
+        self._closing = threading.RLock()
         self._ends = ExitStack()
         self._block = SharedBlock()
         self._ends.callback(self._block.close)
@@ -327,14 +328,15 @@ class AgentProcess:
         Args:
             is_at_once: Do not wait for the process to end by itself.
         """
-        self._connection.close()
-        try:
-            if not is_at_once and not self._is_waiting:
-                with suppress(subprocess.TimeoutExpired):
-                    self._process.wait(timeout=2.0)
-        finally:  # also in a worker that is asked to end meanwhile
-            self._end_group()
-            self._ends.close()
+        with self._closing:  # a worker that ends closes what an episode on a thread may be closing
+            self._connection.close()
+            try:
+                if not is_at_once and not self._is_waiting:
+                    with suppress(subprocess.TimeoutExpired):
+                        self._process.wait(timeout=2.0)
+            finally:  # also in a worker that is asked to end meanwhile
+                self._end_group()
+                self._ends.close()
 
     def _end_group(self) -> None:
         """End the processes that it started, too; a signal may cut this short, and then it is called again."""
