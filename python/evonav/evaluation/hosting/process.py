@@ -403,6 +403,8 @@ class AgentProcesses:
 
     def close(self) -> None:
         """End all processes; safe to call twice."""
+        if self._fork_server is not None and self._lent:  # at once, also those that answer
+            self._fork_server.close()
         for process in (*self._idle, *self._lent):
             process.close()
         self._idle.clear()
