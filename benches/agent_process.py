@@ -17,7 +17,8 @@ from evonav.agents.agent import AgentAction, SensorConfig, Stop
 from evonav.agents.hosting.sandbox import why_not
 from evonav.component import Component
 from evonav.evaluation.hosting.agent import RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
+from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel.local import one_thread_each

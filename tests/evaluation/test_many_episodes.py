@@ -25,7 +25,8 @@ from evonav.decision.vlm.mock_server import FAULTS
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.fork_server import IS_SUPPORTED
 from evonav.evaluation.hosting.isolation import usual_isolation
-from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting, AgentProcesses
+from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore

@@ -23,7 +23,8 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
+from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks

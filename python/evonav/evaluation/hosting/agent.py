@@ -10,7 +10,8 @@ from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.model_relay import is_relayed
-from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, AgentProcesses, failure_of
+from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, failure_of
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo

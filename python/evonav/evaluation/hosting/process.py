@@ -21,8 +21,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -33,7 +33,6 @@ from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
-from evonav.evaluation.hosting import fork_server
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
@@ -47,8 +46,6 @@ LOAD_TIMEOUT_S = 300.0
 """Shortest limit for importing an agent's module."""
 IS_SUPPORTED = os.name == "posix"
 """True where agents can have processes of their own; elsewhere they run in the evaluator's."""
-MAX_PROCESSES = 8
-"""Largest number of processes that a worker keeps; the one that was idle for longest is ended."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
 _STDERR = 2
 _PART_BYTES = 1 << 18
@@ -346,80 +343,6 @@ class AgentProcess:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         self._is_group_ended = True
-
-
-class AgentProcesses:
-    """The agents' processes of a worker, each lent to one episode at a time. Any number of threads may use it."""
-
-    def __init__(
-        self, hosting: AgentHosting, waiting: Callable[[], AbstractContextManager[None]] = nullcontext
-    ) -> None:
-        """Remember the settings; processes start when they are needed.
-
-        Args:
-            hosting: The settings.
-            waiting: Lets other episodes compute while the block waits for a process.
-        """
-        self.hosting = hosting
-        self.waiting = waiting
-        self._fork_server = _new_fork_server(hosting)
-        self._lock = threading.Lock()
-        self._idle: list[AgentProcess] = []
-        """Those that were used last come last."""
-        self._lent: list[AgentProcess] = []
-
-    def lend(self, name: str) -> AgentProcess:
-        """Return a process that waits for requests, until `take_back`; start one if none is idle.
-
-        Raises:
-            AgentFailedError: The process does not start.
-        """
-        with self._lock:
-            found = next((process for process in reversed(self._idle) if process.name == name), None)
-            if found is not None and found.is_usable:
-                self._idle.remove(found)
-                self._lent.append(found)
-                return found
-            ended = [process for process in self._idle if not process.is_usable]
-            num_over = len(self._idle) + len(self._lent) - len(ended) - MAX_PROCESSES + 1
-            usable = [process for process in self._idle if process not in ended]
-            ended += usable[: max(0, num_over)]
-            self._idle = [process for process in self._idle if process not in ended]
-        for process in ended:
-            process.close()
-        process = AgentProcess(name, self.hosting, self._fork_server)
-        with self._lock:
-            self._lent.append(process)
-        return process
-
-    def take_back(self, process: AgentProcess) -> None:
-        """Keep a process for another episode, or end it if it cannot be used any more."""
-        with self._lock:
-            self._lent.remove(process)
-            if is_usable := process.is_usable:
-                self._idle.append(process)
-        if not is_usable:
-            process.close(is_at_once=True)
-
-    def close(self) -> None:
-        """End all processes; safe to call twice."""
-        if self._fork_server is not None and self._lent:  # at once, also those that answer
-            self._fork_server.close()
-        for process in (*self._idle, *self._lent):
-            process.close()
-        self._idle.clear()
-        if self._fork_server is not None:
-            self._fork_server.close()
-
-
-def _new_fork_server(hosting: AgentHosting) -> ForkServer | None:
-    """Return what forks processes; what they inherit of it holds nothing that an agent in a sandbox must not have."""
-    if not fork_server.IS_SUPPORTED:
-        return None
-    if not hosting.is_sandboxed:
-        return ForkServer(None, sys.path)
-    with one_thread_each():
-        return ForkServer(environment(Path(hosting.scratch or tempfile.gettempdir())), search_path())
 
 
 def check_importable(name: str, hosting: AgentHosting) -> None:

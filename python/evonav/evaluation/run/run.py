@@ -23,7 +23,8 @@ from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
-from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
+from evonav.evaluation.run.scheduler import Progress as Progress  # also for those who import it from here
+from evonav.evaluation.run.scheduler import RunJobs, Schedule
 from evonav.evaluation.run.settings_model import NUM_RETRIES
 from evonav.evaluation.run.summary import MODELS_KEY
 from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
@@ -39,21 +40,6 @@ NAMES_KEY = "key_of_names"
 """Place in a run's header of the secret key of agents' names of tasks and of shifts; nothing shows it."""
 SHIFT_KEY = "shift_coordinates"
 """Place in a run's configuration of whether agents are told shifted places; it is there only if they are."""
-
-__all__ = [
-    "NAMES_KEY",
-    "NUM_RETRIES",
-    "SHIFT_KEY",
-    "Progress",
-    "RunConfig",
-    "RunRequest",
-    "agent_seed",
-    "evaluate",
-    "evaluate_all",
-    "perception_seed",
-    "recorded_backend",
-    "run_identity",
-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,8 +238,7 @@ def _hosting(request: RunRequest, workforce: Workforce) -> AgentHosting:
         hosting,
         is_in_process=hosting.is_in_process or workforce.num_workers == 0 or not IS_SUPPORTED,
         hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
-        # Many processes would each need the memory of what asks the model.
-        relays_model=(hosting.is_sandboxed or workforce.jobs_at_once > 1)
+        relays_model=(hosting.is_sandboxed or workforce.jobs_at_once > 1)  # else each process has the client's memory
         and is_relayed(request.config.backend.decision),
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )

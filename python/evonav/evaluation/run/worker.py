@@ -33,7 +33,8 @@ from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
+from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure

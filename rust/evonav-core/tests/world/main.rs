@@ -18,3 +18,4 @@ mod navigation_reference;
 mod outlines;
 mod random_spawn;
 mod scene;
+mod scene_recorded;

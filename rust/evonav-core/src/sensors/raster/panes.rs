@@ -7,7 +7,6 @@ use crate::{
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::Rays,
-        render::FrameBuffer,
     },
     world::mesh::SceneMesh,
 };
@@ -42,42 +41,42 @@ impl Panes {
             }
         }
     }
-}
 
-/// Note the pixels that show glass and clear them.
-///
-/// # Returns
-/// The rows and the blocks of a row that contain them; `None` if there are none.
-pub(super) fn clear(
-    mesh: &SceneMesh,
-    empty: f32,
-    frame: &mut FrameBuffer,
-) -> Option<(Range<usize>, Range<usize>)> {
-    let FrameBuffer { canvas, panes, .. } = frame;
-    panes.pixels.clear();
-    let (mut rows, mut blocks) = (canvas.height_px..0, canvas.blocks_per_row()..0);
-    for row in 0..canvas.height_px {
-        for (block, index) in canvas.row_blocks(row).enumerate() {
-            let (tags, nearness) = (&mut canvas.tags[index], &mut canvas.nearness[index]);
-            let mut last = (0, false);
-            for lane in 0..LANES.min(canvas.width_px - block * LANES) {
-                if tags[lane] != last.0 {
-                    let face = (tags[lane] as usize).checked_sub(1);
-                    last = (tags[lane], face.is_some_and(|face| mesh.is_pane(face)));
-                }
-                if last.1 {
-                    (tags[lane], nearness[lane], last) = (0, empty, (0, false));
-                    panes.pixels.push((row * canvas.width_px + block * LANES + lane) as u32);
-                    rows = rows.start.min(row)..row + 1;
-                    blocks = blocks.start.min(block)..blocks.end.max(block + 1);
+    /// Note the pixels that show glass and clear them.
+    ///
+    /// # Returns
+    /// The rows and the blocks of a row that contain them; `None` if there are none.
+    pub fn clear(
+        &mut self,
+        mesh: &SceneMesh,
+        empty: f32,
+        canvas: &mut Canvas,
+    ) -> Option<(Range<usize>, Range<usize>)> {
+        self.forget();
+        let (mut rows, mut blocks) = (canvas.height_px..0, canvas.blocks_per_row()..0);
+        for row in 0..canvas.height_px {
+            for (block, index) in canvas.row_blocks(row).enumerate() {
+                let (tags, nearness) = (&mut canvas.tags[index], &mut canvas.nearness[index]);
+                let mut last = (0, false);
+                for lane in 0..LANES.min(canvas.width_px - block * LANES) {
+                    if tags[lane] != last.0 {
+                        let face = (tags[lane] as usize).checked_sub(1);
+                        last = (tags[lane], face.is_some_and(|face| mesh.is_pane(face)));
+                    }
+                    if last.1 {
+                        (tags[lane], nearness[lane], last) = (0, empty, (0, false));
+                        self.pixels.push((row * canvas.width_px + block * LANES + lane) as u32);
+                        rows = rows.start.min(row)..row + 1;
+                        blocks = blocks.start.min(block)..blocks.end.max(block + 1);
+                    }
                 }
             }
         }
+        (!self.pixels.is_empty()).then_some((rows, blocks))
     }
-    (!panes.pixels.is_empty()).then_some((rows, blocks))
-}
 
-/// Forget the pixels of the picture before.
-pub(super) fn forget(frame: &mut FrameBuffer) {
-    frame.panes.pixels.clear();
+    /// Forget the pixels of the picture before.
+    pub fn forget(&mut self) {
+        self.pixels.clear();
+    }
 }

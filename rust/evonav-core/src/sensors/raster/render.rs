@@ -13,7 +13,7 @@ use crate::{
             canvas::{Canvas, LANES},
             lens::{Lens, Optics, Scratch},
             light::Light,
-            panes::{self, Panes},
+            panes::Panes,
             shader::Shader,
             style::Style,
         },
@@ -41,7 +41,7 @@ pub struct FrameBuffer {
     pub rgb: Vec<u8>,
     pub(super) canvas: Canvas,
     shader: Shader,
-    pub(super) panes: Panes,
+    panes: Panes,
     pub(super) scratch: Scratch,
 }
 
@@ -119,12 +119,13 @@ pub fn render_lit(
 
 /// Draw what is behind glass in its place.
 fn see_through(mesh: &SceneMesh, view: &View, lens: &Lens, want: Want, out: &mut FrameBuffer) {
-    panes::forget(out);
+    out.panes.forget();
     let mut all = mesh.parts.iter().chain(&mesh.trim);
     if !all.any(|part| part.is_pane && lens.may_see(&part.aabb)) {
         return;
     }
-    let Some((rows, blocks)) = panes::clear(mesh, lens.far_nearness(), out) else { return };
+    let FrameBuffer { canvas, panes, .. } = out;
+    let Some((rows, blocks)) = panes.clear(mesh, lens.far_nearness(), canvas) else { return };
     let mut narrow = Lens::new(view);
     let columns = blocks.start * LANES..(blocks.end * LANES).min(out.canvas.width_px);
     narrow.narrow(&columns, &rows, view.clip_m[1]);
