@@ -21,9 +21,9 @@ from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentFailedError,
     AgentHosting,
-    AgentProcesses,
     check_importable,
 )
+from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore

@@ -58,7 +58,7 @@ def faulty_reply(request):
 def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monkeypatch, backend):
     """Bundled tasks ask much and with images; toy ones are many, and all ask the same at once."""
     monkeypatch.setenv("OPENAI_API_KEY", "none")
-    found, most = {}, {}
+    found, most, cpu_s = {}, {}, {}
     toy_tasks = many_tasks(tmp_path / "tasks", 16)
     for num_workers, at_once in ((1, 1), (1, 4), (2, 2)) if backend == "bundled" else ((1, 1), (1, 16), (2, 4)):
         name = f"{num_workers}-{at_once}"
@@ -84,8 +84,8 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
             most[name] = stub.most_at_once
         found[name] = (texts(tmp_path / name), (tmp_path / name / "summary.json").read_bytes())
         with RunStore(tmp_path / name) as store:
-            costs = store.costs().values()
-        assert all(0.0 < one["cpu_s"] < 0.9 * one["wall_s"] for one in costs)  # its own, not that of all on the worker
+            cpu_s[name] = sum(one["cpu_s"] for one in store.costs().values())
+        assert 0.0 < cpu_s[name] < 2.0 * cpu_s["1-1"]  # of each episode its own, not that of all on the worker
     assert most.pop("1-1") == 1
     assert all(number > 1 for number in most.values())
     assert all(one == found["1-1"] for one in found.values())
