@@ -10,7 +10,7 @@ import evonav
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.cli import main
 
-MAX_FRAMES = 14
+MAX_FRAMES = 12
 PACKAGE = str(Path(evonav.__file__).parent)
 
 

@@ -197,32 +197,31 @@ def progress() -> "Iterator[Callable[[Progress], None]]":
 @contextmanager
 def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
     """Show a progress bar over houses on a terminal, else print a line each minute."""
-    from rich import progress as bars
-    from rich.console import Console
 
-    from evonav.api.progress import bar_columns
+    def line(state: "GenerationProgress") -> str:
+        left_s = state.seconds * (1.0 - state.share) / state.share if state.share else float("inf")
+        return f"{100 * state.share:.0f}%: {_counts(state)}, about {left_s / 60:.0f} min left"
 
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        printed_s = time.monotonic()
-
-        def tell(state: "GenerationProgress") -> None:
-            nonlocal printed_s
-            if time.monotonic() - printed_s >= LINE_EVERY_S:
-                printed_s = time.monotonic()
-                left_s = state.seconds * (1.0 - state.share) / state.share if state.share else float("inf")
-                typer.echo(f"{100 * state.share:.0f}%: {_counts(state)}, about {left_s / 60:.0f} min left", err=True)
-
-        yield tell
-        return
-    with bars.Progress(*bar_columns(), console=console) as bar:
-        houses = bar.add_task("starting", total=1.0)
-        yield lambda state: bar.update(houses, completed=state.share, description=_counts(state))
+    with _bar_or_lines("starting", 1.0) as show:
+        yield lambda state: show(state.share, _counts(state), lambda: line(state))
 
 
 @contextmanager
 def house_progress(count: int) -> "Iterator[Callable[[MakingProgress], None]]":
     """Show a progress bar over houses that are made on a terminal, else print a line each minute."""
+    with _bar_or_lines("houses", float(count)) as show:
+        yield lambda state: show(
+            float(state.num_houses), "houses", lambda: f"{state.num_houses} of {counted(count, 'house')}"
+        )
+
+
+@contextmanager
+def _bar_or_lines(description: str, total: float) -> "Iterator[Callable[[float, str, Callable[[], str]], None]]":
+    """Show a progress bar on a terminal, else print a line each minute.
+
+    Yields:
+        A function of what is done, the bar's description, and a function that writes the line.
+    """
     from rich import progress as bars
     from rich.console import Console
 
@@ -232,17 +231,17 @@ def house_progress(count: int) -> "Iterator[Callable[[MakingProgress], None]]":
     if not console.is_terminal:
         printed_s = time.monotonic()
 
-        def tell(state: "MakingProgress") -> None:
+        def tell(_done: float, _description: str, line: "Callable[[], str]") -> None:
             nonlocal printed_s
             if time.monotonic() - printed_s >= LINE_EVERY_S:
                 printed_s = time.monotonic()
-                typer.echo(f"{state.num_houses} of {counted(count, 'house')}", err=True)
+                typer.echo(line(), err=True)
 
         yield tell
         return
     with bars.Progress(*bar_columns(), console=console) as bar:
-        houses = bar.add_task("houses", total=float(count))
-        yield lambda state: bar.update(houses, completed=float(state.num_houses))
+        task = bar.add_task(description, total=total)
+        yield lambda done, description, _: bar.update(task, completed=done, description=description)
 
 
 def _counts(state: "GenerationProgress") -> str:

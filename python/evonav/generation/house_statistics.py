@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
+from evonav.generation.house_view import area_of_m2
 from evonav.house import House, HouseObject, Room
 from evonav.house.files import HouseText
 from evonav.statistics import holm
@@ -84,7 +85,7 @@ def features_of(house: House) -> Features:
             continue
         roots = [sum(item.parent_id is None for item in by_room[room.id]) for room in rooms]
         on_them = [sum(item.parent_id is not None for item in by_room[room.id]) for room in rooms]
-        found[f"{room_type}: area m2"] = _mean(_area_m2(room.polygon_m) for room in rooms)
+        found[f"{room_type}: area m2"] = _mean(area_of_m2(room.polygon_m) for room in rooms)
         found[f"{room_type}: on floor and walls"] = _mean(roots)
         found[f"{room_type}: on furniture"] = _mean(on_them)
     categories = Counter(item.category or "unknown" for item in house.objects)
@@ -96,7 +97,7 @@ def features_of(house: House) -> Features:
 
 
 def _structure(house: House) -> Iterable[tuple[str, float]]:
-    areas_m2 = [_area_m2(room.polygon_m) for room in house.rooms]
+    areas_m2 = [area_of_m2(room.polygon_m) for room in house.rooms]
     yield "rooms", float(len(house.rooms))
     yield "area m2", sum(areas_m2)
     yield "aspect ratio of rooms", _mean(_aspect(room) for room in house.rooms)
@@ -119,11 +120,6 @@ def _is_member(item: HouseObject) -> bool:
 def _aspect(room: Room) -> float:
     edges = np.ptp(np.array(room.polygon_m), axis=0)
     return float(edges.max() / edges.min())
-
-
-def _area_m2(polygon_m: Sequence[tuple[float, float]]) -> float:
-    x, z = np.array(polygon_m).T
-    return float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2.0)
 
 
 def _mean(values: Iterable[float]) -> float:

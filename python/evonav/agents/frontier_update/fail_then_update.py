@@ -7,7 +7,7 @@ from typing import Literal
 
 from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.frontier_update.questions import IdentityQuestion, Sighting, VerifyQuestion
+from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion, identity_question
 from evonav.agents.frontier_update.relook import FirstLook, RelookConfig, place_from_another_side
 from evonav.agents.navigator import Target
 from evonav.decision.candidates import Pixels, Point2, Point3
@@ -130,17 +130,9 @@ class FailThenUpdate(FrontierUpdate):
         """Return whether an entry does not contradict the goal, or the agent has no time for another one."""
         if self._accepts_any or observation.num_rounds_left <= self._verification.reserve_rounds:
             return True
-        navigator = self._navigator
         self._counters["identity_checks"] += 1
-        remembered = navigator.candidate(entry)
-        answer = self._queries.ask(
-            IdentityQuestion(
-                goal=self._goal,
-                entry=navigator.with_images(remembered) if self._shows_images else remembered,
-                surroundings=[navigator.candidate(one) for one in navigator.objects.entries],
-            )
-        )
-        return answer is not False
+        question = identity_question(self._goal, entry, self._navigator, with_images=self._shows_images)
+        return self._queries.ask(question) is not False
 
     def _decide(self, observation: Observation) -> AgentAction:
         """Decide as Frontier-Update does; take entries back that were set aside if nothing else is left."""

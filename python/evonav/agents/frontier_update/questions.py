@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from evonav.agents.navigator import Navigator
 from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate
+from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.tasks.public import Goal
 
@@ -195,3 +197,13 @@ class IdentityQuestion(YesNoQuestion):
         context = matcher.context_ratios(goal, named, self.surroundings)[index]
         reason = f"appearance {appearance:.2g} and surroundings {context:.2g} times as likely for the goal"
         return appearance * context >= 1.0, reason
+
+
+def identity_question(goal: Goal, entry: ObjectEntry, navigator: Navigator, *, with_images: bool) -> IdentityQuestion:
+    """Ask about an entry of the object memory, among everything remembered."""
+    candidate = navigator.candidate(entry)
+    return IdentityQuestion(
+        goal=goal,
+        entry=navigator.with_images(candidate) if with_images else candidate,
+        surroundings=[navigator.candidate(one) for one in navigator.objects.entries],
+    )

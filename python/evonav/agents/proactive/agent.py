@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav.agents.agent import AgentAction, NavigateTo, Stop
 from evonav.agents.explorer import nearest_frontier
-from evonav.agents.frontier_update.questions import IdentityQuestion
+from evonav.agents.frontier_update.questions import identity_question
 from evonav.agents.navigator import Navigator
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.proactive.config import ProactiveConfig
@@ -29,6 +29,7 @@ from evonav.agents.proactive.searched import SearchedCells
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import matcher_of
+from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import Presence, judge_presence
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal
@@ -185,30 +186,22 @@ class Proactive(NavigatorAgent):
                 continue
             last = self._last
             is_chosen = self._is_final and last is not None and navigator.views.resolve(last.key) == entry_id
-            if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry_id)):
+            if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry)):
                 self._note(posterior)
                 self._record_round(f"object {entry_id}", "identified" if is_detected else "at its place", entry_id)
                 return Stop("identified" if is_detected else "at its place")
         return None
 
-    def _may_be_goal(self, entry_id: int) -> bool:
+    def _may_be_goal(self, entry: ObjectEntry) -> bool:
         """Ask whether an entry contradicts the goal; if it does, it hardly counts for the rest of the stage."""
         if not self.config.checks_identity:
             return True
-        navigator = self._navigator
-        remembered = [navigator.candidate(entry) for entry in navigator.objects.entries]
-        question_entry = next(one for one in remembered if one.entry_id == entry_id)
         self._counters["identity_checks"] += 1
-        answer = self._queries.ask(
-            IdentityQuestion(
-                goal=self._goal,
-                entry=navigator.with_images(question_entry) if self._shows_images else question_entry,
-                surroundings=remembered,
-            )
-        )
+        question = identity_question(self._goal, entry, self._navigator, with_images=self._shows_images)
+        answer = self._queries.ask(question)
         if answer is False:
             self._counters["identities_denied"] += 1
-            self._factors[entry_id] = self.config.unfit
+            self._factors[entry.id] = self.config.unfit
         return answer is not False
 
     def _chosen(self, posterior: Posterior, around: Surroundings, observation: Observation) -> Option | None:

@@ -4,7 +4,7 @@ An agent's failure costs its stage: the same agent goes on with the next one, or
 that remembers nothing. The records of later stages say so. A failure of anything else ends the episode.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import replace
 from time import process_time
 
@@ -58,7 +58,7 @@ class Episode:
         self._last_costs: Mapping[str, float] = {}
         self._is_replaced = False
 
-    def run(self) -> Iterator[StageOutcome]:
+    def run(self) -> Generator[StageOutcome]:
         """Run the stages in order.
 
         Yields:

@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
+from inspect import GEN_CLOSED, getgeneratorstate
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -152,7 +153,8 @@ class WorkerContext:
         self._busy: list[Simulator] = []
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting, waiting)
 
-    def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Generator[StageOutcome]:
+    @contextmanager
+    def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Iterator[Iterator[StageOutcome]]:
         """Run an episode from its beginning, with a fresh agent; if it does not end, its simulator is closed."""
         perception = self.config.backend.perception.create()
         simulator = self._idle.pop() if self._idle else self.config.backend.simulator.create()
@@ -161,7 +163,7 @@ class WorkerContext:
         try:
             agent = self._agent(job)
             with closing(agent) if isinstance(agent, RemoteAgent) else nullcontext():
-                yield from Episode(
+                episode = Episode(
                     spec,
                     job.agent,
                     agent,
@@ -172,8 +174,10 @@ class WorkerContext:
                     _Heartbeat(self._on_round),
                     perception_seed=job.perception_seed,
                     own_cpu_s=self._own_cpu_s,
-                ).run()
-            is_whole = True
+                )
+                with closing(episode.run()) as outcomes:
+                    yield outcomes
+                    is_whole = getgeneratorstate(outcomes) == GEN_CLOSED
         finally:
             self._busy.remove(simulator)
             if is_whole:
@@ -269,34 +273,37 @@ class EpisodeWork:
         After a failure that costs only the attempt, the failure is an event, and the stages from stage 1 on come again.
         """
         head, _, config_text = text.partition("\n")
+        with self._used(config_text) as context:
+            job, num_left = EpisodeJob(**json.loads(head)), _Retries(context.config.num_retries)
+            try:
+                shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
+                task = context.config.backend.tasks.create(Path(job.path))
+                spec = replace(task, opaque_id=job.opaque_id, shift_m=shift_m)
+                is_whole = False
+                while not is_whole:
+                    is_whole = True
+                    with context.attempt(spec, job) as outcomes:
+                        for outcome in outcomes:
+                            if outcome.failure is not None and num_left.take(outcome.failure):
+                                yield _text(outcome.failure)
+                                is_whole = False
+                                break
+                            yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
+            except Exception as error:
+                message = f"{type(error).__name__}: {error}"
+                return _text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
+            return _text(None)
+
+    @contextmanager
+    def _used(self, config_text: str) -> Iterator[WorkerContext]:
+        """Take a turn, and keep the context of a configuration open meanwhile."""
         with nullcontext() if self._turns is None else self._turns.turn():
             context = self._context(config_text)
             context.num_users += 1
             try:
-                return (yield from self._run(EpisodeJob(**json.loads(head)), context))
+                yield context
             finally:
                 context.num_users -= 1
-
-    def _run(self, job: EpisodeJob, context: WorkerContext) -> Generator[str, None, str]:
-        num_left = _Retries(context.config.num_retries)
-        try:
-            shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
-            task = context.config.backend.tasks.create(Path(job.path))
-            spec = replace(task, opaque_id=job.opaque_id, shift_m=shift_m)
-            is_whole = False
-            while not is_whole:
-                is_whole = True
-                with closing(context.attempt(spec, job)) as outcomes:
-                    for outcome in outcomes:
-                        if outcome.failure is not None and num_left.take(outcome.failure):
-                            yield _text(outcome.failure)
-                            is_whole = False
-                            break
-                        yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
-        except Exception as error:
-            message = f"{type(error).__name__}: {error}"
-            return _text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
-        return _text(None)
 
     def _context(self, config_text: str) -> WorkerContext:
         found = self._contexts.pop(config_text, None)
