@@ -22,7 +22,7 @@ from test_nothing_lost import many_tasks
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS
-from evonav.errors import InvalidArgumentError
+from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.hosting.fork_server import IS_SUPPORTED
 from evonav.evaluation.hosting.isolation import usual_isolation
 from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting
@@ -201,6 +201,25 @@ def test_an_interrupt_ends_all_and_the_run_is_resumed(tmp_path):
     waited_for(lambda: not any(map(is_running, everything)), 10.0)
     kept = num_recorded(tmp_path / "run")
     assert kept < 24
+    evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
+    evaluate([WAITING], tasks, tmp_path / "whole", config=replace(CHEAP, hosting=AgentHosting()), num_workers=0)
+    assert texts(tmp_path / "run") == texts(tmp_path / "whole")
+
+
+@pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
+def test_a_killed_driver_leaves_no_process_and_a_second_one_does_not_disturb_it(tmp_path):
+    tasks = many_tasks(tmp_path / "tasks", 8)
+    run = driver(tmp_path, WAITING, 6)
+    waited_for(lambda: len(agents_of(run.pid)) == 6)
+    waited_for(lambda: num_recorded(tmp_path / "run") >= 2)
+    with pytest.raises(StoreError, match=rf"another evonav is writing here \(process {run.pid} on "):
+        evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
+    assert len(agents_of(run.pid)) == 6
+    everything = list(children(run.pid))
+    run.kill()
+    run.wait(timeout=30)
+    waited_for(lambda: not any(map(is_running, everything)), 10.0)
+    assert num_recorded(tmp_path / "run") < 24
     evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
     evaluate([WAITING], tasks, tmp_path / "whole", config=replace(CHEAP, hosting=AgentHosting()), num_workers=0)
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")

@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,9 +17,11 @@ from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 from typer.testing import CliRunner
 
+from evonav.agents.hosting.sandbox import why_not
 from evonav.cli import app
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -165,11 +168,19 @@ config = RunConfig(
     protocol=ProtocolConfig(max_rounds=3),
     hosting=AgentHosting(is_sandboxed=not why_not()),
 )
-evaluate(["random-walk"], task_files(Path(sys.argv[1])), Path(sys.argv[2]), config=config, num_workers=2, num_retries=5)
+tasks, run, at_once = task_files(Path(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
+evaluate(["random-walk"], tasks, run, config=config, num_workers=2, num_retries=5, episodes_at_once=at_once)
 """
+HERE_ALONE = {"config": CHEAP, "num_workers": 0}
+MANY_AT_ONCE = {
+    "config": replace(CHEAP, hosting=AgentHosting(is_sandboxed=not why_not())),
+    "num_workers": 2,
+    "episodes_at_once": 4,
+}
 
 
-def test_a_wall_clock_that_jumps_changes_nothing(tmp_path):
+@pytest.mark.parametrize("at_once", [1, 4])
+def test_a_wall_clock_that_jumps_changes_nothing(tmp_path, at_once):
     """By up to a day, forwards or backwards, whenever a driver, worker or agent reads it."""
     library = compiled("clock.c", tmp_path)
     tasks = many_tasks(tmp_path / "tasks", 8)
@@ -177,7 +188,7 @@ def test_a_wall_clock_that_jumps_changes_nothing(tmp_path):
     environment = {**os.environ, "LD_PRELOAD": str(library), "PYTHONPATH": os.pathsep.join(sys.path)}
     look = [sys.executable, "-c", "import time; print(max(abs(time.time() - time.time()) for _ in range(20)))"]
     assert float(subprocess.run(look, env=environment, check=True, capture_output=True).stdout) > 3600.0
-    command = [sys.executable, "-c", DRIVER, str(tmp_path / "tasks"), str(tmp_path / "run")]
+    command = [sys.executable, "-c", DRIVER, str(tmp_path / "tasks"), str(tmp_path / "run"), str(at_once)]
     subprocess.run(command, env=environment, check=True, timeout=120.0)
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
     with RunStore(tmp_path / "run") as store:
@@ -209,7 +220,7 @@ def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
     assert late_mb < 1.05 * early_mb
     script = tmp_path / "driver.py"
     script.write_text(DRIVER)
-    command = [sys.executable, str(script), str(tmp_path / "tasks"), str(run)]
+    command = [sys.executable, str(script), str(tmp_path / "tasks"), str(run), "1"]
     kills = disturb(command, run, 210, 10, seed=1, environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
     assert kills.total() == 10
     assert len(kills) >= 2
@@ -239,24 +250,26 @@ def small_disk(tmp_path):
         subprocess.run(["umount", str(small)], check=True)
 
 
-def test_a_full_disk_is_one_clear_error(small_disk, tmp_path):
+@pytest.mark.parametrize("workers", [HERE_ALONE, MANY_AT_ONCE])
+def test_a_full_disk_is_one_clear_error(small_disk, tmp_path, workers):
     small, remount = small_disk
     tasks = many_tasks(tmp_path / "tasks", 30)
     with pytest.raises(StoreError, match="0 MB are free there"):
-        evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+        evaluate(["random-walk"], tasks, small / "run", **workers)
     kept = texts_of_stages(small / "run")
     assert 0 < len(kept) < 90
     remount("size=20m")
-    evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+    evaluate(["random-walk"], tasks, small / "run", **workers)
     evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
     assert texts(small / "run") == texts(tmp_path / "whole")
 
 
-def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_path):
+@pytest.mark.parametrize("workers", [HERE_ALONE, MANY_AT_ONCE])
+def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_path, workers):
     small, remount = small_disk
     tasks = many_tasks(tmp_path / "tasks", 2)
     remount("size=20m")
-    evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+    evaluate(["random-walk"], tasks, small / "run", **workers)
     kept = texts_of_stages(small / "run")
     remount("ro")
     assert len(kept) == 6
@@ -265,9 +278,9 @@ def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_pat
     assert done.exit_code == 0, done.output
     assert (tmp_path / "report" / "report.html").is_file()
     with pytest.raises(StoreError, match=r"small/run.*[Rr]ead-only"):
-        evaluate(["random-walk", "stay-still"], tasks, small / "run", config=CHEAP, num_workers=0)
+        evaluate(["random-walk", "stay-still"], tasks, small / "run", **workers)
     remount("rw")
-    evaluate(["random-walk", "stay-still"], tasks, small / "run", config=CHEAP, num_workers=0)
+    evaluate(["random-walk", "stay-still"], tasks, small / "run", **workers)
     assert texts_of_stages(small / "run")[:6] == kept
 
 
