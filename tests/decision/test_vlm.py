@@ -8,11 +8,13 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm.account import Account, Price, image_tokens, read_prices
@@ -149,7 +151,9 @@ def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: 
         store.close()
         with sqlite3.connect(store.path) as db:
             dumps.append(sorted(db.iterdump()))
-            assert db.execute("SELECT count(*) FROM images").fetchone() == (1,)
+            ((name, file),) = db.execute("SELECT name, webp FROM pictures").fetchall()
+        assert name == Picture(IMAGE).name
+        assert np.array_equal(np.asarray(Image.open(BytesIO(file))), IMAGE)
         db.close()
     assert dumps[0] == dumps[1]
 

@@ -22,8 +22,8 @@ class Asking:
         text = goal.unified_instruction
         self._found = {
             "answer": self._client.ask(Prompt.of("What is 1 + 1?")).text,
-            "cached": self._client.is_cached(Prompt.of("What is 1 + 1?")),
-            "not cached": self._client.is_cached(Prompt.of(text)),
+            "first cached": self._client.ask_first((Prompt.of("Another question?"), Prompt.of("What is 1 + 1?")))[0],
+            "none cached": self._client.ask_first((Prompt.of(f"{text}?"), Prompt.of(f"{text}!")), otherwise=1)[0],
             "key": os.environ.get("OPENAI_API_KEY"),
             "held": sorted(vars(self._client)) if hasattr(self._client, "__dict__") else [],
             "large": self._large(),
@@ -34,7 +34,7 @@ class Asking:
             os.write(self._client._descriptor, b"\xff" * 8)
             self._found["broken"] = _tried(lambda: self._client.ask(Prompt.of("Still there?")))
         if goal.stage == 3:
-            message = b'{"operation": "delete", "turns": [], "schema": null, "attempt": 0}'
+            message = b'{"prompts": [], "attempt": 0, "otherwise": 0, "images": []}\n'
             os.write(self._client._descriptor, len(message).to_bytes(8, "little") + message)
 
     def _large(self):

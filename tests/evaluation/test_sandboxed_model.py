@@ -83,7 +83,7 @@ def test_an_agent_reaches_the_model_and_nothing_else_of_it(tmp_path: Path, monke
         assert stub.keys == {f"Bearer {KEY}"}
     details = first.trace[0].details
     assert details["answer"] == "2"
-    assert (details["cached"], details["not cached"], details["key"]) == (True, False, None)
+    assert (details["first cached"], details["none cached"], details["key"]) == (1, 1, None)
     assert details["held"] == ["_descriptor", "never_asks"]
     assert "must be at most" in details["large"]
     assert details["server"] == "PermissionError"

@@ -6,15 +6,18 @@ import json
 import random
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from mutation import json_bytes, mutated_bytes, mutated_json
 
 from evonav.agents.agent import EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig
 from evonav.agents.hosting import wire
+from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.vlm.answer import read_answer, read_response, usage_of
-from evonav.decision.vlm.relay import REQUEST, RESPONSE
+from evonav.decision.vlm.relay import RESPONSE, read_request, request_bytes
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.house import bundled_houses, stream_houses
 from evonav.house.asset_sizes import read_asset_sizes
@@ -186,17 +189,17 @@ def responses(_folder: Path) -> Reader:
         "finish_reason": "stop",
     }
     usage = {"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 1100}
+    image = Picture(np.zeros((2, 3, 3), np.uint8))
+    request, line_end, pixels = request_bytes([Prompt.of("hi", image), Prompt.of(image)], 0, 0).partition(b"\n")
     whole = {"id": "1", "object": "chat.completion", "model": "m", "choices": [choice], "usage": usage}
 
     def read(data: bytes) -> None:
-        for adapter in (REQUEST, RESPONSE):
-            try:
-                adapter.validate_json(data, strict=True)
-            except ValueError:
-                continue
+        with suppress(InvalidArgumentError):
+            read_request(data + line_end + pixels)
+        with suppress(ValueError):
+            RESPONSE.validate_json(data, strict=True)
         response = read_response(data.decode(errors="replace"))
         usage_of(response)
         read_answer(response, "key", is_replayed=False)
 
-    relayed = {"operation": "ask", "turns": [{"role": "user", "parts": ["hi"]}], "schema": None, "attempt": 0}
-    return Reader([json_bytes(whole), json_bytes(relayed)], read)
+    return Reader([json_bytes(whole), request], read)

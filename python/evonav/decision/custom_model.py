@@ -1,7 +1,7 @@
 """Models of your own: any object with `ask(prompt) -> str`, with a cache as for a model behind an endpoint."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Protocol, cast
 
 from evonav.component import import_callable
@@ -12,7 +12,7 @@ from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
-from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, image_name
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 
 
@@ -63,15 +63,13 @@ class CustomClient(CachingClient):
         turns = [
             {
                 "role": turn.role,
-                "content": [
-                    part.text if isinstance(part, Text) else {"image": image_name(part.pixels)} for part in turn.parts
-                ],
+                "content": [part.text if isinstance(part, Text) else {"image": part.name} for part in turn.parts],
             }
             for turn in prompt.turns
         ]
         return {"own_model": self.name, "turns": turns, "attempt": attempt}
 
-    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
+    def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
         reserved_usd = self.account.reserve(Usage())
         usage: Usage | None = None
         try:

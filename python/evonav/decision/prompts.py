@@ -1,7 +1,9 @@
 """Build prompts: text and images in turns."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -18,12 +20,22 @@ class Text:
     text: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Picture:
     """An image in a prompt."""
 
     pixels: NDArray[np.uint8]
     """`(H, W, 3)` RGB."""
+
+    @cached_property
+    def name(self) -> str:
+        """Name of the image where a request is stored: `sha256:` and the hash of its shape and values.
+
+        It is not the hash of its file, whose bytes depend on the compression.
+        """
+        height, width = self.pixels.shape[:2]
+        values = f"{width}x{height} RGB\n".encode() + self.pixels.tobytes()
+        return "sha256:" + hashlib.sha256(values).hexdigest()
 
 
 Part = Text | Picture

@@ -1,14 +1,14 @@
 """Ask a model through a cache: the part that all clients of models share."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Literal, cast
 
 from evonav.decision.prompts import Prompt
 from evonav.decision.vlm.account import Account
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
-from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of, png_of
+from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, key_of
 from evonav.errors import InvalidArgumentError
 
 Mode = Literal["live", "record", "replay", "auto"]
@@ -63,44 +63,64 @@ class CachingClient(ABC):
             StoreError: The exchanges cannot be read or written.
             DecisionError: The model cannot be asked.
         """
-        cached = self.cached_request(prompt, attempt)
-        key = key_of(cached)
-        outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
-        is_replayed = outcome is not None
-        if outcome is not None:
+        return self.ask_first((prompt,), attempt)[1]
+
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, Answer]:
+        """Return the answer to the first prompt whose outcome is cached; if none is, ask one of them.
+
+        Args:
+            prompts: Prompts that differ in the form of the answer.
+            attempt: Number of earlier tries without a valid answer.
+            otherwise: Index of the prompt that is asked if none is cached.
+
+        Returns:
+            Index of the prompt that was answered, and the answer.
+
+        Raises:
+            VlmError: There is no valid answer; `kind` says why.
+            StoreError: The exchanges cannot be read or written.
+            DecisionError: The model cannot be asked.
+        """
+        requests = [self.cached_request(prompt, attempt) for prompt in prompts]
+        keys = [key_of(request) for request in requests]
+        cached = self._first_cached(keys)
+        if cached is not None:
+            index, outcome = cached
             self.account.replayed()
-        elif self.mode == "replay":
-            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
         else:
-            outcome = self._ask_anew(prompt, attempt, cached)
+            index = otherwise
+            if self.mode == "replay":
+                raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {keys[index]}")
+            outcome = self._ask_anew(prompts[index], attempt, requests[index])
         if isinstance(outcome, Failure):
             raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
-        return self._read(outcome, key, is_replayed=is_replayed)
+        return index, self._read(outcome, keys[index], is_replayed=cached is not None)
+
+    def _first_cached(self, keys: Sequence[str]) -> tuple[int, JsonObject | Failure] | None:
+        """Return the first outcome that is cached, with the index of its key."""
+        if self.store is not None and self.mode in ("replay", "auto"):
+            for index, key in enumerate(keys):
+                if (outcome := self.store.outcome(key)) is not None:
+                    return index, outcome
+        return None
 
     def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
         """Ask the model, and store the outcome if the mode and `keeps_failures` require it."""
-        images: dict[str, bytes] = {}
-        for picture in prompt.pictures:
-            name = image_name(picture.pixels)
-            images[name] = images.get(name) or self._stored_png(name) or png_of(picture.pixels)
         outcome: JsonObject | Failure
         try:
-            outcome = self._ask_model(prompt, attempt, images)
+            outcome = self._ask_model(prompt, attempt)
         except VlmError as error:
             if not self.keeps_failures or error.kind in LASTING:
                 raise
             outcome = Failure(error.kind, error.message)
         if self.store is None or self.mode == "live":
             return outcome
+        pictures = prompt.pictures if self.keeps_images else []
         if self.mode == "auto" and (self.keeps_failures or not self._is_malformed(outcome)):
-            return self.store.keep_first(cached, images if self.keeps_images else {}, outcome)
+            return self.store.keep_first(cached, pictures, outcome)
         if self.mode == "record" and not isinstance(outcome, Failure) and not self._is_malformed(outcome):
-            self.store.put(cached, images if self.keeps_images else {}, outcome)
+            self.store.put(cached, pictures, outcome)
         return outcome
-
-    def _stored_png(self, name: str) -> bytes | None:
-        """Return an image's file if an earlier question had it: agents show most images several times."""
-        return None if self.store is None or self.mode == "live" else self.store.image(name)
 
     def _is_malformed(self, outcome: JsonObject | Failure) -> bool:
         """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
@@ -133,13 +153,12 @@ class CachingClient(ABC):
         """Return the content that an exchange's key is computed from, with names of images."""
 
     @abstractmethod
-    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
+    def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
         """Ask the model itself.
 
         Args:
             prompt: The question.
             attempt: Number of earlier tries without a valid answer.
-            images: PNG files of the prompt's images by `image_name`.
 
         Raises:
             VlmError: There is no response.

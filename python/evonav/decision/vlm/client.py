@@ -11,22 +11,22 @@ import base64
 import os
 import threading
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evonav.decision.prompts import Prompt, Text, Turn
+from evonav import _core
+from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
 from evonav.decision.vlm.answer import Answer, read_answer, read_response, usage_of
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.pacing import Pace
-from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, image_name, png_of
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.decision.vlm.secrets import REMOVED, without_secrets
 from evonav.errors import DecisionError, InvalidArgumentError
 
@@ -130,11 +130,11 @@ class VlmClient(CachingClient):
 
     def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
         """Return the request as it is cached: with names of images, and the attempt if nothing else tells it apart."""
-        request = self.request_of(prompt, image_name, attempt)
+        request = self.request_of(prompt, lambda picture: picture.name, attempt)
         return {**request, "attempt": attempt} if attempt and self.config.seed is None else request
 
     def request_of(
-        self, prompt: Prompt, url_of: Callable[[NDArray[np.uint8]], str] | None = None, attempt: int = 0
+        self, prompt: Prompt, url_of: Callable[[Picture], str] | None = None, attempt: int = 0
     ) -> JsonObject:
         """Return the body that is posted to `/chat/completions`.
 
@@ -144,7 +144,7 @@ class VlmClient(CachingClient):
             attempt: Number that is added to the seed.
         """
         config = self.config
-        url_of = url_of or (lambda pixels: _data_url(png_of(pixels)))
+        url_of = url_of or _data_url
         request: JsonObject = {
             "model": config.model,
             "messages": [_message(turn, config.image_detail, url_of) for turn in prompt.turns],
@@ -172,9 +172,9 @@ class VlmClient(CachingClient):
                 tokens += image_tokens((width, height), self.config.image_detail)
         return Usage(int(tokens) + 1, self.config.max_tokens)
 
-    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
+    def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
         """Ask within the limits of money and of concurrent questions."""
-        request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
+        request = self.request_of(prompt, attempt=attempt)
         estimate = self.estimate(prompt)
         reserved_usd = self.account.reserve(estimate)
         usage: Usage | None = None
@@ -271,7 +271,7 @@ class VlmClient(CachingClient):
         return without_secrets(text, (self._key(), unquote(urlsplit(url).password or "")))
 
 
-def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]) -> JsonObject:
+def _message(turn: Turn, detail: str, url_of: Callable[[Picture], str]) -> JsonObject:
     if turn.role != "user":
         return {"role": turn.role, "content": "".join(part.text for part in turn.parts if isinstance(part, Text))}
     content: list[JsonObject] = []
@@ -279,9 +279,10 @@ def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]
         if isinstance(part, Text):
             content.append({"type": "text", "text": part.text})
         else:
-            content.append({"type": "image_url", "image_url": {"url": url_of(part.pixels), "detail": detail}})
+            content.append({"type": "image_url", "image_url": {"url": url_of(part), "detail": detail}})
     return {"role": "user", "content": content}
 
 
-def _data_url(png: bytes) -> str:
+def _data_url(picture: Picture) -> str:
+    png = _core.encode_png(np.ascontiguousarray(picture.pixels))
     return "data:image/png;base64," + base64.b64encode(png).decode()

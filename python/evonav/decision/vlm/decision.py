@@ -118,16 +118,17 @@ class VlmDecision:
         if self.structured == "off":
             return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())
-        if self.structured == "on" or self.client.is_cached(as_json, attempt):
+        if self.structured == "on":
             return self.client.ask(as_json, attempt), True
         # In a replay, an exchange that is not cached as JSON is of a server without schemas.
-        if self._is_refused or self.client.never_asks or self.client.is_cached(plain, attempt):
-            return self.client.ask(plain, attempt), False
+        asks_plain = self._is_refused or self.client.never_asks
         try:
-            return self.client.ask(as_json, attempt), True
+            index, answer = self.client.ask_first((as_json, plain), attempt, otherwise=int(asks_plain))
         except VlmError as error:
-            if not _is_about_format(error):
+            if asks_plain or not _is_about_format(error):
                 raise
+        else:
+            return answer, index == 0
         self._is_refused = True
         return self.client.ask(plain, attempt), False
 

@@ -4,15 +4,15 @@ Questions and answers are JSON messages on a connection that the process inherit
 in place of the client; the evaluator's side is `evonav.evaluation.hosting.model_relay`, which trusts nothing it reads.
 """
 
-import base64
 import os
 import struct
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
@@ -27,38 +27,31 @@ MAX_MESSAGE_BYTES = 64 << 20
 MAX_EDGE_PX = 4096
 
 
-@dataclass(frozen=True, slots=True)
-class _Image:
-    height: Annotated[int, Field(ge=1, le=MAX_EDGE_PX)]
-    width: Annotated[int, Field(ge=1, le=MAX_EDGE_PX)]
-    rgb: str
-    """The pixels, row by row, in base64."""
+_Edge = Annotated[int, Field(ge=1, le=MAX_EDGE_PX)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Turn:
     role: Literal["system", "user", "assistant"]
-    parts: list[str | _Image]
+    parts: list[str | int]
+    """Texts, and indices of images."""
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """A question to the model, or whether its answer is cached."""
-
-    operation: Literal["ask", "is_cached"]
+class _Prompt:
     turns: Annotated[list[_Turn], Field(min_length=1, max_length=100)]
     schema: dict[str, Any] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    """The arguments of `CachingClient.ask_first`; the images' pixels follow the message, row by row, in order."""
+
+    prompts: Annotated[list[_Prompt], Field(min_length=1, max_length=10)]
     attempt: Annotated[int, Field(ge=0, le=1000)]
-
-    @property
-    def prompt(self) -> Prompt:
-        """The question.
-
-        Raises:
-            InvalidArgumentError: An image has other bytes than its size says.
-        """
-        turns = (Turn(turn.role, tuple(_part_of(part) for part in turn.parts)) for turn in self.turns)
-        return Prompt(tuple(turns), self.schema)
+    otherwise: Annotated[int, Field(ge=0, le=9)]
+    images: list[tuple[_Edge, _Edge]]
+    """Height and width of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +59,15 @@ class Response:
     """The outcome of a request, in one of the fields."""
 
     answer: Answer | None = None
-    is_cached: bool | None = None
+    index: int = 0
+    """Index of the prompt that was answered."""
     failure: VlmFailure | None = None
     """The kind of a `VlmError`."""
     error: str | None = None
     """The message of a failure, or of another `DecisionError` if there is no kind."""
 
 
-REQUEST = TypeAdapter(Request)
+_REQUEST = TypeAdapter(_Request)
 RESPONSE = TypeAdapter(Response)
 _lock = threading.Lock()
 
@@ -102,26 +96,26 @@ class RelayedClient:
             VlmError: There is no valid answer; `kind` says why.
             DecisionError: The model cannot be asked.
         """
-        response = self._response("ask", prompt, attempt)
+        return self.ask_first((prompt,), attempt)[1]
+
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, Answer]:
+        """Return the answer to the first prompt whose outcome is cached, else to `prompts[otherwise]`, with its index.
+
+        Raises:
+            VlmError: There is no valid answer; `kind` says why.
+            DecisionError: The model cannot be asked.
+        """
+        response = self._response(request_bytes(prompts, attempt, otherwise))
         if response.failure is not None:
             raise VlmError(response.failure, response.error or "")
         if response.answer is None:
             raise DecisionError(response.error or "the evaluator gave no answer")
-        return response.answer
+        return response.index, response.answer
 
-    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Return whether the outcome of a question is cached, so that nothing is asked."""
-        response = self._response("is_cached", prompt, attempt)
-        if response.is_cached is None:
-            raise DecisionError(response.error or "the evaluator gave no answer")
-        return response.is_cached
-
-    def _response(self, operation: Literal["ask", "is_cached"], prompt: Prompt, attempt: int) -> Response:
-        turns = [_Turn(turn.role, [_part(part) for part in turn.parts]) for turn in prompt.turns]
-        schema = None if prompt.schema is None else dict(prompt.schema)
+    def _response(self, message: bytes) -> Response:
         with _lock:  # of all threads of the agent: an answer belongs to the question before it
             try:
-                write_message(self._descriptor, REQUEST.dump_json(Request(operation, turns, schema, attempt)))
+                write_message(self._descriptor, message)
                 text = read_message(self._descriptor)
             except OSError as error:
                 raise DecisionError(f"the connection to the model is lost: {error}") from error
@@ -129,6 +123,59 @@ class RelayedClient:
             return RESPONSE.validate_json(text)
         except ValidationError as error:
             raise DecisionError("the connection to the model is lost: no answer to the question") from error
+
+
+def request_bytes(prompts: Sequence[Prompt], attempt: int, otherwise: int) -> bytes:
+    """Return the message that asks for `CachingClient.ask_first`. Prompts that share an image send it once."""
+    pixels = {id(part): np.ascontiguousarray(part.pixels, np.uint8) for prompt in prompts for part in prompt.pictures}
+    places = {key: index for index, key in enumerate(pixels)}
+    forms = [
+        _Prompt(
+            [
+                _Turn(turn.role, [part.text if isinstance(part, Text) else places[id(part)] for part in turn.parts])
+                for turn in prompt.turns
+            ],
+            None if prompt.schema is None else dict(prompt.schema),
+        )
+        for prompt in prompts
+    ]
+    request = _Request(forms, attempt, otherwise, [image.shape[:2] for image in pixels.values()])
+    return b"".join((_REQUEST.dump_json(request), b"\n", *(image.data for image in pixels.values())))
+
+
+def read_request(message: bytes) -> tuple[list[Prompt], int, int]:
+    """Return the prompts, the attempt and `otherwise` of a message.
+
+    Raises:
+        InvalidArgumentError: It is no request; the error names the field.
+    """
+    text, _, rest = message.partition(b"\n")  # JSON has no line ends
+    try:
+        request = _REQUEST.validate_json(text, strict=True)
+    except ValidationError as error:
+        problem = error.errors(include_url=False, include_input=False)[0]
+        raise InvalidArgumentError(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}") from error
+    if request.otherwise >= len(request.prompts):
+        raise InvalidArgumentError(f"otherwise = {request.otherwise}: of {len(request.prompts)} prompts")
+    ends = list(accumulate((3 * height * width for height, width in request.images), initial=0))
+    if ends[-1] != len(rest):
+        raise InvalidArgumentError(f"images: expected {ends[-1]} bytes, got {len(rest)}")
+    pictures = [
+        Picture(np.frombuffer(rest, np.uint8, 3 * height * width, start).reshape(height, width, 3))
+        for (height, width), start in zip(request.images, ends, strict=False)
+    ]
+    return [_prompt_of(prompt, pictures) for prompt in request.prompts], request.attempt, request.otherwise
+
+
+def _prompt_of(prompt: _Prompt, pictures: Sequence[Picture]) -> Prompt:
+    for part in (part for turn in prompt.turns for part in turn.parts):
+        if isinstance(part, int) and not 0 <= part < len(pictures):
+            raise InvalidArgumentError(f"parts: image {part} of {len(pictures)}")
+    turns = (
+        Turn(turn.role, tuple(Text(part) if isinstance(part, str) else pictures[part] for part in turn.parts))
+        for turn in prompt.turns
+    )
+    return Prompt(tuple(turns), prompt.schema)
 
 
 def read_message(descriptor: int) -> bytes:
@@ -153,9 +200,10 @@ def write_message(descriptor: int, text: bytes) -> None:
     """
     if len(text) > MAX_MESSAGE_BYTES:
         raise InvalidArgumentError(f"a question of {len(text)} bytes: must be at most {MAX_MESSAGE_BYTES}")
-    data = memoryview(LENGTH.pack(len(text)) + text)
-    while data:
-        data = data[os.write(descriptor, data) :]
+    for part in (LENGTH.pack(len(text)), text):
+        data = memoryview(part)
+        while data:
+            data = data[os.write(descriptor, data) :]
 
 
 def _exactly(descriptor: int, size: int) -> bytes:
@@ -166,22 +214,3 @@ def _exactly(descriptor: int, size: int) -> bytes:
             raise ConnectionResetError("closed")
         data += part
     return bytes(data)
-
-
-def _part(part: Text | Picture) -> str | _Image:
-    if isinstance(part, Text):
-        return part.text
-    height, width = part.pixels.shape[:2]
-    return _Image(height, width, base64.b64encode(np.ascontiguousarray(part.pixels, np.uint8).tobytes()).decode())
-
-
-def _part_of(part: str | _Image) -> Text | Picture:
-    return Text(part) if isinstance(part, str) else Picture(_pixels(part))
-
-
-def _pixels(image: _Image) -> NDArray[np.uint8]:
-    try:
-        data = base64.b64decode(image.rgb, validate=True)
-        return np.frombuffer(data, np.uint8).reshape(image.height, image.width, 3)
-    except ValueError as error:
-        raise InvalidArgumentError(f"an image of {image.width} x {image.height}: other bytes: {error}") from error

@@ -9,15 +9,13 @@ import threading
 import time
 from contextlib import suppress
 
-from pydantic import ValidationError
-
 from evonav.component import Component
 from evonav.decision.backends import VLM, vlm_client
 from evonav.decision.metered import account_costs
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.relay import REQUEST, RESPONSE, Response, read_message, write_message
+from evonav.decision.vlm.relay import RESPONSE, Response, read_message, read_request, write_message
 from evonav.errors import EvonavError, InvalidArgumentError
 
 MAX_ERROR = 2000
@@ -93,19 +91,16 @@ class ModelRelay:
                 self.cpu_s = time.thread_time()
                 write_message(descriptor, answer)
 
-    def _answer(self, text: bytes) -> Response:
+    def _answer(self, message: bytes) -> Response:
         try:
-            request = REQUEST.validate_json(text, strict=True)
-        except ValidationError as error:
-            problem = error.errors(include_url=False, include_input=False)[0]
-            place = ".".join(map(str, problem["loc"]))
-            return Response(error=f"malformed question: {place}: {problem['msg']}"[:MAX_ERROR])
+            prompts, attempt, otherwise = read_request(message)
+        except InvalidArgumentError as error:
+            return Response(error=f"malformed question: {error}"[:MAX_ERROR])
         client = self._client
         assert client is not None  # made before the thread
         try:
-            if request.operation == "is_cached":
-                return Response(is_cached=client.is_cached(request.prompt, request.attempt))
-            return Response(answer=client.ask(request.prompt, request.attempt))
+            index, answer = client.ask_first(prompts, attempt, otherwise=otherwise)
+            return Response(answer, index)
         except VlmError as error:
             return Response(failure=error.kind, error=error.message)
         except EvonavError as error:

@@ -1,0 +1,61 @@
+"""Questions that an agent's process sends to the evaluator, which asks the model."""
+
+import numpy as np
+import pytest
+
+from evonav.decision.prompts import Picture, Prompt, Text, Turn
+from evonav.decision.vlm.relay import read_request, request_bytes
+from evonav.errors import InvalidArgumentError
+
+DRAWS = np.random.default_rng(0)
+NARROW, WIDE = (Picture(DRAWS.integers(0, 256, shape, np.uint8)) for shape in ((5, 2, 3), (3, 9, 3)))
+PLAIN = Prompt((Turn("system", (Text("Be brief."),)), Turn("user", (NARROW, Text("or"), WIDE, NARROW))))
+AS_JSON = Prompt((*PLAIN.turns, Turn("user", (WIDE, Text("as JSON")))), {"type": "object"})
+MESSAGE = request_bytes((AS_JSON, PLAIN), 3, 1)
+
+
+def parts_of(prompt: Prompt) -> list[tuple[str, list[str]]]:
+    return [
+        (turn.role, [part.text if isinstance(part, Text) else part.name for part in turn.parts])
+        for turn in prompt.turns
+    ]
+
+
+def test_a_request_is_read_as_it_was_asked_and_holds_each_image_once() -> None:
+    prompts, attempt, otherwise = read_request(MESSAGE)
+    assert (attempt, otherwise) == (3, 1)
+    assert [parts_of(prompt) for prompt in prompts] == [parts_of(AS_JSON), parts_of(PLAIN)]
+    assert [prompt.schema for prompt in prompts] == [{"type": "object"}, None]
+    for picture in (NARROW, WIDE):
+        assert MESSAGE.count(picture.pixels.tobytes()) == 1
+    ends = MESSAGE.index(b"\n")
+    assert len(MESSAGE) - ends - 1 == NARROW.pixels.size + WIDE.pixels.size
+
+
+def test_an_image_has_the_name_of_its_shape_and_values() -> None:
+    """Cached answers of earlier versions are found by it."""
+    assert (
+        Picture(np.arange(18, dtype=np.uint8).reshape(2, 3, 3)).name
+        == "sha256:94a5bd13d7c5730ed5f8823b6732195951913e631b969b1bae95f7b37c6f03fb"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        (b'"attempt":3', b'"attempt":-1', "attempt: Input should be greater than or equal to 0"),
+        (b'"otherwise":1', b'"otherwise":2', "otherwise = 2: of 2 prompts"),
+        (b"[5,2]", b"[5,3]", "images: expected 126 bytes, got 111"),
+        (b"[5,2]", b"[0,2]", "images.0.0: Input should be greater than or equal to 1"),
+        (b'[0,"or",', b'[2,"or",', "parts: image 2 of 2"),
+        (b'[0,"or",', b'[-1,"or",', "parts: image -1 of 2"),
+        (b'"role":"user"', b'"role":"evaluator"', "prompts.0.turns.1.role: Input should be"),
+        (b"\n", b"", "Invalid JSON"),
+    ],
+)
+def test_a_malformed_request_is_one_error(old: bytes, new: bytes, error: str) -> None:
+    message = MESSAGE.replace(old, new, 1)
+    assert message != MESSAGE
+    with pytest.raises(InvalidArgumentError) as raised:
+        read_request(message)
+    assert error in str(raised.value)
