@@ -3,6 +3,7 @@
 import math
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,10 +15,11 @@ from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.proactive.agent import Proactive, ProactiveBlind
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
+from evonav.agents.proactive.places import visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief, _Entry
 from evonav.agents.proactive.rooms import NO_ROOM, eroded, grown, numbered, rooms_of
-from evonav.agents.proactive.search import Option, best_option, shown_from
-from evonav.agents.proactive.searched import SearchedCells
+from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
+from evonav.agents.proactive.searched import CoarseFrame, SearchedCells
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
 from evonav.evaluation.protocol import ProtocolConfig
@@ -178,17 +180,40 @@ def test_a_place_that_was_left_before_the_agent_was_there_counts_half_each_time(
     assert best_option([one, other], None, [replace(one, kind="frontier")] * 2, config) is one
 
 
-def test_a_place_shows_its_own_room_alone():
+def test_a_place_shows_what_no_wall_hides():
+    coarse = CoarseFrame.over(FRAME)
+    cells = two_rooms(door_cells=10)
+    rows, cols = shown_from((4.0, 1.0), coarse, walls_of(cells, FRAME, []), 2.5)
+    shown_m = [coarse.centre_m(row, col) for row, col in zip(rows, cols, strict=True)]
+    assert all(math.dist(one, (4.0, 1.0)) <= 2.5 + 1e-9 for one in shown_m)
+    assert max(x_m for x_m, _ in shown_m) < 5.3
+    assert sum(math.dist(one, (3.0, 1.0)) < 0.9 for one in shown_m) > 50
+    through = shown_from((4.0, 3.5), coarse, walls_of(cells, FRAME, []), 2.5)
+    assert max(coarse.centre_m(0, col)[0] for col in through[1]) > 6.0  # through the doorway
+    shelf = ObjectCandidate(1, "ShelvingUnit", (5.0, 0.9, 1.0), (0.2, 1.8, 2.0), 3)
+    over = shown_from((4.0, 1.0), coarse, walls_of(cells, FRAME, [shelf]), 2.5)
+    assert max(coarse.centre_m(0, col)[0] for col in over[1]) > 6.0  # furniture is no wall
+
+
+def test_what_was_searched_in_vain_counts_less():
     searched = SearchedCells(FRAME, ProactiveConfig())
-    rooms = rooms_of(two_rooms(door_cells=10), FRAME, [])
-    shown = shown_from((4.0, 1.0), searched.coarse, rooms, 2.5)
-    centres_m = searched.coarse.centres_m()
-    assert shown[(np.hypot(*(centres_m - (3.0, 1.0)).transpose(2, 0, 1)) < 1.0)].all()
-    assert not shown[:, centres_m[0, :, 0] > 5.3].any()
-    assert not shown[(np.hypot(*(centres_m - (4.0, 1.0)).transpose(2, 0, 1)) > 2.6)].any()
-    searched.give_up(shown, 0.3)
-    assert searched.missed(is_small=True)[shown] == pytest.approx(0.3)
-    assert (searched.ever_missed(is_small=False)[~shown] == 1.0).all()
+    rows, cols = shown_from((4.0, 1.0), searched.coarse, walls_of(two_rooms(10), FRAME, []), 2.5)
+    searched.give_up(rows, cols, 0.3)
+    assert searched.missed(0.5)[rows, cols] == pytest.approx(0.3)
+    others = np.ones(searched.missed(9.0).shape, np.bool_)
+    others[rows, cols] = False
+    assert (searched.ever_missed(9.0)[others] == 1.0).all()
+
+
+def test_small_things_are_missed_from_afar(monkeypatch):
+    monkeypatch.setattr("evonav.agents.proactive.searched.seen_cells", lambda *_: (np.array([4]), np.array([7])))
+    searched = SearchedCells(FRAME, ProactiveConfig())
+    edge_m = searched.coarse.frame.cell_m
+    searched.see(SimpleNamespace(pose=SimpleNamespace(x_m=7.5 * edge_m + 2.2, z_m=4.5 * edge_m)))
+    assert searched.missed(visible_range_m("chair"))[4, 7] == pytest.approx(0.1)
+    assert searched.missed(visible_range_m("cell phone"))[4, 7] == 1.0
+    assert visible_range_m("pencil") < visible_range_m("mug") < visible_range_m("toaster") < visible_range_m("bed")
+    assert visible_range_m("flying carpet") == math.inf
 
 
 def test_looks_from_one_side_count_once_a_stage(monkeypatch):
@@ -204,11 +229,11 @@ def test_looks_from_one_side_count_once_a_stage(monkeypatch):
     north, south = At(7.5 * edge_m, 4.5 * edge_m + 1.0), At(7.5 * edge_m, 4.5 * edge_m - 1.0)
     for view, missed in ((north, 0.1), (north, 0.1), (south, 0.01)):
         searched.see(view)
-        assert searched.missed(is_small=False)[4, 7] == pytest.approx(missed)
+        assert searched.missed(9.0)[4, 7] == pytest.approx(missed)
     searched.begin_stage()
-    assert searched.missed(is_small=False)[4, 7] == 1.0
-    assert searched.ever_missed(is_small=False)[4, 7] == pytest.approx(0.01)
-    assert searched.missed(is_small=False)[0, 0] == 1.0
+    assert searched.missed(9.0)[4, 7] == 1.0
+    assert searched.ever_missed(9.0)[4, 7] == pytest.approx(0.01)
+    assert searched.missed(9.0)[0, 0] == 1.0
 
 
 def test_it_stops_near_a_detected_entry_and_asks_once_about_its_identity():
@@ -222,12 +247,12 @@ def test_it_stops_near_a_detected_entry_and_asks_once_about_its_identity():
     assert told[-1][2].counters["identity_checks"] == 3
 
 
-def test_the_moved_table_is_doubted_once_its_place_is_seen_empty_and_the_entry_stays():
+def test_the_moved_table_is_taken_at_its_new_place_and_the_old_entry_stays():
     _, told = rounds_of(Proactive(), *moved_table_stages())
     last = [(belief, said) for stage, belief, said, _ in told if stage == 3]
     shares = [said.details["p_entries"] for _, said in last]
     old = next(iter(shares[0]))
-    assert shares[-1][old] < 0.5 * shares[-1][str(last[-1][1].chosen_entry.entry_id)]
+    assert shares[-1][old] < shares[-1][str(last[-1][1].chosen_entry.entry_id)]
     assert int(old) in {entry.entry_id for entry in last[-1][0].entries}
     assert last[-1][1].chosen_entry.entry_id != int(old)
 

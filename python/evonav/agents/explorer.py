@@ -68,6 +68,11 @@ class Explorer:
         self._given_up.clear()
         self._last = None
 
+    def offer_again(self) -> None:
+        """Take all abandoned frontiers back: what hid the floor behind them may have been moved."""
+        self._given_up.clear()
+        self._last = None
+
     def observe(self, observation: Observation) -> bool:
         """Integrate a round's views; all of them are compared with the map before any is integrated.
 

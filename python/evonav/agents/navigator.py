@@ -121,6 +121,12 @@ class Navigator:
             self._first_map_view = self.round_views[0].id
         return is_outdated
 
+    def explore_anew(self, observation: Observation) -> None:
+        """Forget the map and its frontiers, and begin a new map with this round's views; entries stay as they are."""
+        self.explorer.clear()
+        self.explorer.observe(observation)
+        self._first_map_view = self.round_views[0].id
+
     def without_background(self, observation: Observation) -> Observation:
         """Return an observation without the detections that are not remembered."""
         return replace(observation, views=tuple(self._without_background(view) for view in observation.views))
@@ -166,9 +172,14 @@ class Navigator:
             goal_m = self.observation_point(centre_m) or target.goal_m
             self.target = Target(entry.id, goal_m, centre_m)
 
-    def candidate(self, entry: ObjectEntry) -> ObjectCandidate:
-        """Return an entry of the object memory as questions describe it, without images."""
-        appearance = self._appearance(entry) if self._names_colours else None
+    def candidate(self, entry: ObjectEntry, *, with_looks: bool = True) -> ObjectCandidate:
+        """Return an entry of the object memory as questions describe it, without images.
+
+        Args:
+            entry: The entry.
+            with_looks: False to leave out what its views show, which takes time.
+        """
+        appearance = self._appearance(entry) if self._names_colours and with_looks else None
         return ObjectCandidate(
             entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections, appearance=appearance
         )

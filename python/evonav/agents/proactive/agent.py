@@ -4,19 +4,17 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from evonav.agents.agent import AgentAction, NavigateTo, Stop
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import identity_question
 from evonav.agents.navigator import Navigator
 from evonav.agents.navigator_agent import NavigatorAgent
+from evonav.agents.proactive.belief import TargetBelief
 from evonav.agents.proactive.config import ProactiveConfig
-from evonav.agents.proactive.posterior import Posterior, Surroundings, posterior_of
-from evonav.agents.proactive.presence import PresenceBelief
-from evonav.agents.proactive.rooms import NO_ROOM, box_slices, rooms_of
+from evonav.agents.proactive.places import visible_range_m
+from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings
 from evonav.agents.proactive.search import (
+    SAME_PLACE_M,
     Option,
     best_option,
     frontier_gains,
@@ -25,19 +23,19 @@ from evonav.agents.proactive.search import (
     shown_from,
     with_ways,
 )
-from evonav.agents.proactive.searched import SearchedCells
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.agents.proactive.sightings import Sighting
+from evonav.agents.proactive.standing import ALIKE, Placed, covered, likeliest_places, place_by, places_before
+from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
+from evonav.decision.text.language import similarity
 from evonav.decision.text.matcher import matcher_of
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import Presence, judge_presence
-from evonav.sensors.observation import MapFrame, Observation
+from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 
-ALIKE = 0.8
-"""An entry with at least this share of the largest weight is as good as the best one."""
-FURNITURE_M = 0.3
-"""Distance from an object's box within which its room is looked up."""
+BESIDE_M = 1.5
+"""Largest distance between two entries that an agent can stop at together."""
 SAME_SPOT_M = 0.5
 """Distance within which the agent has stood at a place."""
 
@@ -52,61 +50,101 @@ class Proactive(NavigatorAgent):
 
     def _new_navigator(self) -> Navigator:
         navigator = super()._new_navigator()
-        self._presence = PresenceBelief(self.config)
-        self._searched = SearchedCells(self._task.map_frame, self.config)
-        navigator.observers.append(self._presence.see)
-        navigator.observers.append(lambda objects, view, update: self._searched.see(view))
-        self._here: Point2 | None = None
-        self._path: list[Point2] = []
-        """Places of the agent in this stage."""
+        self._belief = TargetBelief(navigator, self._task.map_frame, self._matcher, self.config)
         return navigator
 
     def begin_stage(self, goal: Goal) -> None:
         """Take a new goal, and let things have moved."""
         super().begin_stage(goal)
         self._parsed = self._matcher.parsed(self._goal)
-        self._factors: dict[int, float] = {}
+        range_m = visible_range_m(self._parsed.noun)
+        self._radius_m = min(max(range_m, self.config.min_radius_m), self.config.search_radius_m)
+        self._inspected: set[int] = set()
+        """Entries that the agent has stood before in this stage."""
         self._last: Option | None = None
         self._abandoned: list[Option] = []
+        self._hope = math.inf
+        """Weight of what can still be found elsewhere in this stage, at most."""
         self._is_final = False
         """Whether the agent goes to an entry because nothing else is left, or no time."""
         self._summary: dict[str, Any] = {}
-        self._searched.begin_stage()
-        if goal.stage > 1:
-            around = self._surroundings()
-            visited = frozenset(_room_at(around.rooms, self._task.map_frame, place) for place in self._path)
-            here = NO_ROOM if self._here is None else _room_at(around.rooms, self._task.map_frame, self._here)
-            self._presence.begin_stage(goal.stage, around.room_of, visited, here)
-        self._path = []
+        self._searched_from: list[Point2] = []
+        """Places from which the agent has searched in this stage."""
+        self._belief.begin_stage(self._parsed, goal.stage)
 
     def act(self, observation: Observation) -> AgentAction:
         """Look, update all beliefs, and stop or go on."""
         self._queries.begin_round()
         self._candidates = ()
         navigator, last = self._navigator, self._last
+        self._belief.begin_round()
         navigator.observe(observation)
-        here = self._here = (observation.pose.x_m, observation.pose.z_m)
-        self._path.append(here)
+        here = (observation.pose.x_m, observation.pose.z_m)
+        self._belief.note_place(here)
         is_done = observation.has_arrived or not observation.is_action_success
         arrived_at = None
-        around = self._surroundings()
+        around = self._belief.surroundings()
         if last is not None and last.kind == "place" and is_done:
-            radius_m = self.config.search_radius_m
-            shown = shown_from(last.position_m, self._searched.coarse, around.rooms, radius_m)
-            self._searched.give_up(shown, self.config.searched)
+            shown = shown_from(last.position_m, self._belief.searched.coarse, around.walls, self._radius_m)
+            self._belief.searched.give_up(*shown, self.config.searched)
+            self._searched_from.append(last.position_m)
             self._last = None
-        if last is not None and last.kind == "object" and last.is_reached and is_done:
+        if last is not None and last.kind == "object" and is_done and self._stands_by(last, here):
             arrived_at = navigator.views.resolve(last.key)
-        self._presence.update()
-        posterior = self._posterior(around)
-        stopped = self._stop_in_reach(posterior, observation, arrived_at)
+            self._inspected.add(arrived_at)
+        self._belief.presence.update()
+        posterior = self._belief.posterior(around)
+        stopped = self._stop_in_reach(posterior, around, observation, arrived_at)
+        if stopped is None and last is not None and last.kind == "sighting" and is_done and last.is_reached:
+            stopped = self._stop_at_sighting(posterior, last, observation)
+            posterior = self._belief.posterior(around)
         if stopped is not None:
             return stopped
         if arrived_at is not None:
             self._leave(arrived_at, observation)
         if self._queries.log or arrived_at is not None:  # an identity was denied, or a way was in vain
-            posterior = self._posterior(around)
-        return self._go(self._chosen(posterior, around, observation), posterior, here)
+            posterior = self._belief.posterior(around)
+        chosen = self._chosen(posterior, around, observation)
+        if self._may_have_missed(chosen, observation):
+            self._counters["maps_forgotten"] += 1
+            navigator.explore_anew(observation)
+            self._belief.searched.forget()
+            self._searched_from.clear()
+            around = self._belief.surroundings()
+            posterior = self._belief.posterior(around)
+            chosen = self._chosen(posterior, around, observation)
+        return self._go(chosen, posterior, around, here)
+
+    def _stands_by(self, last: Option, here: Point2) -> bool:
+        """Return whether the agent, which went to an entry, is at its place: not at a frontier on the way to it."""
+        return last.is_reached or math.dist(here, last.face_m) < self.config.stop_within_m
+
+    def _may_have_missed(self, chosen: Option | None, observation: Observation) -> bool:
+        """Return whether nothing is left to go to but what was denied, while there is time to search all anew."""
+        if observation.num_rounds_left <= self.config.anew_rounds:
+            return False
+        if chosen is None:
+            return True
+        return chosen.kind == "object" and self._is_final and (chosen.key in self._belief.factors or chosen.gain <= 0.0)
+
+    def _stop_at_sighting(self, posterior: Posterior, last: Option, observation: Observation) -> Stop | None:
+        """Stop where something with the goal's name is detected, near, and too small to remember; else forget it."""
+        here = (observation.pose.x_m, observation.pose.z_m)
+        for one, weight in posterior.sightings:
+            if math.dist(one.ground_m, last.face_m) > SAME_PLACE_M:
+                continue
+            others = math.fsum(w for _, w in posterior.sightings) - weight + math.fsum(posterior.entries.values())
+            rest = others + float(posterior.moved.sum() + posterior.unseen.sum())
+            is_near = math.dist(one.ground_m, here) < self.config.stop_within_m and self._belief.sightings.is_current(
+                one
+            )
+            is_near &= similarity(self._parsed.noun, one.label) >= NAMED
+            if is_near and weight >= self.config.commit_share * (weight + rest):
+                self._note(posterior)
+                self._record_round("sighting", "seen, and too small to remember")
+                return Stop("sighted")
+            self._belief.sightings.drop(one)
+        return None
 
     def _leave(self, entry_id: int, observation: Observation) -> None:
         """Take in that the agent stands at an entry's place, does not detect it, and does not stop."""
@@ -115,60 +153,38 @@ class Proactive(NavigatorAgent):
             return
         view = observation.views[-1]
         (evidence,) = navigator.objects.depth_evidence([entry_id], view)
-        self._presence.see_nothing_on_arrival(navigator.objects, entry_id, view, evidence)
-        self._presence.update()
-        self._factors[entry_id] = self.config.unfit
+        self._belief.presence.see_nothing_on_arrival(navigator.objects, entry_id, view, evidence)
+        self._belief.presence.update()
+        self._belief.factors[entry_id] = self.config.unfit
 
     def _is_empty(self, entry_id: int, observation: Observation) -> bool:
         """Return whether the view towards an entry sees through its place."""
         (evidence,) = self._navigator.objects.depth_evidence([entry_id], observation.views[-1])
         return judge_presence(evidence, is_detected=False) is Presence.NO
 
-    def _surroundings(self) -> Surroundings:
-        navigator = self._navigator
-        remembered = [navigator.candidate(entry) for entry in navigator.objects.entries]
-        cells = navigator.explorer.map.cells
-        rooms = rooms_of(cells, self._task.map_frame, remembered)
-        room_of = {one.entry_id: _room_by(rooms, self._task.map_frame, one) for one in remembered}
-        return Surroundings(cells, rooms, remembered, room_of, bool(navigator.explorer.frontiers))
-
-    def _posterior(self, around: Surroundings) -> Posterior:
-        return posterior_of(
-            self._parsed,
-            self._matcher,
-            around,
-            self._presence,
-            self._searched,
-            {self._navigator.views.resolve(entry_id): factor for entry_id, factor in self._factors.items()},
-            self._replaced_entries(around),
-            self.config,
-        )
-
-    def _replaced_entries(self, around: Surroundings) -> frozenset[int]:
-        """Return the entries whose objects were found elsewhere: each newer namesake explains the least believed."""
-        presence = self._presence
-        named = [one.entry_id for one in around.remembered if self._matcher.names_goal(self._parsed, one)]
-        replaced: set[int] = set()
-        for newer in sorted(named):
-            gone = [
-                older
-                for older in named
-                if presence.first_stage(older) < presence.first_stage(newer)
-                and presence.p_present(older) < 0.5
-                and older not in replaced
-            ]
-            if gone:
-                replaced.add(min(gone, key=lambda one: (presence.p_present(one), one)))
-        return frozenset(replaced)
-
     def _is_settled(self, entry_id: int, posterior: Posterior) -> bool:
-        """Return whether no search is worth more than to stop at an entry, if it is there."""
-        weight = posterior.entries[entry_id]
-        others = (w for one, w in posterior.entries.items() if one != entry_id and not self._presence.is_verified(one))
-        is_best = weight >= ALIKE * max(posterior.entries.values())
-        return is_best and weight >= self.config.commit_share * (weight + posterior.elsewhere + math.fsum(others))
+        """Return whether no search is worth more than to stop at an entry, and at those beside it, if they are there.
 
-    def _stop_in_reach(self, posterior: Posterior, observation: Observation, arrived_at: int | None) -> Stop | None:
+        It is compared with what can still be found elsewhere, not with other entries that are known to be there: a
+        search does not tell these apart.
+        """
+        weight, beside = posterior.entries[entry_id], 0.0
+        entry = self._navigator.objects.entry(entry_id)
+        rest = min(posterior.elsewhere, self._hope)
+        for one, other in posterior.entries.items():
+            known = self._navigator.objects.entry(one)
+            if one == entry_id or known is None or entry is None:
+                continue
+            if math.dist(known.centre_m, entry.centre_m) <= BESIDE_M:
+                beside += other
+            elif not self._belief.presence.is_verified(one):
+                rest += other
+        is_best = weight >= ALIKE * max(posterior.entries.values())
+        return is_best and weight + beside >= self.config.commit_share * (weight + beside + rest)
+
+    def _stop_in_reach(
+        self, posterior: Posterior, around: Surroundings, observation: Observation, arrived_at: int | None
+    ) -> Stop | None:
         """Stop at an entry that is near and may be the goal; `None` to go on.
 
         It is near if it is detected within `stop_within_m`, or the agent stands where it can be looked at, and its
@@ -184,6 +200,8 @@ class Proactive(NavigatorAgent):
             has_arrived = entry_id == arrived_at and (is_detected or not self._is_empty(entry_id, observation))
             if not has_arrived and not (is_near and is_detected):
                 continue
+            if entry_id != arrived_at and not self._is_well_placed(entry, posterior, around, here):
+                continue
             last = self._last
             is_chosen = self._is_final and last is not None and navigator.views.resolve(last.key) == entry_id
             if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry)):
@@ -191,6 +209,24 @@ class Proactive(NavigatorAgent):
                 self._record_round(f"object {entry_id}", "identified" if is_detected else "at its place", entry_id)
                 return Stop("identified" if is_detected else "at its place")
         return None
+
+    def _entry_places(self, posterior: Posterior) -> list[tuple[Point2, float]]:
+        """Return the middles of the entries with the goal's name, and their weights."""
+        found = ((self._navigator.objects.entry(one), weight) for one, weight in posterior.entries.items())
+        return [((one.centre_m[0], one.centre_m[2]), weight) for one, weight in found if one is not None]
+
+    def _is_well_placed(self, entry: ObjectEntry, posterior: Posterior, around: Surroundings, here: Point2) -> bool:
+        """Return whether no place by an entry has clearly more of the posterior within reach than the agent's own."""
+        placed = self._entry_places(posterior)
+        if len(placed) == 1:
+            return True
+        place = self._place_by((entry.centre_m[0], entry.centre_m[2]), placed, around, here)
+        return place is None or covered(placed, here) >= ALIKE * covered(placed, place)
+
+    def _place_by(self, centre_m: Point2, placed: Placed, around: Surroundings, here: Point2) -> Point2 | None:
+        """Return where to stand by an entry; `None` if no known floor leads there."""
+        places = places_before(centre_m, self._belief.searched.coarse, around, self.config.stand_within_m)
+        return place_by(places, placed, self._navigator.explorer.map, here)
 
     def _may_be_goal(self, entry: ObjectEntry) -> bool:
         """Ask whether an entry contradicts the goal; if it does, it hardly counts for the rest of the stage."""
@@ -201,7 +237,7 @@ class Proactive(NavigatorAgent):
         answer = self._queries.ask(question)
         if answer is False:
             self._counters["identities_denied"] += 1
-            self._factors[entry.id] = self.config.unfit
+            self._belief.factors[entry.id] = self.config.unfit
         return answer is not False
 
     def _chosen(self, posterior: Posterior, around: Surroundings, observation: Observation) -> Option | None:
@@ -209,13 +245,25 @@ class Proactive(NavigatorAgent):
         config, here = self.config, (observation.pose.x_m, observation.pose.z_m)
         likely = sorted(posterior.entries, key=lambda one: (-posterior.entries[one], one))[: config.num_entries]
         entries = [self._entry_option(entry_id, posterior.entries[entry_id]) for entry_id in likely]
-        frontiers = self._navigator.explorer.frontiers
-        gains = frontier_gains(posterior, self._searched.coarse, around.cells, frontiers)
+        frontiers = around.frontiers
+        gains = frontier_gains(posterior, around)
         options = [Option("frontier", one.id, one.position_m, one.position_m, gains[one.id], 0.0) for one in frontiers]
-        places = places_to_search(posterior, self._searched.coarse, around.cells, around.rooms, config)
-        options += [Option("place", number, eye, face, gain, 0.0) for number, eye, face, gain in places]
+        places = places_to_search(
+            posterior.moved + posterior.unseen, self._belief.searched.coarse, around, self._radius_m, config
+        )
+        options += [
+            Option("place", number, eye, face, gain, 0.0)
+            for number, eye, face, gain in places
+            if all(math.dist(eye, other) > SAME_PLACE_M for other in self._searched_from)
+        ]
+        options += [
+            self._sighting_option(number, one, w, around) for number, (one, w) in enumerate(posterior.sightings)
+        ]
         reached = with_ways(self._navigator.explorer.map, here, [*entries, *options])
-        entries, options = reached[: len(entries)], [one for one in reached[len(entries) :] if one.is_reached]
+        entries, options = reached[: len(entries)], reached[len(entries) :]
+        options = [one for one in options if one.is_reached or one.kind == "sighting"]
+        max_way_m = observation.num_rounds_left * self.sensors.max_travel_m
+        self._hope = math.fsum(one.gain for one in options if one.way_m <= max_way_m)
         self._candidates = tuple(one.key for one in sorted(entries, key=lambda one: (-one.gain, one.key))[:5])
         best = self._best_entry(entries)
         if best is not None:
@@ -223,18 +271,38 @@ class Proactive(NavigatorAgent):
             if config.keeps_reserve and observation.num_rounds_left <= rounds:
                 self._is_final = True
                 return best
+        if config.keeps_reserve and observation.num_rounds_left <= config.last_rounds:
+            last_place = self._likeliest_place(posterior, around, observation)
+            if last_place is not None:
+                self._is_final = True
+                return last_place
+        if best is not None:
             self._is_final = False
-            is_verified = self._presence.is_verified(best.key)
+            is_verified = self._belief.presence.is_verified(best.key)
             if posterior.share(best.key) >= config.commit_share or (
                 is_verified and self._is_settled(best.key, posterior)
             ):
                 return best
-        options += [one for one in entries if not self._presence.is_verified(one.key)]
+        options += [one for one in entries if self._is_worth_a_look(one.key)]
         found = best_option(options, self._last, self._abandoned, config)
         if found is None or found.gain <= 0.0:
             self._is_final = True
             return best or self._related(around, here)
         return found
+
+    def _likeliest_place(self, posterior: Posterior, around: Surroundings, observation: Observation) -> Option | None:
+        """Return where to be when the rounds run out: by the largest part of the posterior that is within reach."""
+        here = (observation.pose.x_m, observation.pose.z_m)
+        placed = self._entry_places(posterior) + [(one.ground_m, weight) for one, weight in posterior.sightings]
+        places = likeliest_places(posterior, placed, self._belief.searched.coarse, around)
+        max_way_m = (observation.num_rounds_left - 1) * self.sensors.max_travel_m
+        ways = with_ways(self._navigator.explorer.map, here, places)
+        near = [one for one in ways if one.is_reached and one.way_m <= max_way_m]
+        return max(near, key=lambda one: (one.gain, -one.way_m, -one.key), default=None)
+
+    def _is_worth_a_look(self, entry_id: int) -> bool:
+        """Return whether an entry is not verified, or was only seen in passing: what is around it tells more."""
+        return not self._belief.presence.is_verified(entry_id) or entry_id not in self._inspected
 
     def _entry_option(self, entry_id: int, weight: float) -> Option:
         entry = self._navigator.objects.entry(entry_id)
@@ -243,6 +311,12 @@ class Proactive(NavigatorAgent):
         return Option(
             "object", entry_id, self._navigator.observation_point(centre_m) or centre_m, centre_m, weight, 0.0
         )
+
+    def _sighting_option(self, number: int, one: Sighting, weight: float, around: Surroundings) -> Option:
+        """Return the place nearest to a sighting that no known wall hides from it, or the sighting's own."""
+        places = places_before(one.ground_m, self._belief.searched.coarse, around, self.config.stand_within_m)
+        place = min(places, key=lambda place: (math.dist(place, one.ground_m), place), default=one.ground_m)
+        return Option("sighting", number, place, one.ground_m, weight, 0.0)
 
     def _best_entry(self, entries: list[Option]) -> Option | None:
         """Return the nearest of the entries with about the largest weight."""
@@ -256,7 +330,7 @@ class Proactive(NavigatorAgent):
         options = with_ways(self._navigator.explorer.map, here, [self._entry_option(o.entry_id, 0.0) for o in near])
         return min(options, key=lambda one: (one.way_m, one.key), default=None)
 
-    def _go(self, option: Option | None, posterior: Posterior, here: Point2) -> AgentAction:
+    def _go(self, option: Option | None, posterior: Posterior, around: Surroundings, here: Point2) -> AgentAction:
         """Go to what was chosen; to an object that the map does not reach, by way of the frontier nearest to it."""
         self._note(posterior)
         last, self._last = self._last, option
@@ -265,29 +339,31 @@ class Proactive(NavigatorAgent):
         if option is None:
             self._record_round("none", "nothing left to go to")
             return Stop("nothing left to go to")
-        explorer = self._navigator.explorer
+        explorer, position_m = self._navigator.explorer, option.position_m
+        if option.kind == "frontier":
+            chosen = next(one for one in explorer.frontiers if one.id == option.key)
+            return self._go_to_frontier(chosen, "most likely a metre")
         if option.kind == "object":
             is_related = option.key not in posterior.entries
             if is_related and last is not None and last.key == option.key and option.way_m <= SAME_SPOT_M:
                 self._record_round(f"object {option.key}", "the goal should be here", option.key)
                 return Stop("nothing left to go to")
-            frontier = None if option.is_reached else nearest_frontier(explorer.frontiers, option.position_m)
-            reason = f"{posterior.share(option.key):.0%} likely at its place"
-            self._record_round(f"object {option.key}", reason, option.key)
-            if frontier is not None:
-                position_m, face_m = explorer.go_to(frontier)
-                return NavigateTo(position_m, face_m=face_m)
-            explorer.stop_exploring()
-            return NavigateTo(option.position_m, face_m=option.face_m)
-        if option.kind == "frontier":
-            return self._go_to_frontier(
-                next(one for one in explorer.frontiers if one.id == option.key), "most likely a metre"
-            )
+            self._record_round(f"object {option.key}", f"{posterior.share(option.key):.0%} likely here", option.key)
+            if not is_related:
+                placed = self._entry_places(posterior)
+                position_m = self._place_by(option.face_m, placed, around, here) or position_m
+        elif option.kind == "sighting":
+            self._record_round("sighting", "seen from afar")
+        else:
+            self._summary["search_position_m"] = list(position_m)
+            self._record_round("search", "most likely a metre")
+        frontier = None if option.is_reached else nearest_frontier(explorer.frontiers, position_m)
+        if frontier is not None:
+            position_m, face_m = explorer.go_to(frontier)
+            return NavigateTo(position_m, face_m=face_m)
         explorer.stop_exploring()
-        self._summary["search_position_m"] = list(option.position_m)
-        self._record_round("search", "most likely a metre")
-        is_elsewhere = math.dist(option.face_m, option.position_m) > 1e-6
-        return NavigateTo(option.position_m, face_m=option.face_m if is_elsewhere else None)
+        is_elsewhere = math.dist(option.face_m, position_m) > 1e-6
+        return NavigateTo(position_m, face_m=option.face_m if is_elsewhere else None)
 
     def _note(self, posterior: Posterior) -> None:
         """Store the summary of the posterior for the records."""
@@ -299,7 +375,8 @@ class Proactive(NavigatorAgent):
         }
 
     def _round_counters(self) -> Mapping[str, int]:
-        return {**self._queries.counters, "identity_checks": 0, "identities_denied": 0, **self._counters}
+        own = {"identity_checks": 0, "identities_denied": 0, "maps_forgotten": 0}
+        return {**self._queries.counters, **own, **self._counters}
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         return {**super()._round_details(reason), **self._summary}
@@ -317,16 +394,3 @@ class ProactiveOracleTheta(Proactive):
 
     def __init__(self, config: ProactiveConfig | None = None, decision: DecisionModel | None = None) -> None:
         super().__init__(config or ProactiveConfig(prior="oracle-theta"), decision)
-
-
-def _room_at(rooms: NDArray[np.int32], frame: MapFrame, place_m: Point2) -> int:
-    row = math.floor((place_m[1] - frame.corner_m[1]) / frame.cell_m)
-    col = math.floor((place_m[0] - frame.corner_m[0]) / frame.cell_m)
-    return int(rooms[row, col]) if 0 <= row < frame.rows and 0 <= col < frame.cols else NO_ROOM
-
-
-def _room_by(rooms: NDArray[np.int32], frame: MapFrame, one: ObjectCandidate) -> int:
-    """Return the room of most cells under and around an object."""
-    numbers = rooms[box_slices(one, frame, FURNITURE_M)]
-    numbers = numbers[numbers != NO_ROOM]
-    return int(np.bincount(numbers).argmax()) if numbers.size else NO_ROOM

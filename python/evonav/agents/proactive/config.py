@@ -51,35 +51,49 @@ class ProactiveConfig:
     """Share by which another place must be better than the one to which the agent goes."""
     stop_within_m: float = 1.8
     """Distance from the middle of a detected entry at which the agent stops."""
+    stand_within_m: float = 1.6
+    """Distance from the middle of an entry within which the agent goes to stand."""
     unfit: float = 0.1
     """Factor of an entry whose identity was denied, for the rest of the stage."""
     reserve_rounds: int = 3
     """Rounds that are kept beyond those that the way to the best entry takes."""
+    last_rounds: int = 5
+    """Rounds before the end from which the agent goes to where the target most likely is within reach."""
+    anew_rounds: int = 25
+    """Rounds that must be left to search the house anew when nothing else is left."""
+    min_radius_m: float = 1.0
+    """Distance within which the agent goes to look for even the smallest things."""
     search_radius_m: float = 2.5
     """Distance within which a place to stand shows the floor and the furniture around it."""
     detection_range_m: float = 3.5
     """Distance within which cells count as seen; detections farther away are not remembered."""
     detection_rate: float = 0.9
     """Probability that a view finds an object in a cell that it shows."""
-    small_detection_rate: float = 0.7
-    """The same for objects smaller than `small_edge_m`."""
-    small_edge_m: float = 0.25
-    """Edge of the cube with an object's volume below which it is small."""
-    support_ratio: float = 20.0
-    """Factor of places on what the text names as the support: the text fits there, and small things stand on things."""
+    on_support: float = 0.95
+    """Probability that the target is on a thing of the type that the text names as its support, as `looks` has it."""
+    min_supports: float = 0.5
+    """Smallest number of such things that share the target."""
     anchor_ratio: float = 4.0
     """Factor of places by what the text names as a neighbour."""
     anchor_m: float = 0.75
     """Distance from the box of such a thing within which places are by it."""
     room_ratio: float = 4.0
     """Factor of a room of the type that the text names; its inverse is that of rooms of other types."""
+    far_beyond: float = 0.25
+    """Share of the unknown area that no frontier leads to directly which belongs to the house, and can be reached."""
+    same_room_beyond: float = 0.75
+    """Probability that what is behind a frontier belongs to the frontier's room."""
+    same_room_beyond_door: float = 0.25
+    """The same for a frontier at a door."""
     searched: float = 0.3
     """Factor of the weight that a place to search from has promised, once the agent has been there."""
     abandoned: float = 0.5
     """Factor of a place or frontier for each time that the agent turned away from it before it was there."""
     num_entries: int = 8
     """Largest number of entries to go to that are compared."""
-    num_places: int = 64
+    num_places: int = 12
     """Largest number of places to search from that are compared."""
-    navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS))
-    """Parameters of the shared navigator: the map is never cleared, and the last observation of a cell wins."""
+    navigator: NavigatorConfig = field(
+        default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS, background=("wall", "floor"))
+    )
+    """Parameters of the shared navigator: the last observation of a cell wins, and doors are remembered."""

@@ -8,18 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
+from evonav.agents.proactive.places import prior_of, visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief
 from evonav.agents.proactive.priors import room_ratios
-from evonav.agents.proactive.rooms import NO_ROOM, box_slices
+from evonav.agents.proactive.rooms import NO_ROOM, box_distance_m
 from evonav.agents.proactive.searched import SearchedCells
-from evonav.decision.appearance.statistics import PER_100_M2, UNKNOWN_PER_100_M2, usual_size
+from evonav.agents.proactive.sightings import Sighting
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.text.language import ParsedGoal, is_structure, similarity
+from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher
-from evonav.memory.occupancy import UNKNOWN
+from evonav.memory import Frontier
 
-FULL_KNOWN_SHARE = 0.5
-"""Share of a coarse cell's map cells that must be unknown for it to count as unknown."""
+AT_DOOR_M = 0.75
+"""Largest distance between a frontier and the box of a door that leads to what is behind it."""
+NAMED = 0.99
+"""Similarity from which a label is the goal's name."""
+SIGHTED = 0.9
+"""Weight of a sighting: that of an entry about whose looks and surroundings nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,8 @@ class Posterior:
 
     entries: Mapping[int, float]
     """Weight of the stored place of each entry with the goal's name, by id."""
+    sightings: Sequence[tuple[Sighting, float]]
+    """Detections without an entry that may be of the goal, or of what the goal is on, and the weight of each."""
     moved: NDArray[np.float64]
     """`(R, C)` weight of each coarse cell as the present place of a remembered object that is no longer at its own."""
     unseen: NDArray[np.float64]
@@ -43,7 +50,7 @@ class Posterior:
     @property
     def elsewhere(self) -> float:
         """Weight of all places without an entry of the goal's name."""
-        return float(self.moved.sum() + self.unseen.sum())
+        return float(self.moved.sum() + self.unseen.sum()) + math.fsum(weight for _, weight in self.sightings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +64,15 @@ class Surroundings:
     remembered: Sequence[ObjectCandidate]
     room_of: Mapping[int, int]
     """Room of each entry."""
-    has_frontiers: bool
+    unknown: NDArray[np.bool_]
+    """`(R, C)` coarse cells that the map does not know, and under nothing remembered: rays end at furniture's edge."""
+    free: NDArray[np.bool_]
+    """`(R, C)` coarse cells that are free in all of their area."""
+    walls: NDArray[np.bool_]
+    """`(R, C)` cells of its map that are blocked, and by nothing remembered."""
+    frontiers: Sequence[Frontier]
+    owners: NDArray[np.int32]
+    """`(R, C)` index of the frontier behind which each coarse cell lies; `NO_ROOM` elsewhere."""
 
 
 def posterior_of(
@@ -66,6 +81,7 @@ def posterior_of(
     around: Surroundings,
     presence: PresenceBelief,
     searched: SearchedCells,
+    sightings: Sequence[Sighting],
     factors: Mapping[int, float],
     replaced: frozenset[int],
     config: ProactiveConfig,
@@ -77,6 +93,7 @@ def posterior_of(
         matcher: Compares the goal with what is remembered.
         around: The memory.
         presence: Belief in each entry.
+        sightings: Everything that was detected and is no entry.
         searched: Probabilities that the views of this stage, and of all stages, missed the target.
         factors: Further factors of entries, such as of those whose identity was denied; 1 if not given.
         replaced: Entries whose objects were found at other places.
@@ -85,12 +102,11 @@ def posterior_of(
     named = [one for one in around.remembered if matcher.names_goal(goal, one)]
     appearances = matcher.appearance_ratios(goal, named) if config.uses_text else [1.0] * len(named)
     fits = matcher.context_ratios(goal, named, around.remembered) if config.uses_text else [1.0] * len(named)
-    size = usual_size(goal.noun)
-    is_small = size is not None and size[0] < config.small_edge_m
+    range_m = visible_range_m(goal.noun)
     coarse = searched.coarse
-    unknown = (coarse.taken(around.cells, UNKNOWN) == UNKNOWN).mean(axis=2) > FULL_KNOWN_SHARE
+    unknown = around.unknown
     rooms = np.asarray(coarse.taken(around.rooms, NO_ROOM).max(axis=2), np.int32)
-    prior = _anchored(goal, around, searched, config)
+    prior, leads = prior_of(goal, around.remembered, sightings, coarse, unknown, config)
 
     entries: dict[int, float] = {}
     by_room: dict[int, float] = {}
@@ -100,17 +116,24 @@ def posterior_of(
         if one.entry_id not in replaced:
             room = around.room_of.get(one.entry_id, NO_ROOM)
             by_room[room] = by_room.get(room, 0.0) + appearance * (1.0 - p_present)
-    moved = _moved(by_room, rooms, ~unknown, prior, config) * searched.missed(is_small=is_small)
+    moved = _moved(by_room, rooms, ~unknown, prior, config) * searched.missed(range_m)
 
+    room_factors = _room_factors(goal, matcher, around, rooms, unknown, config)
+    rated = [
+        (one, SIGHTED * coarse.value_at(room_factors, one.ground_m))
+        for one in sightings
+        if similarity(goal.noun, one.label) >= NAMED
+    ]
+    rated += [(one, share * coarse.value_at(room_factors, one.ground_m)) for one, share in leads]
     unseen = np.zeros_like(prior)
-    if around.has_frontiers or not unknown.all():
-        density = PER_100_M2.get(goal.noun, UNKNOWN_PER_100_M2) / 100.0 * coarse.frame.cell_m**2
-        unseen = density * prior * _room_factors(goal, matcher, around, rooms, config)
-        unseen *= searched.ever_missed(is_small=is_small)
-        if not around.has_frontiers:
+    if around.frontiers or not unknown.all():
+        unseen = prior * room_factors * searched.ever_missed(range_m)
+        unseen[unknown & (around.owners == NO_ROOM)] *= config.far_beyond
+        if not around.frontiers:
             unseen[unknown] = 0.0  # nothing leads there
     total = math.fsum(entries.values()) + float(moved.sum()) + float(unseen.sum())
-    return Posterior(entries, moved, unseen, unknown, total)
+    total += math.fsum(weight for _, weight in rated)
+    return Posterior(entries, rated, moved, unseen, unknown, total)
 
 
 def _moved(
@@ -135,30 +158,12 @@ def _moved(
     return moved
 
 
-def _anchored(
-    goal: ParsedGoal, around: Surroundings, searched: SearchedCells, config: ProactiveConfig
-) -> NDArray[np.float64]:
-    """Return `(R, C)`: 1, and more at what the text names, if it is remembered."""
-    frame = searched.coarse.frame
-    prior = np.ones((frame.rows, frame.cols))
-    if not config.uses_anchors:
-        return prior
-    for relation in goal.relations:
-        if relation.kind == "in" or is_structure(relation.noun):
-            continue
-        near = np.zeros_like(prior, np.bool_)
-        for one in around.remembered:
-            if similarity(relation.noun, one.label) >= 1.0:
-                near[box_slices(one, frame, 0.0 if relation.kind == "on" else config.anchor_m)] = True
-        prior[near] *= config.support_ratio if relation.kind == "on" else config.anchor_ratio
-    return prior
-
-
 def _room_factors(
     goal: ParsedGoal,
     matcher: Matcher,
     around: Surroundings,
     rooms: NDArray[np.int32],
+    unknown: NDArray[np.bool_],
     config: ProactiveConfig,
 ) -> NDArray[np.float64]:
     """Return `(R, C)`: how much likelier the target is in a cell by the type of its room; 1 where that is unknown."""
@@ -172,11 +177,21 @@ def _room_factors(
         room = around.room_of.get(one.entry_id, NO_ROOM)
         if kind is not None and room != NO_ROOM:
             signs.setdefault(room, []).append(kind)
+    by_room: dict[int, float] = {}
     for room, kinds in signs.items():
         kind = max(sorted(set(kinds)), key=kinds.count)
         if goal.room is not None:
             factor = config.room_ratio if kind == goal.room else 1.0 / config.room_ratio
         else:
             factor = ratios.get(kind, 1.0)
+        by_room[room] = factor
         factors[rooms == room] = factor
+    doors = [one for one in around.remembered if canonical(one.label) == "doorway"]
+    for index, frontier in enumerate(around.frontiers):
+        numbers = around.rooms[frontier.cells[:, 0], frontier.cells[:, 1]]
+        numbers = numbers[numbers != NO_ROOM]
+        room = int(np.bincount(numbers).argmax()) if numbers.size else NO_ROOM
+        is_at_door = any(box_distance_m(door, frontier.position_m) <= AT_DOOR_M for door in doors)
+        share = config.same_room_beyond_door if is_at_door else config.same_room_beyond
+        factors[(around.owners == index) & unknown] = share * by_room.get(room, 1.0) + 1.0 - share
     return factors

@@ -1,9 +1,11 @@
 """Rooms of the agent's own map: free floor, cut where it is as narrow as a door."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.memory.occupancy import FREE
 from evonav.sensors.observation import MapFrame
 
@@ -12,6 +14,8 @@ DOOR_HALF_WIDTH_M = 0.6
 """Floor less than twice this wide is a neck: ProcTHOR's doorways are about a metre wide."""
 MIN_ROOM_M2 = 0.25
 """Smallest core of a room: what is left of it after this width is taken from all of its edges."""
+SHRINK = 2
+"""Rooms are found on a grid of blocks of this many rows and columns of cells."""
 MAX_GROWTH_M = 2.0
 """Distance over which rooms grow back from their cores."""
 
@@ -31,9 +35,16 @@ def rooms_of(cells: NDArray[np.uint8], frame: MapFrame, furniture: list[ObjectCa
     for one in furniture:
         if one.centre_m[1] - one.size_m[1] / 2 < 0.3:  # it stands on the floor
             floor[box_slices(one, frame, 0.0)] = True
-    depth = max(1, round(DOOR_HALF_WIDTH_M / frame.cell_m))
-    rooms = numbered(eroded(floor, depth), min_cells=max(1, round(MIN_ROOM_M2 / frame.cell_m**2)))
-    return grown(rooms, floor, round(MAX_GROWTH_M / frame.cell_m))
+    edge_m, (rows, cols) = frame.cell_m * SHRINK, (size // SHRINK for size in floor.shape)
+    blocks = floor[: rows * SHRINK, : cols * SHRINK].reshape(rows, SHRINK, cols, SHRINK)
+    depth = max(1, round(DOOR_HALF_WIDTH_M / edge_m))
+    cores = numbered(eroded(blocks.all(axis=(1, 3)), depth), min_cells=max(1, round(MIN_ROOM_M2 / edge_m**2)))
+    small_rooms = grown(cores, blocks.any(axis=(1, 3)), round(MAX_GROWTH_M / edge_m))
+    rooms = np.full(floor.shape, NO_ROOM, np.int32)
+    large = small_rooms.repeat(SHRINK, axis=0).repeat(SHRINK, axis=1)
+    rooms[: large.shape[0], : large.shape[1]] = large
+    rooms[~floor] = NO_ROOM
+    return rooms
 
 
 def box_slices(one: ObjectCandidate, frame: MapFrame, margin_m: float) -> tuple[slice, slice]:
@@ -45,6 +56,15 @@ def box_slices(one: ObjectCandidate, frame: MapFrame, margin_m: float) -> tuple[
         high = int(np.ceil((one.centre_m[axis] + half_m - corner) / frame.cell_m))
         slices.append(slice(min(max(low, 0), size), min(max(high, 0), size)))
     return slices[0], slices[1]
+
+
+def box_distance_m(one: ObjectCandidate, place_m: Point2) -> float:
+    """Return the distance of a place from an object's box on the ground plane; 0 inside."""
+    gaps = (
+        max(0.0, abs(place - one.centre_m[axis]) - one.size_m[axis] / 2.0)
+        for place, axis in zip(place_m, (0, 2), strict=True)
+    )
+    return math.hypot(*gaps)
 
 
 def eroded(floor: NDArray[np.bool_], depth: int) -> NDArray[np.bool_]:

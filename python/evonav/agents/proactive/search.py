@@ -9,17 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.proactive.config import ProactiveConfig
-from evonav.agents.proactive.posterior import Posterior
-from evonav.agents.proactive.rooms import NO_ROOM, grown
+from evonav.agents.proactive.posterior import Posterior, Surroundings
+from evonav.agents.proactive.rooms import NO_ROOM, box_slices, grown
 from evonav.agents.proactive.searched import CoarseFrame
-from evonav.decision.candidates import Point2
+from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.memory import Frontier
-from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN, OccupancyMap
+from evonav.memory.occupancy import BLOCKED, UNKNOWN, OccupancyMap
+from evonav.sensors.observation import MapFrame
 
-FRONTIER_REACH_M = 3.0
+FULL_KNOWN_SHARE = 0.5
+"""Share of a coarse cell's map cells that must be unknown for it to count as unknown."""
+FRONTIER_REACH_M = 4.0
 """Number of steps over unknown cells, times their edge, up to which they count as behind a frontier."""
 SAME_PLACE_M = 0.75
 """Two rounds' options of one kind are the same if their places are this near: frontiers change with what is seen."""
+NUM_SIGHT_SAMPLES = 8
+"""Number of places on a line of sight that must not be in a wall."""
+BESIDE_M = 0.25
+"""Distance from an object's box within which blocked cells are its own: the agent fits nowhere there."""
 UNREACHED = 1.5
 """Factor of the straight line to what no known floor leads to."""
 
@@ -28,9 +35,9 @@ UNREACHED = 1.5
 class Option:
     """A place to go to."""
 
-    kind: Literal["object", "frontier", "place"]
+    kind: Literal["object", "frontier", "place", "sighting"]
     key: int
-    """Id of an entry or a frontier, or number of a coarse cell."""
+    """Id of an entry or a frontier, number of a coarse cell, or of a sighting."""
     position_m: Point2
     """Place to stand."""
     face_m: Point2
@@ -41,85 +48,127 @@ class Option:
     """Whether known floor leads there."""
 
 
-def frontier_gains(
-    posterior: Posterior, coarse: CoarseFrame, cells: NDArray[np.uint8], frontiers: Sequence[Frontier]
-) -> dict[int, float]:
-    """Return the weight of what may be seen from each frontier, by id.
+def unknown_cells(
+    coarse: CoarseFrame, cells: NDArray[np.uint8], remembered: Sequence[ObjectCandidate]
+) -> NDArray[np.bool_]:
+    """Return the `(R, C)` coarse cells that are unknown in most of their area and under nothing remembered."""
+    unknown: NDArray[np.bool_] = (coarse.taken(cells, UNKNOWN) == UNKNOWN).mean(axis=2) > FULL_KNOWN_SHARE
+    for one in remembered:
+        unknown[box_slices(one, coarse.frame, 0.0)] = False
+    return unknown
+
+
+def owners_of(
+    coarse: CoarseFrame, cells: NDArray[np.uint8], unknown: NDArray[np.bool_], frontiers: Sequence[Frontier]
+) -> NDArray[np.int32]:
+    """Return the frontier behind which each coarse cell lies.
 
     Args:
-        posterior: Weights of the coarse cells.
-        coarse: Their grid.
+        coarse: The grid.
         cells: `(R, C)` of the agent's map.
+        unknown: `(R, C)` coarse cells that are unknown.
         frontiers: The frontiers.
 
     Returns:
-        The weight of the coarse cells of a frontier's region, and of the unknown ones beyond it that can be reached
-        without crossing a blocked cell; each counts for the frontier from which it is reached first.
+        `(R, C)` index of the frontier to whose region a cell belongs, or from which it is reached first over unknown
+        cells without crossing a blocked one; `NO_ROOM` elsewhere.
     """
-    owners = np.full(posterior.unknown.shape, NO_ROOM, np.int32)
+    owners = np.full((coarse.frame.rows, coarse.frame.cols), NO_ROOM, np.int32)
     for index, frontier in enumerate(frontiers):
         owners[frontier.cells[:, 0] // coarse.step, frontier.cells[:, 1] // coarse.step] = index
-    is_open = posterior.unknown & (coarse.taken(cells, UNKNOWN) != BLOCKED).all(axis=2)
-    owners = grown(owners, is_open, round(FRONTIER_REACH_M / coarse.frame.cell_m))
-    is_owned = owners != NO_ROOM
-    sums = np.bincount(owners[is_owned], posterior.unseen[is_owned], minlength=len(frontiers)).tolist()
-    return {frontier.id: gain for frontier, gain in zip(frontiers, sums, strict=True)}
+    is_open = unknown & (coarse.taken(cells, UNKNOWN) != BLOCKED).all(axis=2)
+    return grown(owners, is_open, round(FRONTIER_REACH_M / coarse.frame.cell_m))
+
+
+def frontier_gains(posterior: Posterior, around: Surroundings) -> dict[int, float]:
+    """Return the weight of what was never seen behind each frontier, by id."""
+    is_owned = around.owners != NO_ROOM
+    counts = np.bincount(around.owners[is_owned], posterior.unseen[is_owned], minlength=len(around.frontiers))
+    return {frontier.id: gain for frontier, gain in zip(around.frontiers, counts.tolist(), strict=True)}
 
 
 def places_to_search(
-    posterior: Posterior,
-    coarse: CoarseFrame,
-    cells: NDArray[np.uint8],
-    rooms: NDArray[np.int32],
-    config: ProactiveConfig,
+    weights: NDArray[np.float64], coarse: CoarseFrame, around: Surroundings, radius_m: float, config: ProactiveConfig
 ) -> list[tuple[int, Point2, Point2, float]]:
-    """Return places on the floor from which cells of the same room can be searched.
+    """Return the places on the floor from which most can be searched.
 
     Args:
-        posterior: Weights of the cells.
-        coarse: The grid of the weights.
-        cells: `(R, C)` of the agent's map.
-        rooms: `(R, C)` room of each cell of the map.
+        weights: `(R, C)` of the posterior, of the coarse cells that can be searched.
+        coarse: Their grid.
+        around: The memory.
+        radius_m: Distance within which a place shows the target.
         config: The agent's parameters.
 
     Returns:
         Number of the coarse cell, place to stand, middle of what is found there, and its weight.
     """
-    is_free = (coarse.taken(cells, 0) == FREE).all(axis=2)
-    rows, cols = np.nonzero(is_free)
-    if len(rows) == 0:
-        return []
-    step = max(1, math.ceil(math.sqrt(len(rows) / config.num_places)))
-    on_lattice = (rows % step == step // 2) & (cols % step == step // 2)
-    rows, cols = (rows[on_lattice], cols[on_lattice]) if on_lattice.any() else (rows[:1], cols[:1])
-    weights = np.where(posterior.unknown, 0.0, posterior.moved + posterior.unseen)
-    room = np.asarray(coarse.taken(rooms, -1).max(axis=2))
-    others = np.nonzero(weights > 0.0)
-    centres_m = coarse.centres_m()
-    eyes_m, seen_m = centres_m[rows, cols], centres_m[others]
-    dx_m, dz_m = (seen_m[None, :, axis] - eyes_m[:, None, axis] for axis in (0, 1))
-    shown = dx_m * dx_m + dz_m * dz_m <= config.search_radius_m**2
-    shown &= (room[others][None] == room[rows, cols][:, None]) | (room[others][None] == NO_ROOM)
-    gains = shown * weights[others][None]
-    sums = gains.sum(axis=1)
-    middles = np.einsum("es,sk->ek", gains, seen_m) / np.maximum(sums, 1e-300)[:, None]
-    numbers = (rows * coarse.frame.cols + cols).tolist()
-    return [
-        (number, (eye[0], eye[1]), (middle[0], middle[1]), gain)
-        for number, eye, middle, gain in zip(numbers, eyes_m.tolist(), middles.tolist(), sums.tolist(), strict=True)
-        if gain > 0.0
-    ]
+    sums = np.where(around.free, window_sums(weights, max(1, round(0.8 * radius_m / coarse.frame.cell_m))), 0.0)
+    spacing = max(1, round(SAME_PLACE_M / coarse.frame.cell_m) - 1)
+    found = []
+    for _ in range(config.num_places):
+        row, col = (int(one) for one in np.unravel_index(int(sums.argmax()), sums.shape))
+        if sums[row, col] <= 0.0:
+            break
+        sums[max(0, row - spacing) : row + spacing + 1, max(0, col - spacing) : col + spacing + 1] = 0.0
+        eye = coarse.centre_m(row, col)
+        rows, cols = shown_from(eye, coarse, around.walls, radius_m)
+        gains = weights[rows, cols]
+        gain = float(gains.sum())
+        if gain > 0.0:
+            x_m, z_m = coarse.centre_m(float(gains @ rows) / gain, float(gains @ cols) / gain)
+            found.append((row * coarse.frame.cols + col, eye, (x_m, z_m), gain))
+    return found
 
 
-def shown_from(place_m: Point2, coarse: CoarseFrame, rooms: NDArray[np.int32], radius_m: float) -> NDArray[np.bool_]:
-    """Return the `(R, C)` coarse cells within a distance of a place that are in its room, or in none."""
-    room = np.asarray(coarse.taken(rooms, NO_ROOM).max(axis=2))
+def window_sums(weights: NDArray[np.float64], half: int) -> NDArray[np.float64]:
+    """Return the `(R, C)` sums over the square of `2 * half + 1` cells around each cell."""
+    padded = np.pad(weights, ((half + 1, half), (half + 1, half))).cumsum(axis=0).cumsum(axis=1)
+    size = 2 * half + 1
+    sums: NDArray[np.float64] = (
+        padded[size:, size:] - padded[:-size, size:] - padded[size:, :-size] + padded[:-size, :-size]
+    )
+    return sums
+
+
+def shown_from(
+    place_m: Point2, coarse: CoarseFrame, walls: NDArray[np.bool_], radius_m: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows and columns of the coarse cells within a distance of a place that no wall hides from it.
+
+    Args:
+        place_m: `(x, z)`.
+        coarse: The grid.
+        walls: `(R, C)` cells of the agent's map that are blocked, and by nothing remembered.
+        radius_m: The distance.
+    """
     frame = coarse.frame
-    row = min(max(int((place_m[1] - frame.corner_m[1]) / frame.cell_m), 0), frame.rows - 1)
-    col = min(max(int((place_m[0] - frame.corner_m[0]) / frame.cell_m), 0), frame.cols - 1)
-    gaps_m = np.hypot(*np.moveaxis(coarse.centres_m() - np.array(place_m), -1, 0))
-    shown: NDArray[np.bool_] = (gaps_m <= radius_m) & ((room == room[row, col]) | (room == NO_ROOM))
-    return shown
+    reach = math.ceil(radius_m / frame.cell_m)
+    at_row, at_col = ((place_m[axis] - frame.corner_m[axis]) / frame.cell_m - 0.5 for axis in (1, 0))
+    rows, cols = (
+        grid.ravel()
+        for grid in np.meshgrid(
+            np.arange(max(0, round(at_row) - reach), min(frame.rows, round(at_row) + reach + 1)),
+            np.arange(max(0, round(at_col) - reach), min(frame.cols, round(at_col) + reach + 1)),
+            indexing="ij",
+        )
+    )
+    near = (rows - at_row) ** 2 + (cols - at_col) ** 2 <= (radius_m / frame.cell_m) ** 2
+    rows, cols = rows[near], cols[near]
+    along = np.linspace(0.15, 0.85, NUM_SIGHT_SAMPLES)[:, None]
+    fine_rows = ((at_row + along * (rows - at_row) + 0.5) * coarse.step).astype(np.int64)
+    fine_cols = ((at_col + along * (cols - at_col) + 0.5) * coarse.step).astype(np.int64)
+    np.clip(fine_rows, 0, walls.shape[0] - 1, out=fine_rows)
+    np.clip(fine_cols, 0, walls.shape[1] - 1, out=fine_cols)
+    is_clear = ~walls[fine_rows, fine_cols].any(axis=0)
+    return rows[is_clear], cols[is_clear]
+
+
+def walls_of(cells: NDArray[np.uint8], frame: MapFrame, remembered: Sequence[ObjectCandidate]) -> NDArray[np.bool_]:
+    """Return the `(R, C)` blocked cells of the map that are not under or beside anything remembered."""
+    walls: NDArray[np.bool_] = cells == BLOCKED
+    for one in remembered:
+        walls[box_slices(one, frame, BESIDE_M)] = False
+    return walls
 
 
 def with_ways(occupancy: OccupancyMap, here_m: Point2, options: Sequence[Option]) -> list[Option]:

@@ -14,6 +14,8 @@ from evonav.world.simulator import Intrinsics
 
 CELL_M = 0.25
 """Wanted edge of a cell, which is a whole number of the map's cells."""
+RANGES_M = (0.9, 1.3, 1.8, 2.5, 3.5)
+"""Distances on the ground plane up to which things of different sizes are detected."""
 STRIDES = (5, 3)
 """Every fifth pixel of every fifth row is looked at, if the size of the image allows it; else every third, or all."""
 
@@ -42,12 +44,20 @@ class CoarseFrame:
         padded = np.pad(cells, ((0, missing[0]), (0, missing[1])), constant_values=rest)
         return padded.reshape(rows, step, cols, step).transpose(0, 2, 1, 3).reshape(rows, cols, step * step)
 
-    def centres_m(self) -> NDArray[np.float64]:
-        """Return the `(R, C, 2)` middles of the cells, `(x, z)`."""
+    def centre_m(self, row: float, col: float) -> tuple[float, float]:
+        """Return the middle of a cell, `(x, z)`."""
         frame = self.frame
-        x_m = frame.corner_m[0] + (np.arange(frame.cols) + 0.5) * frame.cell_m
-        z_m = frame.corner_m[1] + (np.arange(frame.rows) + 0.5) * frame.cell_m
-        return np.stack(np.meshgrid(x_m, z_m), axis=-1)
+        return (frame.corner_m[0] + (col + 0.5) * frame.cell_m, frame.corner_m[1] + (row + 0.5) * frame.cell_m)
+
+    def value_at(self, values: NDArray[np.float64], place_m: tuple[float, float]) -> float:
+        """Return the value of the `(R, C)` cells at a place, or at the nearest cell."""
+        return float(values[self.cell_at(place_m)])
+
+    def cell_at(self, place_m: tuple[float, float]) -> tuple[int, int]:
+        """Return row and column of the cell at a place, or of the nearest one."""
+        frame = self.frame
+        row, col = ((place_m[axis] - frame.corner_m[axis]) / frame.cell_m for axis in (1, 0))
+        return min(max(int(row), 0), frame.rows - 1), min(max(int(col), 0), frame.cols - 1)
 
 
 class SearchedCells:
@@ -57,15 +67,19 @@ class SearchedCells:
         self._config = config
         self.coarse = CoarseFrame.over(frame)
         shape = (self.coarse.frame.rows, self.coarse.frame.cols)
-        self._rates = np.array([config.detection_rate, config.small_detection_rate])
-        self._ever = np.ones((2, *shape))
-        self._stage = np.ones((2, *shape))
-        self._sectors = np.zeros((NUM_SECTORS, *shape), np.bool_)
+        self._ever = np.ones((len(RANGES_M), *shape))
+        self._stage = np.ones((len(RANGES_M), *shape))
+        self._sectors = np.zeros((len(RANGES_M), NUM_SECTORS, *shape), np.bool_)
 
     def begin_stage(self) -> None:
         """Let things have moved to any place."""
         self._stage[:] = 1.0
         self._sectors[:] = False
+
+    def forget(self) -> None:
+        """Doubt all earlier looks."""
+        self.begin_stage()
+        self._ever[:] = 1.0
 
     def see(self, view: View) -> None:
         """Take in the surfaces that a view shows."""
@@ -74,28 +88,41 @@ class SearchedCells:
         dx_m = view.pose.x_m - (frame.corner_m[0] + (cols + 0.5) * frame.cell_m)
         dz_m = view.pose.z_m - (frame.corner_m[1] + (rows + 0.5) * frame.cell_m)
         sectors = (np.arctan2(dx_m, dz_m) % math.tau / math.tau * NUM_SECTORS).astype(int) % NUM_SECTORS
-        if self._config.gates_sectors:
-            is_new = ~self._sectors[sectors, rows, cols]
-            rows, cols, sectors = rows[is_new], cols[is_new], sectors[is_new]
-            self._sectors[sectors, rows, cols] = True
-        missed = 1.0 - self._rates[:, None]
-        self._stage[:, rows, cols] *= missed
-        self._ever[:, rows, cols] *= missed
+        missed = 1.0 - self._config.detection_rate
+        gaps_m = np.hypot(dx_m, dz_m)
+        for index, range_m in enumerate(RANGES_M):
+            near = gaps_m <= range_m
+            at = rows[near], cols[near]
+            if self._config.gates_sectors:
+                is_new = ~self._sectors[index, sectors[near], at[0], at[1]]
+                at = at[0][is_new], at[1][is_new]
+                self._sectors[index, sectors[near][is_new], at[0], at[1]] = True
+            self._stage[index][at] *= missed
+            self._ever[index][at] *= missed
 
-    def give_up(self, cells: NDArray[np.bool_], factor: float) -> None:
-        """Lower the weight of `(R, C)` cells that the agent went to see, whatever hides a part of them."""
-        self._stage[:, cells] *= factor
-        self._ever[:, cells] *= factor
+    def give_up(self, rows: NDArray[np.int64], cols: NDArray[np.int64], factor: float) -> None:
+        """Lower the weight of cells that the agent went to see, whatever hides a part of them."""
+        self._stage[:, rows, cols] *= factor
+        self._ever[:, rows, cols] *= factor
 
-    def missed(self, *, is_small: bool) -> NDArray[np.float64]:
-        """Return `(R, C)`: the probability that this stage's views would have missed a target at a cell."""
-        found: NDArray[np.float64] = self._stage[int(is_small)]
+    def missed(self, range_m: float) -> NDArray[np.float64]:
+        """Return `(R, C)`: the probability that this stage's views missed a target at a cell.
+
+        Args:
+            range_m: Distance up to which the target can be detected.
+        """
+        found: NDArray[np.float64] = self._stage[_class_of(range_m)]
         return found
 
-    def ever_missed(self, *, is_small: bool) -> NDArray[np.float64]:
+    def ever_missed(self, range_m: float) -> NDArray[np.float64]:
         """Return `(R, C)`: the same for the views of all stages."""
-        found: NDArray[np.float64] = self._ever[int(is_small)]
+        found: NDArray[np.float64] = self._ever[_class_of(range_m)]
         return found
+
+
+def _class_of(range_m: float) -> int:
+    """Return the index of the longest range that is not longer than another, or the shortest."""
+    return max(0, sum(one <= range_m for one in RANGES_M) - 1)
 
 
 def seen_cells(view: View, frame: MapFrame, range_m: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
