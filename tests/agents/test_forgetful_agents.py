@@ -22,6 +22,7 @@ FORGETFUL = (
     "pro",
     "pro-blind",
     "pro-oracle-theta",
+    "khronos-fu",
     "3d-mem",
     "3d-mem+",
     "msgnav",

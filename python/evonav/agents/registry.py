@@ -54,6 +54,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.proactive.agent:ProactiveOracleTheta",
         "Belief-Weighted Search that knows the probabilities of changes",
     ),
+    "khronos-fu": (
+        "evonav.agents.khronos.agent:KhronosFrontierUpdate",
+        "rival: Frontier-Update with Khronos' votes of rays before and after each object",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

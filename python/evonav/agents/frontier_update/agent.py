@@ -1,5 +1,6 @@
 """Frontier-Update (paper, Sec. C.4): object entries and a map over all stages; the map is rebuilt when contradicted."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -9,13 +10,12 @@ from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.navigator_agent import NavigatorAgent
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import is_structure
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
-from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
@@ -64,6 +64,7 @@ class FrontierUpdate(NavigatorAgent):
         if reached is not None and self._stops_at_sight_of_place():
             return self._stop("arrived", reached.entry_id)
         navigator.observe(observation)
+        self._after_look(observation)
         reached = reached or self._in_reach(observation)
         if reached is not None:
             navigator.target = None
@@ -79,6 +80,9 @@ class FrontierUpdate(NavigatorAgent):
         """Return whether arriving at an entry's place ends the stage without another look."""
         return True
 
+    def _after_look(self, observation: Observation) -> None:
+        """Revise further beliefs by a look that map and object entries have taken in; here there are none."""
+
     def _in_reach(self, observation: Observation) -> Target | None:
         """Return the committed target if the agent need not go any nearer, though it has not reached its place."""
         return None
@@ -89,19 +93,35 @@ class FrontierUpdate(NavigatorAgent):
 
     def _decide(self, observation: Observation) -> AgentAction:
         """Ask where to go: to one of the best entries, or to a frontier."""
+        entries = self._believed()
+        remembered = [self._navigator.candidate(entry) for entry in entries]
+        return self._choose(self._ranked(entries, remembered, observation), remembered, observation)
+
+    def _believed(self) -> Sequence[ObjectEntry]:
+        """Return the entries whose objects the agent believes to be there."""
+        return self._navigator.objects.entries
+
+    def _choose(
+        self, ranked: Sequence[ObjectCandidate], remembered: Sequence[ObjectCandidate], observation: Observation
+    ) -> AgentAction:
+        """Ask about the first candidates and the places to explore, and do what is answered.
+
+        Args:
+            ranked: The objects that may be chosen, the best first.
+            remembered: Everything that is remembered.
+            observation: The present observation.
+        """
         navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)
-        entries = navigator.objects.entries
-        remembered = [navigator.candidate(entry) for entry in entries]
-        ranked = self._ranked(entries, remembered, observation)[: self.config.num_candidates]
-        frontiers = navigator.explorer.frontiers
-        if not ranked and not frontiers:
+        ranked = ranked[: self.config.num_candidates]
+        places = self._places_to_explore(observation)
+        if not ranked and not places:
             return self._without_candidates(observation)
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
             objects=[navigator.with_images(entry) for entry in ranked] if self._shows_images else ranked,
-            frontiers=self._frontier_candidates(here),
+            frontiers=places,
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,
             unseen_m2=self._unseen_m2(),
@@ -110,13 +130,22 @@ class FrontierUpdate(NavigatorAgent):
         self._candidates = tuple(candidate.entry_id for candidate in question.objects)
         choice = self._queries.ask(question)
         if choice is not None and choice.kind == "object":
-            return self._go_to_object(question.objects[choice.index], frontiers, here)
+            return self._go_to_object(question.objects[choice.index], here)
         if choice is not None:
-            return self._go_to_frontier(frontiers[choice.index], self._queries.reason)
-        nearest = nearest_frontier(frontiers, here)
-        if nearest is not None and self.config.on_failed_decision == "nearest_frontier":
-            return self._go_to_frontier(nearest, "no valid answer")
+            return self._explore(places[choice.index], self._queries.reason)
+        if places and self.config.on_failed_decision == "nearest_frontier":
+            nearest = min(places, key=lambda place: (math.dist(place.position_m, here), place.frontier_id))
+            return self._explore(nearest, "no valid answer")
         return self._stop("no valid answer")
+
+    def _places_to_explore(self, observation: Observation) -> Sequence[FrontierCandidate]:
+        """Return the places that a question offers for exploring: all frontiers."""
+        return self._frontier_candidates((observation.pose.x_m, observation.pose.z_m))
+
+    def _explore(self, place: FrontierCandidate, reason: str) -> AgentAction:
+        """Continue towards a place that was offered for exploring, without a commitment."""
+        frontiers = self._navigator.explorer.frontiers
+        return self._go_to_frontier(next(one for one in frontiers if one.id == place.frontier_id), reason)
 
     def _ranked(
         self, entries: Sequence[ObjectEntry], remembered: Sequence[ObjectCandidate], observation: Observation
@@ -140,13 +169,13 @@ class FrontierUpdate(NavigatorAgent):
         """Act when there is nothing to ask about: neither entries nor frontiers."""
         return self._stop("nothing to go to")
 
-    def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], here: Point2) -> AgentAction:
+    def _go_to_object(self, chosen: ObjectCandidate, here: Point2) -> AgentAction:
         """Commit to an entry whose surroundings the map knows; else explore towards it."""
         goal_m = self._navigator.observation_point(chosen.ground_m)
         if goal_m is None:
             self._counters["unsupported_choices"] += 1
             near_m = chosen.ground_m if self.config.explore_towards == "object" else here
-            frontier = nearest_frontier(frontiers, near_m)
+            frontier = nearest_frontier(self._navigator.explorer.frontiers, near_m)
             if frontier is not None:
                 return self._go_to_frontier(frontier, f"towards object {chosen.entry_id}, which the map does not reach")
             goal_m = chosen.ground_m  # the planner ends at the nearest free point

@@ -1,0 +1,1 @@
+"""Khronos' votes of rays before and after each object, on Frontier-Update."""

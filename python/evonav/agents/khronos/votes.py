@@ -1,0 +1,164 @@
+"""Khronos' change detection: votes of rays for the presence and the absence of each object, before and after it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from evonav.memory.forgetting.rule import EntryStates, detected_ids
+from evonav.memory.objects import ObjectMap, ObjectUpdate
+from evonav.memory.presence import EvidenceConfig
+from evonav.sensors.observation import Detections, View
+from evonav.world.simulator import Intrinsics
+
+
+@dataclass(frozen=True, slots=True)
+class VotesConfig:
+    """Khronos' constants; its bins have 5 s, and here a bin is a decision round."""
+
+    window: int = 5
+    """Number of bins, from one on, whose votes are added."""
+    absent_share: float = 0.6
+    """An object is absent from the first window on in which more of the votes are for that."""
+    present_share: float = 0.5
+    """It is present in a window in which more of the votes are for that."""
+    min_votes: int = 16
+    """Views with fewer votes about an object do not count; ours, as `PresenceConfig.min_points`."""
+    evidence: EvidenceConfig = field(default_factory=lambda: EvidenceConfig(band_share=0.0))
+    """Parameters of the comparison of points with depth; the tolerance of 0.1 m is Khronos' default."""
+    stride_px: int = 4
+    """Every such pixel of every such row of a view is kept as a ray; ours."""
+
+
+Bins = dict[int, tuple[int, int]]
+"""Numbers of votes for presence and for absence, by round."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """The result of a series of votes, in one direction of time."""
+
+    absent: int | None = None
+    """The round of the votes, nearest to the object's own, from which on it is absent; `None` if it never is."""
+    present: int | None = None
+    """The farthest round before that in which it is present; `None` if it never is."""
+
+
+def change_of(bins: Mapping[int, tuple[int, int]], config: VotesConfig, *, forward: bool) -> Change:
+    """Return when an object changed, by votes before it was first seen, or after it was last seen.
+
+    Each window begins at a round with votes and goes on for `window` rounds, forwards in time in both directions, as
+    in Khronos.
+
+    Args:
+        bins: The votes.
+        config: Window and shares.
+        forward: Whether to go through the rounds forwards or backwards.
+    """
+    present_at: int | None = None
+    for start in sorted(bins, reverse=not forward):
+        votes = [bins[at] for at in range(start, start + config.window) if at in bins]
+        present, absent = sum(one[0] for one in votes), sum(one[1] for one in votes)
+        if present + absent == 0:
+            continue
+        if absent > config.absent_share * (present + absent):
+            return Change(start, present_at)
+        if present > config.present_share * (present + absent):
+            present_at = start
+    return Change(None, present_at)
+
+
+@dataclass(slots=True)
+class _Track:
+    first: int
+    """Round in which the object was first seen."""
+    last: int
+    """Round in which it was last seen."""
+    after: Bins = field(default_factory=dict)
+    """Votes of rounds after the last one."""
+    before: Change | None = None
+    """The result of the rays from before the first detection; `None` before it is known."""
+
+
+class RayVotes:
+    """The votes about all entries of an object map."""
+
+    def __init__(self, config: VotesConfig | None = None) -> None:
+        self.config = config or VotesConfig()
+        self._tracks: EntryStates[_Track] = EntryStates()
+        self._rays: list[tuple[int, View]] = []
+        """Thinned views, by round."""
+        self._round = 0
+        self._views: list[View] = []
+        """Thinned views of the present round."""
+
+    def see(self, map_: ObjectMap, view: View, update: ObjectUpdate) -> None:
+        """Take in a view that the map has integrated, and keep its rays."""
+        self._tracks.follow(update)
+        for entry_id in detected_ids(update):
+            track = self._tracks.setdefault(entry_id, _Track(self._round, self._round))
+            track.last = self._round
+            track.after.clear()  # it was observed again: what was said of it is out of date
+        self._views.append(thinned(view, self.config.stride_px))
+
+    def end_round(self, map_: ObjectMap) -> None:
+        """Count the votes of the round's rays about what it did not detect; date what it detected first."""
+        for view in self._views:
+            for entry_id, votes in self._votes(map_, map_.in_view(view), view):
+                track = self._tracks.get(entry_id)
+                if track is not None and track.last < self._round:
+                    present, absent = track.after.get(self._round, (0, 0))
+                    track.after[self._round] = (present + votes[0], absent + votes[1])
+        for entry_id, track in self._tracks.items():
+            if track.before is None and map_.entry(entry_id) is not None:
+                track.before = change_of(self._earlier(map_, entry_id, track.first), self.config, forward=False)
+        self._rays += [(self._round, view) for view in self._views]
+        self._views = []
+        self._round += 1
+
+    def is_absent(self, entry_id: int) -> bool:
+        """Return whether later rays say that an entry's object is no longer there."""
+        return self.disappeared(entry_id) is not None
+
+    def disappeared(self, entry_id: int) -> int | None:
+        """Return the round from which on later rays say that an object is absent; `None` if they do not."""
+        track = self._tracks.get(entry_id)
+        return None if track is None else change_of(track.after, self.config, forward=True).absent
+
+    def appeared(self, entry_id: int) -> int | None:
+        """Return the last round in which earlier rays say that an object was absent; `None` if they do not."""
+        track = self._tracks.get(entry_id)
+        return None if track is None or track.before is None else track.before.absent
+
+    def _votes(self, map_: ObjectMap, entry_ids: list[int], view: View) -> list[tuple[int, tuple[int, int]]]:
+        found = zip(entry_ids, map_.depth_evidence(entry_ids, view, self.config.evidence), strict=True)
+        return [
+            (entry_id, (one.num_supported, one.num_see_through))
+            for entry_id, one in found
+            if one.num_not_hidden >= self.config.min_votes
+        ]
+
+    def _earlier(self, map_: ObjectMap, entry_id: int, first: int) -> Bins:
+        """Return the votes of the rays from before an entry was first seen."""
+        bins: Bins = {}
+        for at, view in self._rays:
+            if at < first and entry_id in map_.in_view(view):
+                for _, votes in self._votes(map_, [entry_id], view):
+                    present, absent = bins.get(at, (0, 0))
+                    bins[at] = (present + votes[0], absent + votes[1])
+        return bins
+
+
+def thinned(view: View, stride_px: int) -> View:
+    """Return a view with fewer pixels and without detections: the rays that are kept of it.
+
+    Args:
+        view: The view.
+        stride_px: Every such pixel of every such row is kept, if the size of the image allows it; else all are.
+    """
+    height_px, width_px = view.depth_m.shape
+    stride = stride_px if height_px % stride_px == width_px % stride_px == 0 else 1
+    depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
+    nothing = Detections(np.full(depth_m.shape, -1, np.int32), (), np.empty(0, np.float32))
+    intrinsics = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
+    return replace(view, intrinsics=intrinsics, depth_m=depth_m, detections=nothing, rgb=None)
