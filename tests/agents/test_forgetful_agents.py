@@ -23,6 +23,7 @@ FORGETFUL = (
     "pro-blind",
     "pro-oracle-theta",
     "khronos-fu",
+    "vlfm",
     "3d-mem",
     "3d-mem+",
     "msgnav",

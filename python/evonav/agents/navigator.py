@@ -13,7 +13,7 @@ from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.text.language import canonical
-from evonav.memory import Frontier, ObjectMap, ObjectMapConfig, forgetting
+from evonav.memory import ObjectMap, ObjectMapConfig, forgetting
 from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry, ObjectUpdate
 from evonav.memory.occupancy import FREE, UNKNOWN
@@ -231,13 +231,13 @@ class Navigator:
                 frontier.id,
                 frontier.position_m,
                 distance_m,
-                self.frontier_image(frontier) if with_images else None,
+                self.image_towards(frontier.position_m) if with_images else None,
                 is_current=self.explorer.is_going_to(frontier),
             )
             for frontier, distance_m in zip(frontiers, distances_m, strict=True)
         ]
 
-    def frontier_image(self, frontier: Frontier) -> Pixels | None:
+    def image_towards(self, place_m: Point2) -> Pixels | None:
         """Return a frontier as the agent saw it: the stored view whose axis points most nearly at it.
 
         3D-Mem renders a fresh view for each new frontier. Here one of the stored views must do, since no agent may look
@@ -247,7 +247,7 @@ class Navigator:
         for view in reversed(self.views.views[self._first_map_view :]):
             if view.jpeg is None or (best is not None and view.stage != best[1].stage):
                 break
-            dx_m, dz_m = frontier.position_m[0] - view.pose.x_m, frontier.position_m[1] - view.pose.z_m
+            dx_m, dz_m = place_m[0] - view.pose.x_m, place_m[1] - view.pose.z_m
             distance_m = math.hypot(dx_m, dz_m)
             off_axis_rad = abs(math.remainder(math.atan2(dx_m, dz_m) - view.pose.yaw_rad, math.tau))
             cost = off_axis_rad + 0.1 * distance_m

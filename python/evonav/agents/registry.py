@@ -58,6 +58,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.khronos.agent:KhronosFrontierUpdate",
         "rival: Frontier-Update with Khronos' votes of rays before and after each object",
     ),
+    "vlfm": (
+        "evonav.agents.value_maps.vlfm:Vlfm",
+        "rival: VLFM explores frontiers by a value map that each goal begins anew",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

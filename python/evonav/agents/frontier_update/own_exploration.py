@@ -1,0 +1,63 @@
+"""Frontier-Update that explores by a rule of its own: the question offers the one place that the rule chooses."""
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evonav.agents.agent import AgentAction, NavigateTo
+from evonav.agents.frontier_update.agent import FrontierUpdate
+from evonav.decision.candidates import FrontierCandidate, Point2
+from evonav.memory import Frontier
+from evonav.sensors.observation import Observation
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place to explore."""
+
+    position_m: Point2
+    """Place to stand."""
+    face_m: Point2
+    """Point to look at from there."""
+    value: float
+    frontier: Frontier | None = None
+    """The frontier, if the place is one."""
+
+
+class OwnExploration(FrontierUpdate):
+    """Asks whether a remembered object is the goal; where it goes otherwise is its own rule, not the model's choice.
+
+    So agents with other rules of exploration have the same decisions.
+    """
+
+    _place: Place | None = None
+    """The place that the last question offered."""
+
+    @abstractmethod
+    def _place_to_explore(self, observation: Observation) -> Place | None:
+        """Return where the rule would explore now; `None` if nothing is left."""
+
+    def _goes_to(self, place: Place, here: Point2) -> None:
+        """Note that the agent, at `here`, goes to a place that the rule chose."""
+
+    def _places_to_explore(self, observation: Observation) -> Sequence[FrontierCandidate]:
+        place = self._place = self._place_to_explore(observation)
+        if place is None:
+            return []
+        self._here = (observation.pose.x_m, observation.pose.z_m)
+        image = self._navigator.image_towards(place.face_m) if self._shows_images else None
+        frontier_id = -1 if place.frontier is None else place.frontier.id
+        return [FrontierCandidate(frontier_id, place.position_m, math.dist(place.position_m, self._here), image)]
+
+    def _explore(self, place: FrontierCandidate, reason: str) -> AgentAction:
+        chosen = self._place
+        assert chosen is not None, "the question offered it"
+        self._goes_to(chosen, self._here)
+        reason = f"value {chosen.value:.2f}: {reason}"
+        if chosen.frontier is not None:
+            return self._go_to_frontier(chosen.frontier, reason)
+        self._navigator.explorer.stop_exploring()
+        self._record_round("search", reason)
+        is_elsewhere = math.dist(chosen.face_m, chosen.position_m) > 1e-6
+        return NavigateTo(chosen.position_m, face_m=chosen.face_m if is_elsewhere else None)

@@ -1,0 +1,69 @@
+"""VLFM's value map: each view spreads one value over its cone, with more confidence in the middle than at the edges."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.decision.candidates import Point2
+from evonav.sensors.observation import MapFrame, View
+
+
+@dataclass(frozen=True, slots=True)
+class ConeMapConfig:
+    """VLFM's constants."""
+
+    min_confidence: float = 0.25
+    """Confidence at the edges of the field of view; it is 1 on the axis."""
+    ignored_below: float = 0.35
+    """A new confidence below this does not count where it is also below the old one."""
+
+
+class ConeMap:
+    """Values of the cells that views have shown, and the confidence in them."""
+
+    def __init__(self, frame: MapFrame, config: ConeMapConfig | None = None) -> None:
+        self.config = config or ConeMapConfig()
+        self._frame = frame
+        self.values = np.zeros((frame.rows, frame.cols))
+        self.confidences = np.zeros((frame.rows, frame.cols))
+
+    def see(self, view: View, value: float) -> None:
+        """Give all cells that a view shows its value: the mean of all views' values, weighted by confidence.
+
+        Args:
+            view: The view.
+            value: Its value.
+        """
+        config, frame = self.config, self._frame
+        cells = np.concatenate([view.occupancy.free, view.occupancy.blocked])
+        if len(cells) == 0:
+            return
+        rows, cols = cells[:, 0], cells[:, 1]
+        dx_m = frame.corner_m[0] + (cols + 0.5) * frame.cell_m - view.pose.x_m
+        dz_m = frame.corner_m[1] + (rows + 0.5) * frame.cell_m - view.pose.z_m
+        off_rad = np.abs((np.arctan2(dx_m, dz_m) - view.pose.yaw_rad + math.pi) % math.tau - math.pi)
+        half_rad = math.atan(0.5 * view.intrinsics.width_px / view.intrinsics.focal_px)
+        is_inside = off_rad <= half_rad
+        rows, cols, off_rad = rows[is_inside], cols[is_inside], off_rad[is_inside]
+        new = np.cos(off_rad / half_rad * (math.pi / 2)) ** 2
+        new = config.min_confidence + (1.0 - config.min_confidence) * new
+        old = self.confidences[rows, cols]
+        counts = (new >= config.ignored_below) | (new >= old)
+        rows, cols, new, old = rows[counts], cols[counts], new[counts], old[counts]
+        both = new + old
+        self.values[rows, cols] = (old * self.values[rows, cols] + new * value) / both
+        self.confidences[rows, cols] = (old * old + new * new) / both
+
+
+def largest_within(values: NDArray[np.float64], frame: MapFrame, place_m: Point2, radius_m: float) -> float:
+    """Return the largest of `(R, C)` values within a distance of `(x, z)`; 0 where the map has no cell."""
+    steps = math.ceil(radius_m / frame.cell_m)
+    at = [(place_m[1] - frame.corner_m[1]) / frame.cell_m, (place_m[0] - frame.corner_m[0]) / frame.cell_m]
+    lows = [max(0, math.floor(one) - steps) for one in at]
+    window = values[lows[0] : max(0, math.floor(at[0]) + steps + 1), lows[1] : max(0, math.floor(at[1]) + steps + 1)]
+    rows = np.arange(window.shape[0]) + lows[0] + 0.5 - at[0]
+    cols = np.arange(window.shape[1]) + lows[1] + 0.5 - at[1]
+    is_near = np.hypot(rows[:, None], cols[None, :]) * frame.cell_m <= radius_m
+    return float(window[is_near].max()) if is_near.any() else 0.0
