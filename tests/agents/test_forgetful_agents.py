@@ -24,6 +24,7 @@ FORGETFUL = (
     "pro-oracle-theta",
     "khronos-fu",
     "vlfm",
+    "onemap",
     "3d-mem",
     "3d-mem+",
     "msgnav",

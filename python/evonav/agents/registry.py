@@ -62,6 +62,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.value_maps.vlfm:Vlfm",
         "rival: VLFM explores frontiers by a value map that each goal begins anew",
     ),
+    "onemap": (
+        "evonav.agents.value_maps.onemap:OneMap",
+        "rival: OneMap keeps one map over goals, and checks likely places again for each",
+    ),
     "3d-mem": (
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",

@@ -1,0 +1,164 @@
+"""OneMap's map: what each cell shows, weighted by how certain that is, and two counts of how well it was seen."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.proactive.rooms import numbered
+from evonav.agents.relatedness import Feature, Relatedness
+from evonav.sensors.observation import MapFrame, View
+from evonav.world.camera import unproject
+from evonav.world.simulator import Intrinsics
+
+BACKGROUND = ""
+"""The label of pixels without a detection."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabelMapConfig:
+    """OneMap's constants."""
+
+    stride_px: int = 5
+    """Every such pixel of every such row counts, if the size of the image allows it; ours."""
+    gradient_factor: float = 0.2
+    """Steepness with which a gradient of depth lowers the weight of a pixel."""
+    best_depth_m: float = 1.0
+    """Depth at which a pixel has the largest weight..."""
+    depth_spread_m: float = 1.5
+    """...and the distance from it over which the weight falls."""
+    min_weight: float = 1e-5
+    """A pixel with a smaller weight does not count."""
+    max_uncertainty: float = 0.2
+    """A cell is explored, or checked, when 1 over the sum of its weights is below this."""
+
+
+class LabelMap:
+    """Weights of the labels that each cell shows, over all goals; OneMap has the mean of image features in their place.
+
+    The similarity of a cell to a goal is the weighted mean of what its labels have to do with it.
+    """
+
+    def __init__(self, frame: MapFrame, config: LabelMapConfig | None = None) -> None:
+        self.config = config or LabelMapConfig()
+        self._frame = frame
+        self._numbers: dict[str, int] = {BACKGROUND: 0}
+        self._sums = np.zeros((8, frame.rows * frame.cols), np.float32)
+        self._confidence = np.zeros(frame.rows * frame.cols)
+        self._checked = np.zeros(frame.rows * frame.cols)
+        self._features: dict[str, Feature] = {}
+
+    @property
+    def explored(self) -> NDArray[np.bool_]:
+        """`(R, C)` cells that were seen well enough in any stage."""
+        return self._is_certain(self._confidence)
+
+    @property
+    def checked(self) -> NDArray[np.bool_]:
+        """`(R, C)` cells that were seen well enough for the present goal."""
+        return self._is_certain(self._checked)
+
+    def begin_goal(self) -> None:
+        """Clear what was checked: every goal may look at every place again. What the cells show stays."""
+        self._checked[:] = 0.0
+
+    def see(self, view: View) -> None:
+        """Take in the surfaces of a view."""
+        config, frame = self.config, self._frame
+        height_px, width_px = view.depth_m.shape
+        stride = config.stride_px if height_px % config.stride_px == width_px % config.stride_px == 0 else 1
+        depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
+        masks = view.detections.masks[stride // 2 :: stride, stride // 2 :: stride]
+        intrinsics = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
+        weights = pixel_weights(depth_m, intrinsics, config)
+        points_m = unproject(depth_m, view.pose, intrinsics)
+        with np.errstate(invalid="ignore"):
+            cols = np.floor((points_m[..., 0] - frame.corner_m[0]) / frame.cell_m)
+            rows = np.floor((points_m[..., 2] - frame.corner_m[1]) / frame.cell_m)
+            counts = (weights > config.min_weight) & (rows >= 0) & (rows < frame.rows)
+            counts &= (cols >= 0) & (cols < frame.cols)
+        flat = (rows[counts] * frame.cols + cols[counts]).astype(np.int64)
+        labels = self._label_numbers(view)[masks[counts]]
+        share = weights[counts] / np.bincount(flat, minlength=len(self._confidence))[flat]
+        np.add.at(self._sums, (labels, flat), share.astype(np.float32))
+        seen = np.bincount(flat, share, minlength=len(self._confidence))
+        self._confidence += seen
+        self._checked += seen
+
+    def similarity(self, related: Relatedness) -> NDArray[np.float64]:
+        """Return `(R, C)`: how much each cell has to do with a goal; 0 for one that was never seen."""
+        scores = np.zeros(len(self._sums), np.float32)
+        for label, number in self._numbers.items():
+            scores[number] = related.of(label, self._unit_feature(label)) if label else 0.0
+        sums = (scores @ self._sums).astype(np.float64)
+        found = np.divide(sums, self._confidence, out=np.zeros_like(sums), where=self._confidence > 0.0)
+        return found.reshape(self._frame.rows, self._frame.cols)
+
+    def _label_numbers(self, view: View) -> NDArray[np.int64]:
+        """Return the number of each detection's label; the last one is the background's, so index -1 finds it."""
+        detections = view.detections
+        for index, label in enumerate(detections.labels):
+            self._numbers.setdefault(label, len(self._numbers))
+            if detections.features is not None:
+                feature = detections.features[index]
+                self._features[label] = self._features[label] + feature if label in self._features else feature
+        if len(self._numbers) > len(self._sums):
+            self._sums = np.concatenate([self._sums, np.zeros_like(self._sums)])
+        return np.array([*(self._numbers[label] for label in detections.labels), 0])
+
+    def _unit_feature(self, label: str) -> Feature | None:
+        """Return the direction of the mean feature of a label's detections."""
+        total = self._features.get(label)
+        length = 0.0 if total is None else float(np.linalg.norm(total))
+        return None if total is None or length == 0.0 else total / np.float32(length)
+
+    def _is_certain(self, sums: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return (sums * self.config.max_uncertainty > 1.0).reshape(self._frame.rows, self._frame.cols)
+
+
+def pixel_weights(depth_m: NDArray[np.float32], intrinsics: Intrinsics, config: LabelMapConfig) -> NDArray[np.float64]:
+    """Return how certain the place of each pixel is: 1 at the best depth on a surface that faces the camera.
+
+    Args:
+        depth_m: `(H, W)` planar depth.
+        intrinsics: Its camera.
+        config: The constants.
+
+    Returns:
+        `(H, W)` weights, 0 to 1; 0 where there is no depth.
+    """
+    is_finite = np.isfinite(depth_m)
+    depth = np.where(is_finite, depth_m, depth_m[is_finite].max() if is_finite.any() else 0.0).astype(np.float64)
+    by_row, by_col = np.gradient(depth) if min(depth.shape) > 1 else (np.zeros_like(depth), np.zeros_like(depth))
+    by_row /= intrinsics.focal_px / intrinsics.height_px
+    by_col /= intrinsics.focal_px / intrinsics.width_px
+    flatness = 1.0 - np.tanh(config.gradient_factor * np.hypot(by_row, by_col))
+    nearness = np.exp(-(((config.best_depth_m - depth) / config.depth_spread_m) ** 2) / 3.0)
+    return np.where(is_finite, flatness * nearness, 0.0)
+
+
+def clusters_of(
+    similarity: NDArray[np.float64], is_open: NDArray[np.bool_], *, share: float, min_cells: int
+) -> list[tuple[int, int, float]]:
+    """Return the groups of the most similar cells.
+
+    Args:
+        similarity: `(R, C)`.
+        is_open: `(R, C)` cells that may belong to a group.
+        share: Least similarity in a group, relative to the largest one of all these cells.
+        min_cells: Smallest number of cells of a group.
+
+    Returns:
+        Row, column and similarity of each group's most similar cell, the first of equals; by row and column.
+    """
+    largest = float(np.where(is_open, similarity, 0.0).max(initial=0.0))
+    if largest <= 0.0 or not math.isfinite(largest):
+        return []
+    groups = numbered(is_open & (similarity >= share * largest), min_cells)
+    found = []
+    for number in range(int(groups.max(initial=-1)) + 1):
+        inside = np.where(groups == number, similarity, -1.0)
+        row, col = np.unravel_index(int(inside.argmax()), inside.shape)
+        found.append((int(row), int(col), float(inside[row, col])))
+    return found
