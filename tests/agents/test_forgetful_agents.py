@@ -22,6 +22,7 @@ FORGETFUL = (
     "pro",
     "pro-blind",
     "pro-oracle-theta",
+    "dynamem",
     "khronos-fu",
     "vlfm",
     "onemap",

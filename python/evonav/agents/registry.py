@@ -54,6 +54,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.proactive.agent:ProactiveOracleTheta",
         "Belief-Weighted Search that knows the probabilities of changes",
     ),
+    "dynamem": (
+        "evonav.agents.dynamem.agent:DynaMem",
+        "rival: DynaMem deletes points that depth sees through, and looks again at what it saw long ago",
+    ),
     "khronos-fu": (
         "evonav.agents.khronos.agent:KhronosFrontierUpdate",
         "rival: Frontier-Update with Khronos' votes of rays before and after each object",

@@ -1,0 +1,122 @@
+"""DynaMem's exploration: the edges of the reachable floor, valued by how long ago they were seen."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.decision.candidates import Point2
+from evonav.memory.occupancy import BLOCKED, FREE, OccupancyMap
+from evonav.sensors.observation import MapFrame, View
+
+NEVER = -1
+_AROUND = tuple((row, col) for row in (-1, 0, 1) for col in (-1, 0, 1) if (row, col) != (0, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class SeenConfig:
+    """DynaMem's constants."""
+
+    steepness: float = 0.1
+    """Change of the value's logarithmic odds with each view of age."""
+    half_age: float = 10.0
+    """Number of views since a place was seen at which its value is one half."""
+    steps: int = 200
+    """Values are rounded up to this part of 1; of equal values the nearest place wins."""
+    near_radius_m: float = 0.5
+    """Places this near the agent count as seen."""
+    padding_cells: int = 2
+    """Number of cells around an obstacle in which what was never seen is taken for a part of it."""
+
+
+class LastSeen:
+    """The view in which each cell of the map was last seen."""
+
+    def __init__(self, frame: MapFrame, config: SeenConfig | None = None) -> None:
+        self.config = config or SeenConfig()
+        self._frame = frame
+        self._at = np.full((frame.rows, frame.cols), NEVER, np.int64)
+        self._num_views = 0
+
+    def see(self, view: View) -> None:
+        """Note the cells that a view shows."""
+        for cells in (view.occupancy.free, view.occupancy.blocked):
+            self._at[cells[:, 0], cells[:, 1]] = self._num_views
+        self._num_views += 1
+
+    def be_at(self, here_m: Point2) -> None:
+        """Note that the agent stands at `(x, z)`: it has seen what is around."""
+        frame = self._frame
+        rows = frame.corner_m[1] + (np.arange(frame.rows) + 0.5) * frame.cell_m - here_m[1]
+        cols = frame.corner_m[0] + (np.arange(frame.cols) + 0.5) * frame.cell_m - here_m[0]
+        is_near = rows[:, None] ** 2 + cols[None, :] ** 2 <= self.config.near_radius_m**2
+        self._at[is_near] = np.maximum(self._at[is_near], max(0, self._num_views - 1))
+
+    def give_up(self, place_m: Point2) -> None:
+        """Treat the cell at `(x, z)` as seen: the agent went there in vain."""
+        self._at[self._cell(place_m)] = max(0, self._num_views - 1)
+
+    def values(self) -> NDArray[np.float64]:
+        """Return the `(R, C)` value of looking at each cell again: 1 for one that was never seen."""
+        config = self.config
+        age = (self._num_views - 1 - self._at).astype(np.float64)
+        values = 1.0 / (1.0 + np.exp(-config.steepness * (age - config.half_age)))
+        return np.where(self._at == NEVER, 1.0, np.ceil(values * config.steps) / config.steps)
+
+    def best_edge(self, occupancy: OccupancyMap, here_m: Point2) -> tuple[Point2, Point2, float] | None:
+        """Return the cell beside the reachable floor with the largest value.
+
+        Args:
+            occupancy: The agent's map.
+            here_m: `(x, z)` of the agent.
+
+        Returns:
+            Middle of the floor's cell beside it, its own middle, and its value; of equal values the nearest, then the
+            first. `None` if no floor can be reached.
+        """
+        is_free = occupancy.cells == FREE
+        rows, cols = np.nonzero(is_free)
+        middles_m = self._middles_m(rows, cols)
+        reached = np.zeros_like(is_free)
+        if len(rows):
+            is_reached = np.isfinite(occupancy.distances_m(here_m, middles_m))
+            reached[rows[is_reached], cols[is_reached]] = True
+        padding = occupancy.cells == BLOCKED
+        for _ in range(self.config.padding_cells):
+            padding = _grown(padding)
+        is_edge = _grown(reached) & ~reached & ~((self._at == NEVER) & padding)
+        rows, cols = np.nonzero(is_edge)
+        if len(rows) == 0:
+            return None
+        values = self.values()[rows, cols]
+        places_m = self._middles_m(rows, cols)
+        ways_m = np.hypot(places_m[:, 0] - here_m[0], places_m[:, 1] - here_m[1])
+        best = int(np.lexsort((ways_m, -values))[0])
+        row, col = int(rows[best]), int(cols[best])
+        padded = np.pad(reached, 1)
+        beside = [(row + r, col + c) for r, c in _AROUND if padded[1 + row + r, 1 + col + c]]
+        row, col = min(beside, key=lambda one: math.dist(one, (row, col)))
+        stand_m = self._middles_m(np.array([row]), np.array([col]))[0].tolist()
+        face_m = places_m[best].tolist()
+        return (stand_m[0], stand_m[1]), (face_m[0], face_m[1]), float(values[best])
+
+    def _middles_m(self, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> NDArray[np.float64]:
+        frame = self._frame
+        x_m = frame.corner_m[0] + (cols + 0.5) * frame.cell_m
+        return np.stack([x_m, frame.corner_m[1] + (rows + 0.5) * frame.cell_m], axis=1)
+
+    def _cell(self, place_m: Point2) -> tuple[int, int]:
+        frame = self._frame
+        row = math.floor((place_m[1] - frame.corner_m[1]) / frame.cell_m)
+        col = math.floor((place_m[0] - frame.corner_m[0]) / frame.cell_m)
+        return min(max(row, 0), frame.rows - 1), min(max(col, 0), frame.cols - 1)
+
+
+def _grown(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the `(R, C)` cells, and those beside them in eight directions."""
+    padded = np.pad(cells, 1)
+    rows, cols = cells.shape
+    shifts = (padded[1 + r : 1 + r + rows, 1 + c : 1 + c + cols] for r, c in _AROUND)
+    found: NDArray[np.bool_] = np.logical_or.reduce([cells, *shifts])
+    return found
