@@ -23,6 +23,7 @@ FORGETFUL = (
     "pro-blind",
     "pro-oracle-theta",
     "dynamem",
+    "dualmap",
     "khronos-fu",
     "vlfm",
     "onemap",
@@ -58,7 +59,7 @@ def test_every_agent_is_combined_with_every_rule() -> None:
             with_rule(name, "reset")
 
 
-@pytest.mark.parametrize("name", FORGETFUL)
+@pytest.mark.parametrize("name", [name for name in FORGETFUL if name != "dualmap"])  # its anchors are no entries
 def test_an_agent_that_resets_remembers_only_this_stage(name: str) -> None:
     def first_ids(name: str) -> list[int]:
         """Ids of the entries in the first round of the second stage."""

@@ -58,6 +58,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.dynamem.agent:DynaMem",
         "rival: DynaMem deletes points that depth sees through, and looks again at what it saw long ago",
     ),
+    "dualmap": (
+        "evonav.agents.dualmap.agent:DualMap",
+        "rival: DualMap remembers furniture, and what lay on it, and looks there again",
+    ),
     "khronos-fu": (
         "evonav.agents.khronos.agent:KhronosFrontierUpdate",
         "rival: Frontier-Update with Khronos' votes of rays before and after each object",
