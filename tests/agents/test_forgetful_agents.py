@@ -22,6 +22,7 @@ FORGETFUL = (
     "pro",
     "pro-blind",
     "pro-oracle-theta",
+    "evolving",
     "dynamem",
     "dualmap",
     "khronos-fu",

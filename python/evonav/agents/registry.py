@@ -54,6 +54,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.proactive.agent:ProactiveOracleTheta",
         "Belief-Weighted Search that knows the probabilities of changes",
     ),
+    "evolving": (
+        "evonav.agents.evolving.agent:Evolving",
+        "rival: EvolvingNav's belief over sites, with soft negative evidence",
+    ),
     "dynamem": (
         "evonav.agents.dynamem.agent:DynaMem",
         "rival: DynaMem deletes points that depth sees through, and looks again at what it saw long ago",
