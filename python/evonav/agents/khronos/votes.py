@@ -8,7 +8,7 @@ import numpy as np
 from evonav.memory.forgetting.rule import EntryStates, detected_ids
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import EvidenceConfig
-from evonav.sensors.observation import Detections, View
+from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.simulator import Intrinsics
 
 
@@ -109,9 +109,7 @@ class RayVotes:
                 if track is not None and track.last < self._round:
                     present, absent = track.after.get(self._round, (0, 0))
                     track.after[self._round] = (present + votes[0], absent + votes[1])
-        for entry_id, track in self._tracks.items():
-            if track.before is None and map_.entry(entry_id) is not None:
-                track.before = change_of(self._earlier(map_, entry_id, track.first), self.config, forward=False)
+        self._date_new(map_)
         self._rays += [(self._round, view) for view in self._views]
         self._views = []
         self._round += 1
@@ -138,15 +136,27 @@ class RayVotes:
             if one.num_not_hidden >= self.config.min_votes
         ]
 
-    def _earlier(self, map_: ObjectMap, entry_id: int, first: int) -> Bins:
-        """Return the votes of the rays from before an entry was first seen."""
-        bins: Bins = {}
-        for at, view in self._rays:
-            if at < first and entry_id in map_.in_view(view):
-                for _, votes in self._votes(map_, [entry_id], view):
-                    present, absent = bins.get(at, (0, 0))
-                    bins[at] = (present + votes[0], absent + votes[1])
-        return bins
+    def _date_new(self, map_: ObjectMap) -> None:
+        """Let the rays from before say when the objects came that this round detected first."""
+        new = {one: track for one, track in self._tracks.items() if track.before is None and map_.entry(one)}
+        if not new:
+            return
+        bins: dict[int, Bins] = {entry_id: {} for entry_id in new}
+        for at, view in self._rays_near(map_, list(new)):
+            shown = [one for one in map_.in_view(view) if one in new and at < new[one].first]
+            for entry_id, votes in self._votes(map_, shown, view):
+                present, absent = bins[entry_id].get(at, (0, 0))
+                bins[entry_id][at] = (present + votes[0], absent + votes[1])
+        for entry_id, track in new.items():
+            track.before = change_of(bins[entry_id], self.config, forward=False)
+
+    def _rays_near(self, map_: ObjectMap, entry_ids: list[int]) -> list[tuple[int, View]]:
+        """Return the kept views from near enough to one of some entries to detect it."""
+        entries = [entry for one in entry_ids if (entry := map_.entry(one)) is not None]
+        centres_m = np.array([(entry.centre_m[0], entry.centre_m[2]) for entry in entries])
+        eyes_m = np.array([(view.pose.x_m, view.pose.z_m) for _, view in self._rays]).reshape(-1, 2)
+        gaps_m = np.hypot(*np.moveaxis(eyes_m[:, None] - centres_m[None], -1, 0)).min(axis=1, initial=np.inf)
+        return [self._rays[index] for index in np.flatnonzero(gaps_m <= map_.config.max_distance_m)]
 
 
 def thinned(view: View, stride_px: int) -> View:
@@ -161,4 +171,5 @@ def thinned(view: View, stride_px: int) -> View:
     depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
     nothing = Detections(np.full(depth_m.shape, -1, np.int32), (), np.empty(0, np.float32))
     intrinsics = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
-    return replace(view, intrinsics=intrinsics, depth_m=depth_m, detections=nothing, rgb=None)
+    no_cells = VisibleOccupancy(np.empty((0, 2), np.int32), np.empty((0, 2), np.int32))
+    return replace(view, intrinsics=intrinsics, depth_m=depth_m, detections=nothing, occupancy=no_cells, rgb=None)
