@@ -60,12 +60,15 @@ class Evolving(FailThenUpdate):
         self._parsed = self._matcher.parsed(self._goal)
         self._coarse = CoarseFrame.over(self._task.map_frame)
         self._coverage = Coverage(self._own.belief)
+        self._denied: list[int] = []
+        """Objects of this stage that were not verified: to see them again says nothing new."""
         self._belief = Belief({}, 1.0)
 
     def _after_look(self, observation: Observation) -> None:
         """Take in what this round's views show of all sites; the next site is chosen anew."""
         navigator = self._navigator
         navigator.target = None
+        denied = {navigator.views.resolve(one) for one in self._denied}
         best: dict[int, float] = {}
         for view in observation.views:
             entry_ids = navigator.objects.in_view(view)
@@ -74,7 +77,8 @@ class Evolving(FailThenUpdate):
                 best[entry_id] = max(best.get(entry_id, 0.0), one.num_not_hidden / max(1, total))
         for entry_id, share in best.items():
             if self._is_named(entry_id) and navigator.is_detected(entry_id):
-                self._coverage.find(entry_id)
+                if entry_id not in denied:
+                    self._coverage.find(entry_id)
             else:
                 self._coverage.look(entry_id, share)
 
@@ -93,6 +97,7 @@ class Evolving(FailThenUpdate):
             return None
         action = super()._act_at_place(entry_id, observation)
         if action is None:
+            self._denied.append(entry_id)
             self._coverage.fail(entry_id)
         return action
 
