@@ -25,7 +25,7 @@ def test_the_policy_without_learning_finishes_a_task(capsys):
 def test_rewards_rise_while_training(monkeypatch):
     example = _load("train_gym")
     monkeypatch.setattr(example, "NUM_ENVS", 16)
-    weights, curve = example.train(None, 24)
+    weights, curve = example.train("endless:train", 24)
     assert np.mean(curve[-6:]) > np.mean(curve[:6]) + 0.005
     assert weights.shape == (3, example.NUM_FEATURES)
     reward, success, num_stages = example.evaluate(weights, num_steps=40)

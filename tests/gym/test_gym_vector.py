@@ -11,7 +11,8 @@ from gymnasium.vector import AutoresetMode
 
 from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.gym import ENV_ID, OBSERVATIONS, NavConfig, VectorEnv
-from evonav.gym.worlds import TaskSource, WorldLoader
+from evonav.gym.sources import FolderTasks
+from evonav.gym.worlds import WorldLoader
 
 SMALL = {"width_px": 32, "height_px": 24}
 
@@ -155,7 +156,7 @@ def test_the_kernel_refuses_arrays_of_the_wrong_shape():
 
 
 def test_houses_are_built_once_and_memory_is_bounded():
-    source, config = TaskSource(), NavConfig(**SMALL)
+    source, config = FolderTasks(), NavConfig(**SMALL)
     loader = WorldLoader(source, config, max_bytes=2**40)
     again = [loader.get(0, 1).world for _ in range(3)]
     assert again[0] is again[1] is again[2]

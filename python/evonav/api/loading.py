@@ -16,6 +16,7 @@ from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.generation.dataset import generate_dataset, inherited_names
 from evonav.generation.worker import GenerationOptions
+from evonav.house.evonav10k import SPLITS, made_split, split_to_make
 from evonav.house.files import HouseText, HouseTexts
 from evonav.parallel.folders import write_atomically
 from evonav.parallel.worker import Workforce
@@ -88,7 +89,8 @@ def load_houses(
 
     Args:
         source: `"bundled"`, a file of houses (JSON, JSONL, either with `.gz`), a folder of such files, a fetched split
-            (`"procthor-10k:val"`), houses from a seed (`"endless:7"`), or a list of these.
+            (`"procthor-10k:val"`), a split that evonav makes when it is first used (`"evonav-10k:test"`), houses from a
+            seed (`"endless:7"`), or a list of these.
         limit: Number of houses to take, from the first. Default: all.
         assets: File of sizes for assets that the catalogue lacks (docs/houses.md); they become part of the houses.
         start: `"auto"` gives a house without a start a free place to start from.
@@ -115,6 +117,9 @@ def load_houses(
 
 
 def _house_texts(source: str | Path, options: HouseOptions | None = None) -> HouseTexts:
+    if (split := split_to_make(str(source))) is not None:
+        with progress_bar("houses") as show:
+            made_split(split, on_progress=lambda state: show(state.num_houses, SPLITS[split].num_houses, ""))
     try:
         return HouseTexts(source, options)
     except HouseError as error:

@@ -100,8 +100,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav houses make --count 100 --seed 7 --out houses.jsonl.gz",
         "evonav houses make --count 10 --config flats.toml --out flats.jsonl",
     ),
-    "houses stats": ("evonav houses stats bundled endless:7 --limit 150",),
-    "houses fetch": ("evonav houses fetch procthor-10k --split test",),
+    "houses stats": ("evonav houses stats bundled endless:7 --limit 150 --classifier",),
+    "houses fetch": (
+        "evonav houses fetch procthor-10k --split test",
+        "evonav houses fetch evonav-10k --split train --workers 8",
+    ),
     "tasks list": ("evonav tasks list", "evonav tasks list tasks --limit 10"),
     "tasks schema": ("evonav tasks schema task", "evonav tasks schema --out schemas"),
     "tasks show": ("evonav tasks show", "evonav tasks show tasks --task TASK --stage 2 --out stage.svg"),

@@ -150,7 +150,7 @@ def generate_dataset(
 
 def inherited_names(houses: HouseTexts) -> tuple[str, str]:
     """Return the dataset and split that tasks inherit from their houses."""
-    return ("evonav", "none") if houses.published is None else ("procthor-10k", houses.published.split)
+    return houses.split or ("evonav", "none")
 
 
 class _Run:

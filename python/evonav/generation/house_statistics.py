@@ -15,12 +15,17 @@ from evonav.house import House, HouseObject, Room
 from evonav.house.files import HouseText
 from evonav.statistics import holm
 from evonav.statistics.distributions import normal_cdf
+from evonav.world.embedded import EmbeddedSimulator
 
 ROOM_TYPES = ("Kitchen", "LivingRoom", "Bedroom", "Bathroom")
 MIN_HOUSES = 3
 """Least number of houses of a stratum in each set; strata with fewer are left out."""
 MIN_SHARE = 0.02
 """Least share of houses with an object of a category for the category to be compared."""
+CATEGORY = "number of "
+"""Beginning of the names of features that count the objects of a category."""
+MIN_STRAIGHT_M = 1.0
+"""Least straight distance of a place whose detour is measured."""
 Features = dict[str, float]
 
 
@@ -62,15 +67,38 @@ class HouseComparison:
 
 
 def sample_of(text: HouseText) -> HouseSample:
-    """Measure a house.
+    """Measure a house. Assets without a known size have the usual one of their category.
 
     Raises:
         HouseError: The house is malformed.
+        SimulationError: The agent fits nowhere.
     """
     house = House(text.text, name=text.name)
     spec = json.loads(text.text)["metadata"].get("roomSpecId")
     stratum = f"{len(house.rooms)} rooms" if spec is None else str(spec)
-    return HouseSample(stratum, features_of(house))
+    return HouseSample(stratum, features_of(house) | walking_features(house))
+
+
+def walking_features(house: House) -> Features:
+    """Return how far the agent can walk from the start of a house: free floor, and lengths of paths.
+
+    Raises:
+        HouseError: The house has no start.
+        SimulationError: The agent fits nowhere.
+    """
+    simulator = EmbeddedSimulator(allow_unknown_assets=True)
+    pose = simulator.reset(house)
+    places = simulator.reachable_positions()
+    paths_m = np.asarray(simulator.path_lengths_m(pose.position_m, places))
+    straight_m = np.hypot(places[:, 0] - pose.x_m, places[:, 2] - pose.z_m)
+    is_far = straight_m >= MIN_STRAIGHT_M
+    detours = paths_m[is_far] / straight_m[is_far]
+    return {
+        "free floor m2": float(len(places)) * simulator.config.grid_m**2,
+        "path to a place m": float(paths_m.mean()),
+        "longest path m": float(paths_m.max()),
+        "path by straight line": float(detours.mean()) if is_far.any() else 1.0,
+    }
 
 
 def features_of(house: House) -> Features:
@@ -92,7 +120,7 @@ def features_of(house: House) -> Features:
     found["objects"] = float(len(house.objects))
     found["categories"] = float(len(categories))
     found["asset groups"] = float(len({item.id.rpartition("|")[0] for item in house.objects if _is_member(item)}))
-    found.update({f"number of {category}": float(count) for category, count in categories.items()})
+    found.update({f"{CATEGORY}{category}": float(count) for category, count in categories.items()})
     return found
 
 
@@ -135,7 +163,7 @@ def compare_houses(a: Sequence[HouseSample], b: Sequence[HouseSample]) -> HouseC
     Raises:
         InvalidArgumentError: No spec has enough houses in both sets.
     """
-    sets = [_by_stratum(a), _by_stratum(b)]
+    sets = [by_stratum(a), by_stratum(b)]
     shared = [name for name in sets[0] if min(len(one.get(name, ())) for one in sets) >= MIN_HOUSES]
     if not shared:
         raise InvalidArgumentError(f"the sets have no room spec of which both have at least {MIN_HOUSES} houses")
@@ -144,7 +172,7 @@ def compare_houses(a: Sequence[HouseSample], b: Sequence[HouseSample]) -> HouseC
     weights /= weights.sum()
     averages, variances, errors = [], [], []
     for one in sets:
-        tables = [_table(one[name], names) for name in shared]
+        tables = [feature_table(one[name], names) for name in shared]
         averages.append(sum(w * t.mean(axis=0) for w, t in zip(weights, tables, strict=True)))
         variances.append(sum(w * t.var(axis=0, ddof=1) for w, t in zip(weights, tables, strict=True)))
         errors.append(sum(w**2 * t.var(axis=0, ddof=1) / len(t) for w, t in zip(weights, tables, strict=True)))
@@ -165,7 +193,8 @@ def compare_houses(a: Sequence[HouseSample], b: Sequence[HouseSample]) -> HouseC
     )
 
 
-def _by_stratum(samples: Sequence[HouseSample]) -> dict[str, list[Features]]:
+def by_stratum(samples: Sequence[HouseSample]) -> dict[str, list[Features]]:
+    """Return the features of houses by their stratum, in the order of its names."""
     found: dict[str, list[Features]] = defaultdict(list)
     for sample in samples:
         found[sample.stratum].append(sample.features)
@@ -176,12 +205,13 @@ def _feature_names(houses: Sequence[Features]) -> list[str]:
     """Return the features of at least some houses, in the order in which houses have them; categories last, by name."""
     shares = Counter(name for features in houses for name in features)
     usual = [name for name in shares if shares[name] >= MIN_SHARE * len(houses)]
-    return [name for name in usual if not name.startswith("number of")] + sorted(
-        name for name in usual if name.startswith("number of")
+    return [name for name in usual if not name.startswith(CATEGORY)] + sorted(
+        name for name in usual if name.startswith(CATEGORY)
     )
 
 
-def _table(houses: Sequence[Features], names: Sequence[str]) -> NDArray[np.float64]:
+def feature_table(houses: Sequence[Features], names: Sequence[str]) -> NDArray[np.float64]:
+    """Return named features of `N` houses, `(N, M)`; 0 where a house has none, such as the area of its kitchen."""
     return np.array([[features.get(name, 0.0) for name in names] for features in houses])
 
 

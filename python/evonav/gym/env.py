@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from evonav.gym.config import NavConfig
 from evonav.gym.modes import RENDER_MODES
-from evonav.gym.vector_env import Infos, Observations, VectorEnv
+from evonav.gym.spaces import Infos, Observations
+from evonav.gym.vector_env import VectorEnv
 
 
 class LifelongNavEnv(gymnasium.Env[Observations, Any]):
@@ -34,6 +35,7 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
         self,
         tasks: Path | str | None = None,
         *,
+        houses: Path | str | None = None,
         subset: str | None = None,
         config: NavConfig | None = None,
         render_mode: str | None = None,
@@ -43,18 +45,27 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
 
         Args:
             tasks: Folder of tasks; by default the bundled ones.
+            houses: Houses whose tasks are generated as they are chosen, such as `endless:train`; instead of `tasks`.
             subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
             render_mode: `rgb_array` for pictures of `render_view` (`NavConfig`), or none.
             **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
+            HouseError: The houses cannot be read.
             InvalidArgumentError: A setting is out of range.
             TaskError: The folder has no tasks, or not the subset.
         """
         self.render_mode = render_mode
         self._batch = VectorEnv(
-            tasks, subset=subset, config=config, render_mode=render_mode, num_threads=1, cache_mb=0, **settings
+            tasks,
+            houses=houses,
+            subset=subset,
+            config=config,
+            render_mode=render_mode,
+            num_threads=1,
+            cache_mb=0,
+            **settings,
         )
         self.config, self.source = self._batch.config, self._batch.loader.source
         self.observation_space = self._batch.single_observation_space
@@ -65,7 +76,7 @@ class LifelongNavEnv(gymnasium.Env[Observations, Any]):
 
         Args:
             seed: Seed for the choice of this task and all later ones.
-            options: `{"task": TASK_ID}` to choose a task.
+            options: `{"task": TASK_ID}` to choose a task; of houses, `{"task": "endless:7:3"}`.
 
         Raises:
             InvalidArgumentError: The task does not exist.

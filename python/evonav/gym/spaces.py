@@ -14,6 +14,9 @@ from evonav import _core
 from evonav.gym.config import ACTIONS, STOP, NavConfig
 from evonav.tasks.public import Goal
 
+Observations = dict[str, Any]
+Infos = dict[str, Any]
+
 MAX_STAGES = 64
 MAX_INSTRUCTION = 2000
 """Largest length of an instruction and largest number of stages that a task file may contain."""

@@ -22,14 +22,13 @@ from evonav.evaluation.episode import motion
 from evonav.gym import modes, spaces
 from evonav.gym.config import STOP, NavConfig
 from evonav.gym.map_view import MapView
+from evonav.gym.sources import task_source
+from evonav.gym.spaces import Infos, Observations
 from evonav.gym.stage import RewardedStage, task_result
-from evonav.gym.worlds import StageWorld, TaskSource, WorldLoader
+from evonav.gym.worlds import StageWorld, WorldLoader
 from evonav.parallel.local import num_cores
 from evonav.world.appearance import Change
 from evonav.world.pose import Pose
-
-Observations = dict[str, Any]
-Infos = dict[str, Any]
 
 
 @dataclass(slots=True)
@@ -72,6 +71,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         tasks: Path | str | None = None,
         *,
         num_envs: int = 1,
+        houses: Path | str | None = None,
         subset: str | None = None,
         config: NavConfig | None = None,
         render_mode: str | None = None,
@@ -86,6 +86,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         Args:
             tasks: Folder of tasks; by default the bundled ones.
             num_envs: Number B of environments.
+            houses: Houses whose tasks are generated as they are chosen, such as `endless:train`; instead of `tasks`.
             subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
             render_mode: `rgb_array` for pictures of `render_view` (`NavConfig`), or none.
@@ -98,8 +99,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
-            InvalidArgumentError: A setting is out of range.
-            TaskError: The folder has no tasks, or not the subset.
+            EvonavError: A setting is out of range, or the tasks or houses cannot be read.
         """
         modes.check_render_mode(render_mode)
         given = {name: getattr(config, name) for name in config.model_fields_set} if config else {}
@@ -122,7 +122,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         )
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.loader = WorldLoader(TaskSource(tasks, subset=subset), self.config, cache_mb * 2**20)
+        self.loader = WorldLoader(task_source(tasks, houses, subset), self.config, cache_mb * 2**20)
         self._images: dict[str, NDArray[Any]] = {}
         self._episodes: list[_Episode] = []
         self._maps: dict[int, MapView] = {}

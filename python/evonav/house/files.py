@@ -9,15 +9,12 @@ from importlib import resources
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, NamedTuple, Protocol
+from typing import IO, NamedTuple, Protocol
 
 from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.house.generated import ENDLESS, EndlessHouses
 from evonav.parallel.folders import sha256_of_file
-
-if TYPE_CHECKING:
-    from evonav.house.procthor10k import HouseSet
 
 BUNDLED = "bundled"
 """Names the houses that come with evonav; `bundled:3` is the third of them."""
@@ -30,9 +27,10 @@ def stream_houses(path: str | Path, limit: int | None = None) -> Iterator[House]
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; `endless:SEED`, for
-            houses that are made as they are read, without end; or `bundled`, for the houses that come with evonav.
-            `bundled:3`, `endless:7:3` and `houses.jsonl:3` are the third house.
+            or a directory with such files, taken by name; a fetched split, `procthor-10k:val`; a split that is made
+            when it is first used, `evonav-10k:test`; `endless:SEED`, for houses that are made as they are read, without
+            end; or `bundled`, for the houses that come with evonav. `bundled:3`, `evonav-10k:test:3`, `endless:7:3` and
+            `houses.jsonl:3` are the third house.
         limit: Number of houses after which to stop.
 
     Yields:
@@ -81,14 +79,18 @@ class HouseTexts:
 
         Raises:
             DatasetError: The split was not fetched, or is incomplete.
+            HousesDifferError: A split that evonav makes does not hold its houses.
             HouseError: The file does not exist.
             InvalidArgumentError: The path names a known dataset, but no split of it.
         """
-        self.published: HouseSet | None = None
-        """The published split that is read; `None` for a file or a directory."""
+        self.split: tuple[str, str] | None = None
+        """Data set and split of the houses; `None` if their path names none."""
         self.completion = completion
         self._path = Path(path)
-        self._endless: EndlessHouses | None = None
+        self.endless: EndlessHouses | None = None
+        """Houses that are made as they are read."""
+        self._sha256: str | None = None
+        """Checksum of the houses' text, whatever the file is packed by; `None` if that of the file is taken."""
         self._number: int | None = None
         """Number of the one house that is read; `None` for all."""
         if str(path).partition(":")[0] == BUNDLED and not self._path.exists():
@@ -99,17 +101,27 @@ class HouseTexts:
             self._path, self._number = Path(numbered[1]), int(numbered[2])
             self.name = numbered[1]
         elif str(path).startswith("procthor-10k") and not self._path.exists():
-            from evonav.house.procthor10k import house_set, split_path
+            from evonav.house.procthor10k import NAME, house_set, split_path
 
-            self.published = house_set(path)
-            self._path = split_path(self.published)
+            published = house_set(path)
+            self.split = (NAME, published.split)
+            self._path = split_path(published)
             self.name = str(path)
+        elif str(path).startswith("evonav-10k") and not self._path.exists():
+            from evonav.house.evonav10k import NAME, SPLITS, made_split, named_split
+
+            numbered = _NUMBERED.fullmatch(str(path))
+            self.name, self._number = (numbered[1], int(numbered[2])) if numbered else (str(path), None)
+            split = named_split(self.name)
+            self.split = (NAME, split)
+            self._sha256 = SPLITS[split].sha256
+            self._path = made_split(split)
         elif str(path).partition(":")[0] == ENDLESS and not self._path.exists():
-            self._endless = EndlessHouses(str(path))
+            self.endless = EndlessHouses(str(path))
             self.name = str(path)
         else:
             self.name = str(self._path)
-        self.files = [] if self._endless is not None else files_of(self._path)
+        self.files = [] if self.endless is not None else files_of(self._path)
         """The files to read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
         self._num_bytes_before = 0
@@ -118,7 +130,7 @@ class HouseTexts:
     @property
     def is_endless(self) -> bool:
         """Return whether there is no last house."""
-        return self._endless is not None and self._endless.number is None
+        return self.endless is not None and self.endless.number is None
 
     def check_end(self, limit: int | None) -> None:
         """Check that no more houses are asked for than can be read.
@@ -135,10 +147,12 @@ class HouseTexts:
         Raises:
             HouseError: A file cannot be read.
         """
-        if self._endless is not None:
-            return [(self.name, self._endless.sha256())]
+        if self.endless is not None:
+            return [(self.name, self.endless.sha256())]
+        if self._sha256 is not None:
+            return [(self.name, self._sha256)]
         try:
-            return [(self.name if self.published else file.name, sha256_of_file(file)) for file in self.files]
+            return [(self.name if self.split else file.name, sha256_of_file(file)) for file in self.files]
         except OSError as error:
             raise HouseError(f"{self.name}: cannot be read: {error}") from error
 
@@ -164,8 +178,8 @@ class HouseTexts:
             raise HouseError(f"{self.name}:{self._number}: {self.name} has fewer houses")
 
     def _read(self) -> Iterator[HouseText]:
-        if self._endless is not None:
-            yield from (HouseText(*house) for house in self._endless)
+        if self.endless is not None:
+            yield from (HouseText(*house) for house in self.endless)
         self._num_bytes_before = 0
         for file in self.files:
             name = self.name if file == self._path else str(file)

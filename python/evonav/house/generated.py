@@ -17,8 +17,10 @@ from evonav.toml import read_toml
 
 ENDLESS = "endless"
 """`endless:SEED` names the endless houses of a seed, and `endless:SEED:N` the N-th of them, from 1."""
+SPLIT_SEEDS = {"train": 20_001, "val": 20_002, "test": 20_003}
+"""Seeds of `endless:train`, `endless:val` and `endless:test`, which have the assets of their split."""
 MAX_SEED = 2**64 - 1
-_NAME = re.compile(rf"{ENDLESS}:(\d+)(?::([1-9]\d*))?")
+_NAME = re.compile(rf"{ENDLESS}:(\d+|{'|'.join(SPLIT_SEEDS)})(?::([1-9]\d*))?")
 
 
 class EndlessHouses:
@@ -28,15 +30,23 @@ class EndlessHouses:
         """Read a name.
 
         Args:
-            name: `endless:SEED` or `endless:SEED:N`.
+            name: `endless:SEED` or `endless:SPLIT`, and `:N` for the N-th of them.
 
         Raises:
             InvalidArgumentError: The name has another form, or a number is too large.
         """
         found = _NAME.fullmatch(name)
         if found is None:
-            raise InvalidArgumentError(f"{name}: expected {ENDLESS}:SEED or {ENDLESS}:SEED:N, with N from 1")
-        self.seed = int(found[1])
+            splits = ", ".join(SPLIT_SEEDS)
+            raise InvalidArgumentError(
+                f"{name}: expected {ENDLESS}:SEED or {ENDLESS}:SEED:N, with N from 1, and {splits} or a number as SEED"
+            )
+        self.name = f"{ENDLESS}:{found[1]}"
+        """Name of all houses of the seed."""
+        split = found[1] if found[1] in SPLIT_SEEDS else None
+        self.seed = int(found[1]) if split is None else SPLIT_SEEDS[split]
+        self.parameters = "{}" if split is None else json.dumps({"split": split})
+        """Parameters as JSON."""
         self.number = None if found[2] is None else int(found[2])
         """Number of the only house, from 1; `None` for all."""
         if max(self.seed, self.number or 0) > MAX_SEED:
@@ -44,13 +54,18 @@ class EndlessHouses:
 
     def sha256(self) -> str:
         """Return the checksum of everything that decides the houses: version, seed and parameters."""
-        return hashlib.sha256(f"{__version__} {self.seed} {default_house_parameters()}".encode()).hexdigest()
+        return hashlib.sha256(
+            f"{__version__} {self.seed} {default_house_parameters()} {self.parameters}".encode()
+        ).hexdigest()
 
     def __iter__(self) -> Iterator[tuple[str, str]]:
         """Yield the name `endless:SEED:N` and the text of each house, from the first one on."""
-        maker = house_maker("{}")
         for number in count(1) if self.number is None else [self.number]:
-            yield f"{ENDLESS}:{self.seed}:{number}", maker.make(self.seed, number - 1)
+            yield self.house(number)
+
+    def house(self, number: int) -> tuple[str, str]:
+        """Make the house of a number from 1; return its name and its text."""
+        return f"{self.name}:{number}", house_maker(self.parameters).make(self.seed, number - 1)
 
 
 @lru_cache(maxsize=4)

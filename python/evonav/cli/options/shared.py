@@ -89,7 +89,10 @@ PlotFile = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Write a plot: .svg, .png or .pdf. It needs the extra `viz`."),
 ]
-HOUSES = "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, endless:SEED, or bundled"
+HOUSES = (
+    "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, evonav-10k:SPLIT, endless:SEED, "
+    "or bundled"
+)
 Houses = Annotated[
     Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}. Default: use --tasks.")
 ]
@@ -169,9 +172,14 @@ Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run; an
 
 
 def read_houses(houses: "Path | str", assets: Path | None, start: str) -> "HouseTexts":
-    """Return houses, with the sizes of `--assets` and the starts of `--start`."""
+    """Return houses, with the sizes of `--assets` and the starts of `--start`; houses that evonav makes are made."""
+    from evonav.cli.display import house_progress
+    from evonav.house.evonav10k import SPLITS, made_split, split_to_make
     from evonav.house.files import HouseTexts
 
+    if (split := split_to_make(str(houses))) is not None:
+        with house_progress(SPLITS[split].num_houses) as show:
+            made_split(split, on_progress=show)
     return HouseTexts(houses, house_options(assets, start))
 
 

@@ -24,10 +24,13 @@ from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
+    from evonav.generation.house_classifier import Telling
     from evonav.generation.house_statistics import HouseComparison
     from evonav.report.tables.table import Table
 
 EXIT_WRONG = 1
+NUM_USED = 10
+"""Features that the table of a classifier shows."""
 LEVEL = 0.05
 """Largest adjusted p at which two sets of houses differ in a feature."""
 
@@ -52,9 +55,8 @@ def list_houses(
     """List houses with their rooms, floor areas and objects."""
     from evonav.generation.house_view import area_of_m2
     from evonav.house import House
-    from evonav.house.files import HouseTexts
 
-    texts = HouseTexts(path or BUNDLED)
+    texts = read_houses(path or BUNDLED, None, "file")
     texts.check_end(limit)
     typer.echo("rooms   area m2  objects  house")
     for house in (House(text, name=name) for name, text in islice(texts, limit)):
@@ -184,21 +186,53 @@ def stats(
     b: Annotated[str, typer.Argument(metavar="B", help="Houses to compare them with.")],
     limit: Limit = None,
     every: Annotated[bool, typer.Option("--all", help="Print all features, not only those that differ.")] = False,
+    classifier: Annotated[
+        bool,
+        typer.Option("--classifier", help="Also train a classifier to tell the sets apart; needs the extra `houses`."),
+    ] = False,
 ) -> None:
     """Set two sets of houses side by side, and test in what they differ.
 
     Houses are compared with those of the same room spec.
     """
+    from evonav.generation.house_classifier import tell_apart
     from evonav.generation.house_statistics import compare_houses, sample_of
 
     samples = []
     for name in (a, b):
-        texts = read_houses(name, None, "file")
+        texts = read_houses(name, None, "auto")
         texts.check_end(limit)
         with status(f"Reading {name}"):
             samples.append([sample_of(text) for text in islice(texts, limit)])
     found = compare_houses(*samples)
     show_tables([comparison_table(found, (a, b), every=every)])
+    if classifier:
+        with status("Training a classifier"):
+            told = tell_apart(*samples)
+        show_tables([telling_table(told, found)])
+
+
+def telling_table(told: "Telling", found: "HouseComparison") -> "Table":
+    """Return the table of `evonav houses stats --classifier`: what the classifier uses most."""
+    from evonav.report.tables.table import Table
+
+    means = {one.name: (f"{one.mean_a:.2f}", f"{one.mean_b:.2f}") for one in found.features}
+    rows = [
+        (name, f"{100 * loss:.1f}", *means.get(name, ("-", "-")))
+        for name, loss in list(told.uses.items())[:NUM_USED]
+        if loss > 0.0
+    ]
+    low, high = told.interval
+    counts = counted(told.num_houses, "house")
+    return Table(
+        title=f"A classifier is right in {100 * told.accuracy:.1f}% [{100 * low:.1f}, {100 * high:.1f}]; chance is 50%",
+        columns=("what it uses", "lost without, points", "A", "B"),
+        rows=tuple(rows),
+        notes=(
+            f"Gradient boosting with {counted(len(told.uses), 'feature')} of {counts} of each set, as many of each "
+            "room spec, on houses that it was not trained on (five folds).",
+        ),
+    )
 
 
 def comparison_table(found: "HouseComparison", names: tuple[str, str], *, every: bool) -> "Table":
@@ -226,8 +260,13 @@ def comparison_table(found: "HouseComparison", names: tuple[str, str], *, every:
 
 
 @houses_app.command(name="fetch", cls=Command)
+@with_settings("pool")
 def fetch_houses(
-    dataset: Annotated[str, typer.Argument(metavar="DATASET", help="Dataset: procthor-10k.")],
+    pool: "RunSettings",
+    dataset: Annotated[
+        str,
+        typer.Argument(metavar="DATASET", help="Dataset: procthor-10k, which is downloaded, or evonav-10k, made here."),
+    ],
     revision: Annotated[
         str | None, typer.Option(metavar="TEXT", help="Commit, tag or branch. Default: the one for AI2-THOR 5.")
     ] = None,
@@ -243,20 +282,31 @@ def fetch_houses(
         typer.Option(metavar="FOLDER", help="Folder of the download. Default: EVONAV_CACHE, else ~/.cache/evonav."),
     ] = None,
 ) -> None:
-    """Download a published dataset of houses.
+    """Download a published dataset of houses, or make that of evonav; run again to resume.
 
-    If it was downloaded before, the checksums of its files are verified.
+    If the houses are there already, the checksums of their files are verified.
     """
+    from evonav.house import evonav10k
     from evonav.house.procthor10k import NAME, REVISION, SPLITS
     from evonav.house.procthor10k_fetch import fetch_procthor10k
 
-    if dataset != NAME:
-        raise typer.BadParameter(f"{dataset}: expected {NAME}")
+    if dataset not in (NAME, evonav10k.NAME):
+        raise typer.BadParameter(f"{dataset}: expected {NAME} or {evonav10k.NAME}")
     splits = listed(split)
     unknown = [name for name in splits if name not in SPLITS]
     if unknown:
         raise typer.BadParameter(f"--split {unknown[0]}: expected {', '.join(SPLITS)}")
     wanted = [name for name in SPLITS if not splits or name in splits]
+    if dataset == evonav10k.NAME:
+        if revision is not None:
+            raise typer.BadParameter(f"--revision {revision}: {dataset} has none")
+        for name in wanted:
+            num_houses, path = evonav10k.SPLITS[name].num_houses, evonav10k.split_path(name, cache)
+            state = "verified" if path.exists() else "made"
+            with interruptible(path), house_progress(num_houses) as show:
+                evonav10k.made_split(name, cache=cache, workforce=pool.workforce(), on_progress=show)
+            typer.echo(f"{dataset}:{name}\t{counted(num_houses, 'house')}\t{state}\t{path}")
+        return
     with status(f"Fetching {NAME}") as tell:
         fetched = fetch_procthor10k(revision or REVISION, wanted, cache=cache, on_progress=tell)
     for name in wanted:

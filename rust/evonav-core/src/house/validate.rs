@@ -13,6 +13,8 @@ const HOLE_TOLERANCE_M: f64 = 0.01;
 /// Smallest area of a floor.
 const MIN_AREA_M2: f64 = 0.01;
 const MIN_WALL_M: f64 = 0.001;
+/// Area of a triangle up to which its corners lie on one line.
+const ON_LINE_M2: f64 = 1e-9;
 
 /// Check ids, references, polygons and openings.
 pub(super) fn check(house: &House) -> Result<(), Error> {
@@ -69,7 +71,10 @@ fn check_room(house: &House, room: &Room) -> Result<(), Error> {
 /// Return whether two segments cross between their ends.
 fn cross(a: [Vec2; 2], b: [Vec2; 2]) -> bool {
     let side = |[p, q]: [Vec2; 2], r: Vec2| polygon_area_m2(&[p, q, r]);
-    side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
+    // Ends on one line are a little beside it: their coordinates are rounded.
+    let are_apart =
+        |[one, other]: [f64; 2]| one.min(other) < -ON_LINE_M2 && one.max(other) > ON_LINE_M2;
+    are_apart(b.map(|end| side(a, end))) && are_apart(a.map(|end| side(b, end)))
 }
 
 fn check_wall(house: &House, wall: &Wall, rooms: &HashSet<&str>) -> Result<(), Error> {

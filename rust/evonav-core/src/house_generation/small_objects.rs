@@ -10,7 +10,7 @@ use crate::{
         structure::Structure,
     },
     rng::Stream,
-    world::layout::{Layout, surfaces::sample_surface_place},
+    world::layout::{Layout, surfaces::spawn_on_surface},
 };
 
 /// Height at which objects wait for their place: no house reaches it.
@@ -81,7 +81,9 @@ fn wanted_on(
     let receptacle_bias = receptacle_bias.copied().unwrap_or(rules.receptacle_bias);
     let on_it = stock.categories.iter().filter_map(|(&category, facts)| {
         let probability = catalogue.rest_probability(category, receptacle);
-        let is_used = probability > 0.0 && facts.rule.room_weight(room_type) > 0.0;
+        // `InitialRandomSpawn` leaves what is fixed, such as taps, where it is.
+        let is_used =
+            probability > 0.0 && facts.is_movable && facts.rule.room_weight(room_type) > 0.0;
         is_used.then_some((category, probability))
     });
     let happening = on_it.filter(|(category, probability)| {
@@ -125,8 +127,7 @@ pub(super) fn place(
         if is_single && has_one {
             continue;
         }
-        let place = (0..rules.num_places)
-            .find_map(|_| sample_surface_place(layout, index, &[receptacle], 0.0, stream));
+        let place = spawn_on_surface(layout, index, receptacle, rules.num_points, stream);
         if let Some(place) = place {
             layout.put(index, place);
             let object = &mut objects[index];

@@ -63,6 +63,16 @@ fn corners(points: &[[i32; 2]]) -> Value {
     points.iter().map(|[x, z]| json!({"x": x, "y": 0, "z": z})).collect()
 }
 
+/// A side of a room that is rounded and ends at several walls of others does not cross itself.
+#[test]
+fn edges_on_one_line_do_not_cross() {
+    let side = [2.029, 4.059, 10.147, 12.177].map(|z| json!({"x": 6.088, "y": 0.0, "z": z}));
+    let other = [12.177, 2.029].map(|z| json!({"x": 8.118, "y": 0.0, "z": z}));
+    let polygon: Vec<Value> = side.into_iter().chain(other).collect();
+    let house = changed("/rooms/0/floorPolygon", json!(polygon));
+    House::from_json("house", &house).expect("valid");
+}
+
 #[test]
 fn refusals_name_object_field_and_value() {
     let cases = [

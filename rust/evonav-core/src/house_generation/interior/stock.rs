@@ -25,6 +25,9 @@ pub(in crate::house_generation) struct Stock {
 pub(in crate::house_generation) struct StockCategory {
     pub rule: &'static PlacementRule,
     pub assets: Vec<&'static Asset>,
+    /// Whether such objects can be picked up or pushed: any asset of the category, of whatever
+    /// split, since the database lacks this of some.
+    pub is_movable: bool,
 }
 
 /// An asset group with the assets that may be used.
@@ -47,7 +50,9 @@ impl Stock {
         let categories = catalogue.categories().into_iter().filter_map(|name| {
             let assets = used(catalogue.assets_in(name));
             let rule = catalogue.placement(name)?;
-            (!assets.is_empty()).then_some((name, StockCategory { rule, assets }))
+            let mut all = catalogue.assets_in(name).iter().filter_map(|id| catalogue.get(id));
+            let is_movable = all.any(|asset| asset.is_pickupable || asset.is_moveable);
+            (!assets.is_empty()).then_some((name, StockCategory { rule, assets, is_movable }))
         });
         let groups = catalogue.groups().iter().filter_map(|definition| {
             let named = definition.members.iter().filter(|member| !member.assets.is_empty());

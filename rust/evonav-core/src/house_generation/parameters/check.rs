@@ -166,7 +166,7 @@ impl HouseParameters {
             ("structure.num_candidates", structure.num_candidates, 1, 1000),
             ("floor_objects.group_tries", floor_objects.group_tries, 1, 1000),
             ("small_objects.max_of_category", small_objects.max_of_category, 1, 100),
-            ("small_objects.num_places", small_objects.num_places, 1, 1000),
+            ("small_objects.num_points", small_objects.num_points, 1, 1000),
         ] {
             let expected = format!("in {least}..={most}");
             Error::require(name, value, &expected, |v| (least..=most).contains(&v))?;

@@ -205,9 +205,9 @@ pub struct SmallObjects {
     pub max_of_category: usize,
     /// Height from which an asset of a category is not small (`HOUSE_PLANT_MAX_HEIGHT`).
     pub max_heights_m: BTreeMap<String, f64>,
-    /// Number of places tried for an object on its receptacle: 6 points with 4 yaws, as AI2-THOR's
-    /// `InitialRandomSpawn` does.
-    pub num_places: usize,
+    /// Number of points tried for an object on its receptacle, with 4 yaws each, as AI2-THOR's
+    /// `InitialRandomSpawn` does (`numPlacementAttempts` and the first one).
+    pub num_points: usize,
 }
 
 fn names(names: &[&str]) -> Vec<String> {
@@ -372,7 +372,7 @@ impl Default for SmallObjects {
             house_bias_beta: [3.5, 1.9],
             max_of_category: 3,
             max_heights_m: table(&[("HousePlant", 0.75)]),
-            num_places: 24,
+            num_points: 6,
         }
     }
 }

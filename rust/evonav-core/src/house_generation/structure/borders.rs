@@ -157,11 +157,13 @@ impl Structure {
 #[derive(Debug, Clone)]
 struct Run {
     rooms: (usize, Option<usize>),
+    /// Cells on its side of smaller coordinates.
+    before: Cell,
     low: Corner,
     high: Corner,
 }
 
-/// Return all borders: maximal straight lines between the same two rooms.
+/// Return all borders: maximal straight lines between the same two rooms, each on one side.
 fn border_runs(cells: &Cells) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for axis in 0..2 {
@@ -173,7 +175,8 @@ fn border_runs(cells: &Cells) -> Vec<Run> {
                     cell[axis] = fixed as i64 + offset;
                     cells.at(cell[0], cell[1])
                 };
-                let rooms = match (beside(-1), beside(0)) {
+                let before = beside(-1);
+                let rooms = match (before, beside(0)) {
                     (Cell::Of(a), Cell::Of(b)) if a != b => (a.min(b), Some(a.max(b))),
                     (Cell::Of(a), Cell::Outside) | (Cell::Outside, Cell::Of(a)) => (a, None),
                     _ => continue,
@@ -182,9 +185,12 @@ fn border_runs(cells: &Cells) -> Vec<Run> {
                 low[axis] = fixed;
                 let mut high = low;
                 high[1 - axis] += 1;
-                match runs.last_mut().filter(|run| run.rooms == rooms && run.high == low) {
-                    Some(run) if run.low[axis] == fixed => run.high = high,
-                    _ => runs.push(Run { rooms, low, high }),
+                let continues = |run: &&mut Run| {
+                    (run.rooms, run.before, run.high, run.low[axis]) == (rooms, before, low, fixed)
+                };
+                match runs.last_mut().filter(continues) {
+                    Some(run) => run.high = high,
+                    None => runs.push(Run { rooms, before, low, high }),
                 }
             }
         }
@@ -224,4 +230,27 @@ fn loop_of(runs: &[Run], cells: &Cells, room: usize) -> Option<Vec<(usize, Corne
     let is_closed = found[found.len() - 1].2 == found[0].1;
     let is_simple = (0..found.len()).all(|i| found[..i].iter().all(|side| side.1 != found[i].1));
     (is_closed && is_simple).then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{border_runs, loop_of};
+    use crate::house_generation::structure::boundary::{Cell, Cells};
+
+    /// Two rooms on four cells: beside each other, and each in two cells that touch at a corner.
+    #[test]
+    fn rooms_that_touch_themselves_at_a_corner_have_no_outline() {
+        let outlines = |rooms: [[usize; 2]; 2]| {
+            let mut cells = Cells::empty([2, 2]);
+            for (x, column) in rooms.into_iter().enumerate() {
+                for (z, room) in column.into_iter().enumerate() {
+                    cells.set(x, z, Cell::Of(room));
+                }
+            }
+            let runs = border_runs(&cells);
+            [0, 1].map(|room| loop_of(&runs, &cells, room).map(|sides| sides.len()))
+        };
+        assert_eq!(outlines([[0, 0], [1, 1]]), [Some(4), Some(4)]);
+        assert_eq!(outlines([[0, 1], [1, 0]]), [None, None]);
+    }
 }

@@ -28,6 +28,11 @@ pub(super) struct Cells {
 }
 
 impl Cells {
+    /// Create cells of no room yet.
+    pub(super) fn empty(size: [usize; 2]) -> Self {
+        Self { size, cells: vec![Cell::Empty; size[0] * size[1]] }
+    }
+
     pub(super) fn get(&self, x: usize, z: usize) -> Cell {
         self.cells[x * self.size[1] + z]
     }
@@ -67,7 +72,7 @@ pub(super) fn sample_boundary(
             [0, 1].map(|_| least.max(1) + stream.below(most + 1 - least.max(1)))
         }
     };
-    let mut cells = Cells { size, cells: vec![Cell::Empty; size[0] * size[1]] };
+    let mut cells = Cells::empty(size);
     let shape = [parameters.cut_alpha_per_room * num_rooms as f64, parameters.cut_beta];
     let num_cuts = (parameters.cut_scale * beta(stream, shape)).round() as usize;
     for _ in 0..num_cuts {

@@ -2,7 +2,7 @@
 
 use crate::{
     assets::Catalogue,
-    geometry::{Vec2, add, outline::overlap_m, polygon_contains, rotate, yaw_rotation},
+    geometry::{Vec2, Vec3, add, outline::overlap_m, polygon_contains, rotate, yaw_rotation},
     rng::Stream,
     world::{
         footprint::convex_hull,
@@ -20,6 +20,12 @@ const SUPPORTED_SHARE: f64 = 0.8;
 const SURFACE_M: f64 = 0.02;
 /// Largest height difference between parts that bear one object.
 const LEVEL_M: f64 = 0.003;
+
+/// Number of yaws at a point.
+const NUM_YAWS: usize = 4;
+/// Number of draws of a point on a surface that covers a part of its receptacle's box, such as the
+/// tank of a toilet.
+const POINT_DRAWS: usize = 20;
 
 /// Categories that are part of their support and move with it.
 pub const FITTINGS: [&str; 3] = ["Faucet", "ShowerHead", "Sink"];
@@ -62,24 +68,73 @@ pub fn sample_surface_place(
     min_move_m: f64,
     stream: &mut Stream,
 ) -> Option<Placement> {
-    let receptacle_index = *receptacles.get(stream.below(receptacles.len()))?;
-    let (item, receptacle) = (&layout.items[index], &layout.items[receptacle_index]);
+    let receptacle = *receptacles.get(stream.below(receptacles.len()))?;
+    let point_m = sample_surface_point(layout, receptacle, stream)?;
+    let quarter_turns = stream.below(NUM_YAWS);
+    surface_place(layout, index, receptacle, point_m, quarter_turns, SUPPORTED_SHARE, min_move_m)
+}
+
+/// Draw a place for one small object as AI2-THOR's `InitialRandomSpawn` does: at each of
+/// `num_points` points on the receptacle in turn, with each of four yaws, and with all corners over
+/// it; `None` if it fits nowhere.
+pub fn spawn_on_surface(
+    layout: &Layout,
+    index: usize,
+    receptacle: usize,
+    num_points: usize,
+    stream: &mut Stream,
+) -> Option<Placement> {
+    let solids = &layout.items[receptacle].solids;
+    let is_borne = |&[x, height_m, z]: &Vec3| {
+        let mut level = solids.iter().filter(|solid| (solid.top_m - height_m).abs() < SURFACE_M);
+        level.any(|solid| polygon_contains(&solid.outline_m, [x, z]))
+    };
+    (0..num_points).find_map(|_| {
+        let mut points =
+            (0..POINT_DRAWS).map_while(|_| sample_surface_point(layout, receptacle, stream));
+        let point_m = points.find(is_borne)?;
+        let first = stream.below(NUM_YAWS);
+        (first..first + NUM_YAWS)
+            .find_map(|turns| surface_place(layout, index, receptacle, point_m, turns, 1.0, 0.0))
+    })
+}
+
+/// Draw a point over the box of a receptacle, at the height of one of its surfaces; `None` if it
+/// has no surface.
+fn sample_surface_point(layout: &Layout, receptacle: usize, stream: &mut Stream) -> Option<Vec3> {
+    let receptacle = &layout.items[receptacle];
     let surfaces = &receptacle.asset.surfaces_m;
     let height_m = bottom_m(&receptacle.solids) + surfaces.get(stream.below(surfaces.len()))?;
     let yaw_deg = receptacle.placement.rotation_deg[1];
     let [size_x, _, size_z] = receptacle.asset.size_m;
     let local = [(stream.uniform() - 0.5) * size_x, 0.0, (stream.uniform() - 0.5) * size_z];
-    let centre =
+    let [x, _, z] =
         add(rotate(&yaw_rotation(yaw_deg.to_radians()), local), receptacle.placement.position_m);
+    Some([x, height_m, z])
+}
+
+/// Return the place of an object over a point of a receptacle's surface; `None` if it would
+/// overhang, touch another object, or stay where it already is.
+///
+/// # Arguments
+/// * `quarter_turns` - its yaw from that of the receptacle.
+/// * `supported_share` - share of its outline, about its middle, that must lie over the surface.
+fn surface_place(
+    layout: &Layout,
+    index: usize,
+    receptacle_index: usize,
+    [x, height_m, z]: Vec3,
+    quarter_turns: usize,
+    supported_share: f64,
+    min_move_m: f64,
+) -> Option<Placement> {
+    let (item, receptacle) = (&layout.items[index], &layout.items[receptacle_index]);
+    let yaw_deg = receptacle.placement.rotation_deg[1] + 90.0 * quarter_turns as f64;
     let rise_m = item.rise_m();
     let [x_deg, _, z_deg] = item.placement.rotation_deg;
     let mut place = Placement {
-        position_m: [
-            round_to(centre[0], ROUND_M),
-            round_to(height_m + rise_m, ROUND_M),
-            round_to(centre[2], ROUND_M),
-        ],
-        rotation_deg: [x_deg, turned_deg(yaw_deg + 90.0 * stream.below(4) as f64), z_deg],
+        position_m: [x, height_m + rise_m, z].map(|value| round_to(value, ROUND_M)),
+        rotation_deg: [x_deg, turned_deg(yaw_deg), z_deg],
         parent: Some(receptacle_index),
     };
     let moved_m: f64 = (0..3)
@@ -112,7 +167,7 @@ pub fn sample_surface_place(
     let shrunk = |p: &Vec2| {
         [0, 1].map(|i| {
             let middle = place.position_m[2 * i];
-            middle + SUPPORTED_SHARE * (p[i] - middle)
+            middle + supported_share * (p[i] - middle)
         })
     };
     let is_valid = is_borne([place.position_m[0], place.position_m[2]])

@@ -1,0 +1,106 @@
+"""Tell two sets of houses apart with a classifier: a two-sample test that sees how features hang together.
+
+Lopez-Paz & Oquab, "Revisiting Classifier Two-Sample Tests", ICLR 2017: if no classifier tells houses that it has not
+seen from those of the other set better than by chance, the sets have the same distribution as far as its features
+show.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from evonav.component import optional_module
+from evonav.errors import InvalidArgumentError
+from evonav.generation.house_statistics import CATEGORY, Features, HouseSample, by_stratum, feature_table
+from evonav.statistics import Interval, wilson
+
+NUM_FEATURES = 60
+"""Largest number of features: all that are no counts of a category, then the categories that most houses have."""
+NUM_FOLDS = 5
+MIN_HOUSES = 2 * NUM_FOLDS
+"""Least number of houses of each set."""
+NUM_SHUFFLES = 5
+"""Times that each feature is shuffled to find what it is worth."""
+_EXTRA = "'evonav[houses]'"
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """How well a classifier tells two sets of houses apart."""
+
+    num_houses: int
+    """Number of houses of each set; every stratum has as many of one as of the other."""
+    accuracy: float
+    """Share of houses in folds that it was not trained on which it assigns to their set; 0.5 is chance."""
+    interval: Interval
+    """95% interval of the accuracy (Wilson)."""
+    uses: Mapping[str, float]
+    """Accuracy that is lost when a feature is shuffled among these houses, largest first."""
+
+
+def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int = 0) -> Telling:
+    """Train gradient boosting to tell two sets of houses apart, in five folds.
+
+    Of each stratum that both sets have, as many houses are drawn of one as of the other, and folds have as many of
+    one as of the other. So the mix of room specs says nothing.
+
+    Args:
+        a: Houses of one set.
+        b: Houses of the other one.
+        seed: Seed of the draws, the folds and the shuffles.
+
+    Raises:
+        InvalidArgumentError: There are too few houses of the same strata.
+        StoreError: scikit-learn is not installed.
+    """
+    purpose = "the classifier needs scikit-learn"
+    ensemble = optional_module("sklearn.ensemble", purpose, _EXTRA)
+    inspection = optional_module("sklearn.inspection", purpose, _EXTRA)
+    sets = _balanced(a, b, Random(seed))  # noqa: S311 - no secrets
+    num_houses = len(sets[0])
+    if num_houses < MIN_HOUSES:
+        raise InvalidArgumentError(
+            f"the sets have {num_houses} houses of the same room specs; a classifier needs at least {MIN_HOUSES}"
+        )
+    names = _most_usual([*sets[0], *sets[1]])
+    table = feature_table([*sets[0], *sets[1]], names)
+    labels = np.repeat([0, 1], num_houses)
+    folds = np.tile(np.arange(num_houses) % NUM_FOLDS, 2)
+    num_right, losses = 0, np.zeros(len(names))
+    for fold in range(NUM_FOLDS):
+        is_held_out = folds == fold
+        model: Any = ensemble.GradientBoostingClassifier(random_state=seed)
+        model.fit(table[~is_held_out], labels[~is_held_out])
+        held_out = table[is_held_out], labels[is_held_out]
+        num_right += round(float(model.score(*held_out)) * len(held_out[1]))
+        found = inspection.permutation_importance(model, *held_out, n_repeats=NUM_SHUFFLES, random_state=seed)
+        losses += found.importances_mean * len(held_out[1])
+    num_all = 2 * num_houses
+    order = np.argsort(-losses, kind="stable")
+    uses = {names[index]: float(losses[index]) / num_all for index in order}
+    return Telling(num_houses, num_right / num_all, wilson(num_right, num_all) or (0.0, 1.0), uses)
+
+
+def _balanced(
+    a: Sequence[HouseSample], b: Sequence[HouseSample], random: Random
+) -> tuple[list[Features], list[Features]]:
+    """Draw as many houses of each stratum from one set as from the other."""
+    one, other = by_stratum(a), by_stratum(b)
+    drawn: tuple[list[Features], list[Features]] = ([], [])
+    for name in (name for name in one if name in other):
+        count = min(len(one[name]), len(other[name]))
+        drawn[0].extend(random.sample(one[name], count))
+        drawn[1].extend(random.sample(other[name], count))
+    return drawn
+
+
+def _most_usual(houses: Sequence[Features]) -> list[str]:
+    """Return the features that are compared, those of no category first."""
+    shares = Counter(name for features in houses for name in features)
+    others = sorted(name for name in shares if not name.startswith(CATEGORY))
+    categories = sorted((name for name in shares if name.startswith(CATEGORY)), key=lambda name: (-shares[name], name))
+    return [*others, *categories][:NUM_FEATURES]
