@@ -3,10 +3,11 @@
     python examples/train_gym.py [updates]
 
 Every task is in a new house with ProcTHOR's train assets, made from a seed when it is needed; what was learned is tried
-on bundled tasks, whose houses have test assets. 32 environments walk at once; every 32 steps the policy is moved towards
-the actions after which more came of it than on average (Williams, "Simple statistical gradient-following algorithms",
-1992). The environment's own reward is for getting nearer to the goal and finding it; new ground, as far as the agent's
-own pose tells, counts too. Where to walk is learned; the rule to stop where the goal is seen from close by is given.
+on bundled tasks, whose houses have test assets. 32 environments walk at once; every 32 steps the policy is moved
+towards the actions after which more came of it than on average (Williams, "Simple statistical gradient-following
+algorithms", 1992). The environment's own reward is for getting nearer to the goal and finding it; new ground, as far as
+the agent's own pose tells, counts too. Where to walk is learned; the rule to stop where the goal is seen from close by
+is given.
 """
 
 import sys

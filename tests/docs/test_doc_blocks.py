@@ -40,6 +40,7 @@ PARSED_ONLY = {
     "evonav houses fetch": "network",
     "evonav sweep": "minutes: tests/evaluation/test_sweep.py runs these files, smaller",
     "--houses procthor-10k": "needs what the network brings",
+    "evonav-10k": "minutes: tests/house/test_evonav10k.py makes smaller sets",
     "test-90": "needs a whole dataset",
     "--simulator ai2thor": "AI2-THOR: tests/world, tests/thor",
     "--decision vlm": "a model: tests/decision, with a stand-in",

@@ -163,6 +163,8 @@ def test_the_command(small: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
         assert f"evonav-10k:val\t3 houses\t{state}" in capsys.readouterr().out
     assert run("houses", "list", "evonav-10k:test:2") == 0
     assert "evonav-10k:test:2" in capsys.readouterr().out
+    assert run("houses", "list", "evonav-10k:train:0") != 0
+    assert not split_path("train").exists()
     assert run("houses", "fetch", "evonav-10k", "--revision", "main") != 0
     assert run("houses", "fetch", "other") != 0
     assert "expected procthor-10k or evonav-10k" in " ".join(capsys.readouterr().err.split())

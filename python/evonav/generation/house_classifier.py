@@ -1,4 +1,4 @@
-"""Tell two sets of houses apart with a classifier: a two-sample test that sees how features hang together.
+"""Train a classifier to tell two sets of houses apart: a two-sample test that also sees combinations of features.
 
 Lopez-Paz & Oquab, "Revisiting Classifier Two-Sample Tests", ICLR 2017: if no classifier tells houses that it has not
 seen from those of the other set better than by chance, the sets have the same distribution as far as its features
@@ -29,8 +29,8 @@ _EXTRA = "'evonav[houses]'"
 
 
 @dataclass(frozen=True, slots=True)
-class Telling:
-    """How well a classifier tells two sets of houses apart."""
+class ClassifierTest:
+    """The result of a classifier that was trained to tell two sets of houses apart."""
 
     num_houses: int
     """Number of houses of each set; every stratum has as many of one as of the other."""
@@ -42,7 +42,7 @@ class Telling:
     """Accuracy that is lost when a feature is shuffled among these houses, largest first."""
 
 
-def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int = 0) -> Telling:
+def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int = 0) -> ClassifierTest:
     """Train gradient boosting to tell two sets of houses apart, in five folds.
 
     Of each stratum that both sets have, as many houses are drawn of one as of the other, and folds have as many of
@@ -72,17 +72,17 @@ def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int 
     folds = np.tile(np.arange(num_houses) % NUM_FOLDS, 2)
     num_right, losses = 0, np.zeros(len(names))
     for fold in range(NUM_FOLDS):
-        is_held_out = folds == fold
+        is_test = folds == fold
         model: Any = ensemble.GradientBoostingClassifier(random_state=seed)
-        model.fit(table[~is_held_out], labels[~is_held_out])
-        held_out = table[is_held_out], labels[is_held_out]
-        num_right += round(float(model.score(*held_out)) * len(held_out[1]))
-        found = inspection.permutation_importance(model, *held_out, n_repeats=NUM_SHUFFLES, random_state=seed)
-        losses += found.importances_mean * len(held_out[1])
+        model.fit(table[~is_test], labels[~is_test])
+        test = table[is_test], labels[is_test]
+        num_right += round(float(model.score(*test)) * len(test[1]))
+        found = inspection.permutation_importance(model, *test, n_repeats=NUM_SHUFFLES, random_state=seed)
+        losses += found.importances_mean * len(test[1])
     num_all = 2 * num_houses
     order = np.argsort(-losses, kind="stable")
     uses = {names[index]: float(losses[index]) / num_all for index in order}
-    return Telling(num_houses, num_right / num_all, wilson(num_right, num_all) or (0.0, 1.0), uses)
+    return ClassifierTest(num_houses, num_right / num_all, wilson(num_right, num_all) or (0.0, 1.0), uses)
 
 
 def _balanced(

@@ -22,8 +22,8 @@ from evonav.tasks.subsets import subset_roots
 NUM_DRAWN = 2**31
 """Number of tasks of houses that may be drawn."""
 MAX_HOUSES_TRIED = 200
-"""Houses in a row without a task after which there is none; of ProcTHOR's houses, one in nine has a single room."""
-_NUM_KEPT = 64
+"""Houses in a row without a task after which there is none; of ProcTHOR's houses, one in five has a single room."""
+_NUM_CACHED = 64
 """Generated tasks that are kept in memory, about 1 MB each."""
 
 
@@ -138,7 +138,7 @@ class HouseTasks:
         self._endless = texts.endless if texts.is_endless else None
         self._texts: tuple[HouseText, ...] = () if texts.is_endless else tuple(texts)
         self._dataset, self._split = inherited_names(texts)
-        self._made = lru_cache(maxsize=_NUM_KEPT)(self._make)
+        self._made = lru_cache(maxsize=_NUM_CACHED)(self._make)
 
     def draw(self, random: np.random.Generator) -> int:
         """Draw the number of a task uniformly."""

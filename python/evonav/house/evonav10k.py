@@ -9,6 +9,7 @@ generator that makes other houses must get another name.
 import gzip
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -30,7 +31,7 @@ class HousesDifferError(HouseError):
 
 
 class MadeSplit(NamedTuple):
-    """What decides a split, and what must come out."""
+    """A split: what decides its houses, and their checksum."""
 
     seed: int
     num_houses: int
@@ -63,9 +64,9 @@ def named_split(text: str) -> Split:
 
 def split_to_make(name: str, cache: Path | None = None) -> Split | None:
     """Return the split that `evonav-10k:SPLIT` or `evonav-10k:SPLIT:N` names, if it was not made yet."""
-    named = ":".join(name.split(":")[:2])
-    found = (split for split in SPLITS if named == f"{NAME}:{split}" and not split_path(split, cache).exists())
-    return next(found, None)
+    found = re.fullmatch(rf"{NAME}:(\w+)(:[1-9]\d*)?", name)
+    wanted = (split for split in SPLITS if found and found[1] == split and not split_path(split, cache).exists())
+    return next(wanted, None)
 
 
 def split_path(split: Split, cache: Path | None = None) -> Path:
@@ -95,14 +96,15 @@ def made_split(
     path, made = split_path(split, cache), SPLITS[split]
     if not path.exists():
         with writing(path.parent):
-            make_houses(
-                path,
-                made.num_houses,
-                seed=made.seed,
-                parameters=json.dumps({"split": split}),
-                workforce=workforce,
-                on_progress=on_progress,
-            )
+            if not path.exists():  # another process may have made it meanwhile
+                make_houses(
+                    path,
+                    made.num_houses,
+                    seed=made.seed,
+                    parameters=json.dumps({"split": split}),
+                    workforce=workforce,
+                    on_progress=on_progress,
+                )
     digest = _sha256_of_text(path)
     if digest != made.sha256:
         raise HousesDifferError(

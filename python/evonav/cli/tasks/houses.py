@@ -24,7 +24,7 @@ from evonav.counted import counted
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.generation.house_classifier import Telling
+    from evonav.generation.house_classifier import ClassifierTest
     from evonav.generation.house_statistics import HouseComparison
     from evonav.report.tables.table import Table
 
@@ -208,28 +208,28 @@ def stats(
     show_tables([comparison_table(found, (a, b), every=every)])
     if classifier:
         with status("Training a classifier"):
-            told = tell_apart(*samples)
-        show_tables([telling_table(told, found)])
+            tested = tell_apart(*samples)
+        show_tables([classifier_table(tested, found)])
 
 
-def telling_table(told: "Telling", found: "HouseComparison") -> "Table":
+def classifier_table(tested: "ClassifierTest", found: "HouseComparison") -> "Table":
     """Return the table of `evonav houses stats --classifier`: what the classifier uses most."""
     from evonav.report.tables.table import Table
 
-    means = {one.name: (f"{one.mean_a:.2f}", f"{one.mean_b:.2f}") for one in found.features}
+    averages = {one.name: (f"{one.mean_a:.2f}", f"{one.mean_b:.2f}") for one in found.features}
     rows = [
-        (name, f"{100 * loss:.1f}", *means.get(name, ("-", "-")))
-        for name, loss in list(told.uses.items())[:NUM_USED]
+        (name, f"{100 * loss:.1f}", *averages.get(name, ("-", "-")))
+        for name, loss in list(tested.uses.items())[:NUM_USED]
         if loss > 0.0
     ]
-    low, high = told.interval
-    counts = counted(told.num_houses, "house")
+    rate, low, high = (f"{100 * value:.1f}" for value in (tested.accuracy, *tested.interval))
+    counts = counted(tested.num_houses, "house")
     return Table(
-        title=f"A classifier is right in {100 * told.accuracy:.1f}% [{100 * low:.1f}, {100 * high:.1f}]; chance is 50%",
+        title=f"A classifier is right in {rate}% [{low}, {high}]; chance is 50%",
         columns=("what it uses", "lost without, points", "A", "B"),
         rows=tuple(rows),
         notes=(
-            f"Gradient boosting with {counted(len(told.uses), 'feature')} of {counts} of each set, as many of each "
+            f"Gradient boosting with {counted(len(tested.uses), 'feature')} of {counts} of each set, as many of each "
             "room spec, on houses that it was not trained on (five folds).",
         ),
     )
