@@ -209,15 +209,30 @@ proptest! {
         };
         // The same buffer for all: nothing is left of the picture before.
         let mut buffer = FrameBuffer::default();
-        let mut picture = |front: Option<Part>| {
+        let picture = |front: Option<Part>, buffer: &mut FrameBuffer| {
             let all: Vec<Part> = parts.iter().copied().chain(front).collect();
             let want = Want { rgb: Some(Style::Default), instances: true };
-            render(&SceneMesh::build(&scene_of(&all)), &camera, want, &mut buffer).unwrap();
+            render(&SceneMesh::build(&scene_of(&all)), &camera, want, buffer).unwrap();
             buffer.take()
         };
-        let (glazed, opaque, open) = (picture(Some(pane)), picture(Some(board)), picture(None));
+        let [glazed, opaque, open] =
+            [Some(pane), Some(board), None].map(|front| picture(front, &mut buffer));
         prop_assert_eq!(&glazed.0, &opaque.0, "depth");
         prop_assert_eq!(&glazed.2, &opaque.2, "instances");
+        // Nor is anything left of it in a smaller picture of another style.
+        let small = Camera { width_px: 20, height_px: 15, ..camera };
+        let mesh = SceneMesh::build(&scene_of(&[parts[0], pane]));
+        let styles = [Style::Default, Style::Plain];
+        let [_, plain] = styles.map(|style| {
+            let want = Want { rgb: Some(style), instances: true };
+            let camera = if style == Style::Plain { small } else { camera };
+            render(&mesh, &camera, want, &mut buffer).unwrap();
+            buffer.take().1
+        });
+        let mut fresh = FrameBuffer::default();
+        let want = Want { rgb: Some(Style::Plain), instances: true };
+        render(&mesh, &small, want, &mut fresh).unwrap();
+        prop_assert_eq!(plain, fresh.rgb);
         // Where glass fills the picture, no line around it reaches into it.
         if glazed.2.iter().any(|&body| body != parts.len() as i32 + 1) {
             return Ok(());

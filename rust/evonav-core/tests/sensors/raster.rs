@@ -161,6 +161,41 @@ proptest! {
         }
     }
 
+    /// What hides what decides only what need not be drawn: every pixel is that of the nearest of the
+    /// parts, each drawn alone.
+    #[test]
+    fn hidden_parts_leave_no_trace(
+        parts in vec(part(), 1..12),
+        wall_m in [0.3..2.0_f64, 0.3..2.0_f64, 0.2..3.0_f64],
+        view in view(),
+    ) {
+        // A wall before the camera hides much of the rest.
+        let ahead_m = view.axes()[2].map(|axis| axis * wall_m[2]);
+        let wall = Part {
+            primitive: Primitive::Cuboid { half_m: [wall_m[0], wall_m[1], 0.05] },
+            centre_m: add(view.camera.position_m, ahead_m),
+            rotation: euler_rotation_deg([0.0, view.camera.yaw_rad.to_degrees(), 0.0]),
+            ..parts[0]
+        };
+        let parts: Vec<Part> = parts.into_iter().chain([wall]).collect();
+        let view = View { camera: Camera { width_px: 3 * view.camera.width_px, ..view.camera }, ..view };
+        let draw = |parts: &[Part]| {
+            let mut frame = FrameBuffer::default();
+            let want = Want { rgb: None, instances: true };
+            render_view(&SceneMesh::build(&scene_of(parts)), &view, want, &mut frame).unwrap();
+            frame
+        };
+        let all = draw(&parts);
+        let alone: Vec<FrameBuffer> = parts.iter().map(|part| draw(&[*part])).collect();
+        for (index, &depth_m) in all.depth_m.iter().enumerate() {
+            let depths_m = alone.iter().map(|frame| frame.depth_m[index]);
+            prop_assert_eq!(depth_m, depths_m.fold(f32::INFINITY, f32::min));
+            if let Ok(body) = usize::try_from(all.instances[index] - 1) {
+                prop_assert_eq!(depth_m, alone[body].depth_m[index]);
+            }
+        }
+    }
+
     /// Asking for more images changes none of them.
     #[test]
     fn wants_do_not_change_images(parts in vec(part(), 0..12), view in view()) {

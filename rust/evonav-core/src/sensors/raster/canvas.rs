@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use evonav_simd::Kernel;
+
 use crate::geometry::{Vec2, Vec3};
 
 /// Number of pixels that one step of the inner loops handles, in plain arrays, which compilers turn
@@ -35,7 +37,7 @@ impl Canvas {
         self.tags.resize(num_blocks, [0; LANES]);
         self.left.resize(height_px, 0);
         self.right.resize(height_px, 0);
-        self.drawn = [0..height_px, 0..self.blocks_per_row()];
+        self.draw_within(0..height_px, 0..self.blocks_per_row());
     }
 
     /// Clear some rows and blocks, and draw only on them until the canvas is cleared again. Their
@@ -58,12 +60,17 @@ impl Canvas {
             self.nearness[first + blocks.start..first + blocks.end].fill([empty; LANES]);
             self.tags[first + blocks.start..first + blocks.end].fill([0; LANES]);
         }
-        self.drawn = [rows, blocks];
+        self.draw_within(rows, blocks);
     }
 
     /// Draw only on some rows and blocks until the canvas is cleared.
     pub fn draw_within(&mut self, rows: Range<usize>, blocks: Range<usize>) {
         self.drawn = [rows, blocks];
+    }
+
+    /// Return the rows, and the blocks of a row, on which is drawn.
+    pub fn drawn(&self) -> &[Range<usize>; 2] {
+        &self.drawn
     }
 
     pub fn blocks_per_row(&self) -> usize {
@@ -86,37 +93,47 @@ impl Canvas {
     /// A pixel is covered if its centre is inside. A centre on an edge belongs to the polygon to
     /// the right of or below that edge, so that neighbours neither overlap nor leave a gap.
     pub fn fill(&mut self, corners_px: &[Vec2], plane: Vec3, tag: u32) {
+        evonav_simd::compute(Fill { canvas: self, corners_px, plane, tag });
+    }
+
+    #[inline(always)]
+    fn fill_polygon(&mut self, corners_px: &[Vec2], plane: Vec3, tag: u32) {
         let rows = self.scan(corners_px);
         let blocks_per_row = self.blocks_per_row();
+        let (first, pixels) = (rows.start, rows.start * blocks_per_row..rows.end * blocks_per_row);
+        let ends = self.left[rows.clone()].iter().zip(&self.right[rows]);
+        let nearness = self.nearness[pixels.clone()].chunks_exact_mut(blocks_per_row);
+        let tags = self.tags[pixels].chunks_exact_mut(blocks_per_row);
+        let [_, drawn] = &self.drawn;
         let step = plane[0] as f32;
-        for row in rows {
-            let (left, right) = (self.left[row] as usize, self.right[row] as usize);
+        for ((row, (&left, &right)), (nearness, tags)) in
+            (first as i32..).zip(ends).zip(nearness.zip(tags))
+        {
             if left >= right {
                 continue;
             }
-            let blocks = left / LANES..(right - 1) / LANES + 1;
-            let [_, drawn] = &self.drawn;
+            let blocks = left as usize / LANES..(right as usize - 1) / LANES + 1;
             let (first, end) = (blocks.start.max(drawn.start), blocks.end.min(drawn.end));
             if first >= end {
                 continue;
             }
-            let u = (blocks.start * LANES) as f64 + 0.5;
-            let start = plane[0] * u + plane[1] * (row as f64 + 0.5) + plane[2];
+            let u = f64::from((blocks.start * LANES) as i32) + 0.5;
+            let start = plane[0] * u + plane[1] * (f64::from(row) + 0.5) + plane[2];
             let span = Span {
-                left: (left - blocks.start * LANES) as u32,
-                right: (right - blocks.start * LANES) as u32,
+                left: left as usize % LANES,
+                right: (right as usize - 1) % LANES + 1,
                 start: start as f32,
                 step,
                 tag,
-                first_drawn: first - blocks.start,
-                last: blocks.len() - 1,
+                first_drawn: (first - blocks.start) as i32,
+                last: blocks.len() as i32 - 1,
             };
-            let blocks = row * blocks_per_row + first..row * blocks_per_row + end;
-            span.draw(&mut self.nearness[blocks.clone()], &mut self.tags[blocks]);
+            span.draw(&mut nearness[first..end], &mut tags[first..end]);
         }
     }
 
     /// Set `left` and `right` for the rows that the polygon covers, and return these rows.
+    #[inline(always)]
     fn scan(&mut self, corners_px: &[Vec2]) -> Range<usize> {
         let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
         for corner in corners_px {
@@ -145,70 +162,111 @@ impl Canvas {
     }
 
     /// Return the drawn rows whose centre is between two heights.
+    #[inline(always)]
     fn rows_between(&self, top_px: f64, bottom_px: f64) -> Range<usize> {
         let [drawn, _] = &self.drawn;
-        first_centre(top_px, self.height_px).max(drawn.start)
-            ..first_centre(bottom_px, self.height_px).min(drawn.end)
+        let first = |at_px: f64| first_centre(at_px, self.height_px as f64) as usize;
+        first(top_px).max(drawn.start)..first(bottom_px).min(drawn.end)
     }
 
+    #[inline(always)]
     fn edge(&mut self, upper: Vec2, lower: Vec2, is_right: bool) {
         let rows = self.rows_between(upper[1], lower[1]);
         let columns = if is_right { &mut self.right } else { &mut self.left };
+        // If the part of the image on which is drawn has none of them, the rows may run backwards.
+        let Some(columns) = columns.get_mut(rows.clone()) else { return };
         let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
-        for row in rows {
-            let u = upper[0] + (row as f64 + 0.5 - upper[1]) * slope;
-            columns[row] = first_centre(u, self.width_px) as u32;
+        let width = self.width_px as f64;
+        for (row, column) in (rows.start as i32..).zip(columns) {
+            let u = upper[0] + (f64::from(row) + 0.5 - upper[1]) * slope;
+            *column = first_centre(u, width);
         }
+    }
+}
+
+/// [`Canvas::fill`] and its arguments.
+struct Fill<'a> {
+    canvas: &'a mut Canvas,
+    corners_px: &'a [Vec2],
+    plane: Vec3,
+    tag: u32,
+}
+
+impl Kernel for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        self.canvas.fill_polygon(self.corners_px, self.plane, self.tag);
     }
 }
 
 /// Return the index of the first pixel whose centre is at or after `coordinate_px`, within
 /// `0..=size_px`.
-fn first_centre(coordinate_px: f64, size_px: usize) -> usize {
-    let shifted = (coordinate_px - 0.5).clamp(0.0, size_px as f64);
-    // The ceiling is computed by hand: baseline x86-64 has no instruction for it.
-    let whole = shifted as u32;
-    whole as usize + usize::from(f64::from(whole) < shifted)
+#[inline(always)]
+fn first_centre(coordinate_px: f64, size_px: f64) -> u32 {
+    // The ceiling is computed by hand, since baseline x86-64 has no instruction for it: the whole
+    // number nearest to a number by the mantissa of a sum with 2^52.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    let shifted = coordinate_px - 0.5;
+    let shifted = if shifted > 0.0 { shifted } else { 0.0 };
+    let shifted = if shifted < size_px { shifted } else { size_px };
+    let sum = shifted + WHOLE;
+    sum.to_bits() as u32 + u32::from(sum - WHOLE < shifted)
 }
 
-/// A run of pixels in one row; positions are counted from the first block's first pixel.
+/// A block of lanes that are covered, between two of lanes that are not.
+const COVERED: [u32; 3 * LANES] = {
+    let mut lanes = [0; 3 * LANES];
+    let mut lane = LANES;
+    while lane < 2 * LANES {
+        lanes[lane] = u32::MAX;
+        lane += 1;
+    }
+    lanes
+};
+
+/// A run of pixels in one row.
 struct Span {
-    left: u32,
-    right: u32,
+    /// First covered lane of the first block, and the one after the last block's last.
+    left: usize,
+    right: usize,
+    /// Nearness at the first block's first lane, and its change from lane to lane.
     start: f32,
     step: f32,
     tag: u32,
     /// Block that is drawn first.
-    first_drawn: usize,
+    first_drawn: i32,
     /// Last block, drawn or not.
-    last: usize,
+    last: i32,
 }
 
 impl Span {
+    #[inline(always)]
     fn draw(&self, nearness: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
         let in_block = LANE_INDEX.map(|lane| lane * self.step);
         let block_step = LANES as f32 * self.step;
         for (block, (stored, tags)) in (self.first_drawn..).zip(nearness.iter_mut().zip(tags)) {
             let base = self.start + block as f32 * block_step;
-            let candidate = in_block.map(|offset| base + offset);
+            let mut candidate = in_block.map(|offset| base + offset);
             // If only some pixels of a block are covered, the others get a value that is never
             // nearer.
-            let candidate = if block == 0 || block == self.last {
-                self.covered((block * LANES) as u32, candidate)
-            } else {
-                candidate
-            };
+            if block == 0 {
+                candidate = masked(candidate, &COVERED[LANES - self.left..]);
+            }
+            if block == self.last {
+                candidate = masked(candidate, &COVERED[2 * LANES - self.right..]);
+            }
             merge(candidate, self.tag, stored, tags);
         }
     }
+}
 
-    fn covered(&self, first: u32, candidate: [f32; LANES]) -> [f32; LANES] {
-        std::array::from_fn(|lane| {
-            let position = first + lane as u32;
-            let is_covered = position >= self.left && position < self.right;
-            if is_covered { candidate[lane] } else { 0.0 }
-        })
-    }
+/// Return the numbers of some lanes, and 0 in the others.
+#[inline(always)]
+fn masked(numbers: [f32; LANES], mask: &[u32]) -> [f32; LANES] {
+    let mask: &[u32; LANES] = mask.first_chunk().expect("two blocks of lanes");
+    std::array::from_fn(|lane| f32::from_bits(numbers[lane].to_bits() & mask[lane]))
 }
 
 /// Store the nearer of candidate and stored, lane by lane.
@@ -220,10 +278,11 @@ fn merge(candidate: [f32; LANES], tag: u32, stored: &mut [f32; LANES], tags: &mu
     let (old, old_tags) = (*stored, *tags);
     let mask: [u32; LANES] =
         std::array::from_fn(|lane| u32::from(candidate[lane] > old[lane]).wrapping_neg());
-    *stored = std::array::from_fn(|lane| {
-        f32::from_bits(
-            (candidate[lane].to_bits() & mask[lane]) | (old[lane].to_bits() & !mask[lane]),
-        )
-    });
+    *stored =
+        std::array::from_fn(
+            |lane| {
+                if candidate[lane] > old[lane] { candidate[lane] } else { old[lane] }
+            },
+        );
     *tags = std::array::from_fn(|lane| (tag & mask[lane]) | (old_tags[lane] & !mask[lane]));
 }

@@ -36,7 +36,7 @@ pub(super) enum Optics {
 /// A view, prepared for drawing.
 pub(super) struct Lens {
     axes: Mat3,
-    eye_m: Vec3,
+    pub eye_m: Vec3,
     pub optics: Optics,
     centre_px: Vec2,
     pub clip_m: Vec2,
@@ -154,6 +154,23 @@ impl Lens {
         let corner: Vec3 =
             std::array::from_fn(|k| if forward[k] > 0.0 { aabb.min_m[k] } else { aabb.max_m[k] });
         dot(forward, sub(corner, self.eye_m))
+    }
+
+    /// Return the columns and rows of pixels that may show a box in front of the camera of a
+    /// perspective view, with one more on each side for rounding; they may lie out of the image.
+    pub fn box_px(&self, aabb: &Aabb) -> [Range<usize>; 2] {
+        let [low, high] = [aabb.min_m, aabb.max_m].map(|corner| sub(corner, self.eye_m));
+        let (mut low_px, mut high_px) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in 0..8 {
+            let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            let point_px = self.to_image(rotate(&self.axes, [at(0), at(1), at(2)]));
+            for axis in 0..2 {
+                low_px[axis] = low_px[axis].min(point_px[axis]);
+                high_px[axis] = high_px[axis].max(point_px[axis]);
+            }
+        }
+        // Conversions of numbers below 0 give 0.
+        [0, 1].map(|axis| (low_px[axis] - 1.0) as usize..(high_px[axis] + 2.0) as usize)
     }
 
     /// Transform a part's vertices to the camera's frame and the image; return whether the near

@@ -4,6 +4,8 @@
 //! triangles, faces turned away are never drawn, and a face's inverse depth is the exact plane
 //! equation instead of an interpolation between corners. Colours are computed after visibility.
 
+use evonav_simd::Kernel;
+
 use crate::{
     Error,
     geometry::Vec3,
@@ -11,6 +13,7 @@ use crate::{
         camera::{Camera, View},
         raster::{
             canvas::{Canvas, LANES},
+            hidden::Hidden,
             lens::{Lens, Optics, Scratch},
             light::Light,
             panes::Panes,
@@ -40,6 +43,7 @@ pub struct FrameBuffer {
     /// Colours, sRGB, `(H, W, 3)`. Empty if not rendered.
     pub rgb: Vec<u8>,
     pub(super) canvas: Canvas,
+    hidden: Hidden,
     shader: Shader,
     panes: Panes,
     pub(super) scratch: Scratch,
@@ -105,14 +109,16 @@ pub fn render_lit(
         out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
     draw_parts(mesh, &mesh.parts, &lens, want, out, |_| true);
-    resolve(mesh, &lens, want, out);
+    evonav_simd::compute(Resolve { mesh, lens: &lens, want, out });
     if let Some(style) = want.rgb {
         if style == Style::Default {
             draw_parts(mesh, &mesh.trim, &lens, want, out, |_| true);
             see_through(mesh, view, &lens, want, out);
         }
         out.shader.shade(style, mesh, light, &lens, &out.canvas, &mut out.rgb);
-        out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
+        if style == Style::Default {
+            out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
+        }
     }
     Ok(())
 }
@@ -135,8 +141,8 @@ fn see_through(mesh: &SceneMesh, view: &View, lens: &Lens, want: Want, out: &mut
     }
 }
 
-/// Draw some of the parts in view, nearest first.
-fn draw_parts(
+/// Draw some of the parts in view, nearest first, without those that others hide.
+pub(super) fn draw_parts(
     mesh: &SceneMesh,
     parts: &[PartMesh],
     lens: &Lens,
@@ -145,21 +151,17 @@ fn draw_parts(
     is_drawn: impl Fn(&PartMesh) -> bool,
 ) {
     lens.collect_visible(parts, &mut out.scratch.visible);
+    out.hidden.begin(&out.canvas);
     for index in 0..out.scratch.visible.len() {
-        let part = &parts[out.scratch.visible[index].1 as usize];
-        if is_drawn(part) {
+        let (nearest_m, part) = out.scratch.visible[index];
+        let part = &parts[part as usize];
+        if is_drawn(part) && !out.hidden.hides(&out.canvas, mesh, part, lens, nearest_m) {
             draw_part(mesh, part, lens, want, out);
         }
     }
 }
 
-pub(super) fn draw_part(
-    mesh: &SceneMesh,
-    part: &PartMesh,
-    lens: &Lens,
-    want: Want,
-    out: &mut FrameBuffer,
-) {
+fn draw_part(mesh: &SceneMesh, part: &PartMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     let FrameBuffer { canvas, shader, scratch, .. } = out;
     let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
     for index in part.faces.clone() {
@@ -207,36 +209,59 @@ fn clip_near(
     }
 }
 
-/// Turn the canvas of the solid parts into images of depth and instances.
-fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
-    let FrameBuffer { depth_m, instances, rgb, canvas, .. } = out;
-    let num_pixels = canvas.width_px * canvas.height_px;
-    depth_m.resize(num_pixels, 0.0);
-    let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
-    let depth_or_none = |w: f32, depth_m: f32| if w > empty { depth_m } else { f32::INFINITY };
-    match lens.optics {
-        Optics::Perspective { .. } => {
-            unpad(canvas, &canvas.nearness, depth_m, |b| b.map(|w| depth_or_none(w, 1.0 / w)));
+/// Turns the canvas of the solid parts into images of depth and instances.
+struct Resolve<'a> {
+    mesh: &'a SceneMesh,
+    lens: &'a Lens,
+    want: Want,
+    out: &'a mut FrameBuffer,
+}
+
+impl Kernel for Resolve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { mesh, lens, want, out } = self;
+        let FrameBuffer { depth_m, instances, rgb, canvas, .. } = out;
+        let num_pixels = canvas.width_px * canvas.height_px;
+        depth_m.resize(num_pixels, 0.0);
+        let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
+        match lens.optics {
+            Optics::Perspective { .. } => unpad(canvas, &canvas.nearness, depth_m, |block| {
+                depths_of(block, empty, |nearness| 1.0 / nearness)
+            }),
+            Optics::Orthographic { .. } => unpad(canvas, &canvas.nearness, depth_m, |block| {
+                depths_of(block, empty, |nearness| horizon_m - nearness)
+            }),
         }
-        Optics::Orthographic { .. } => {
-            let depth = |w: f32| depth_or_none(w, horizon_m - w);
-            unpad(canvas, &canvas.nearness, depth_m, |block| block.map(depth));
+        instances.resize(if want.instances { num_pixels } else { 0 }, 0);
+        match want {
+            Want { instances: true, rgb: Some(_) } => {
+                unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
+            }
+            Want { instances: true, rgb: None } => {
+                unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
+            }
+            Want { instances: false, .. } => {}
         }
+        rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
     }
-    instances.resize(if want.instances { num_pixels } else { 0 }, 0);
-    match want {
-        Want { instances: true, rgb: Some(_) } => {
-            unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
-        }
-        Want { instances: true, rgb: None } => {
-            unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
-        }
-        Want { instances: false, .. } => {}
+}
+
+/// Return the depths of pixels, infinite where they are empty.
+#[inline(always)]
+fn depths_of(nearness: &[f32; LANES], empty: f32, depth_m: impl Fn(f32) -> f32) -> [f32; LANES] {
+    let mut depths_m = [0.0; LANES];
+    for lane in 0..LANES {
+        let depth_m = depth_m(nearness[lane]);
+        depths_m[lane] = if nearness[lane] > empty { depth_m } else { f32::INFINITY };
     }
-    rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
+    depths_m
 }
 
 /// Copy rows of padded blocks to rows of exactly the image's width.
+#[inline(always)]
 fn unpad<T: Copy, U: Copy>(
     canvas: &Canvas,
     blocks: &[[T; LANES]],
@@ -256,6 +281,7 @@ fn unpad<T: Copy, U: Copy>(
 }
 
 /// Return the instance ids of face tags. Most blocks lie within one face.
+#[inline(always)]
 fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES]) -> [i32; LANES] {
     let body_of = |tag: u32| match tag.checked_sub(1) {
         Some(face) => mesh.faces[face as usize].body as i32 + 1,

@@ -9,7 +9,7 @@ use crate::{
         raster::{
             canvas::LANES,
             lens::Lens,
-            render::{FrameBuffer, Want, draw_part},
+            render::{FrameBuffer, Want, draw_parts},
         },
     },
     world::mesh::SceneMesh,
@@ -54,11 +54,8 @@ pub fn visible_px(
     let blocks = columns.start / LANES..columns.end.div_ceil(LANES);
     let size_px = [camera.width_px, camera.height_px];
     frame.canvas.clear_within(size_px, lens.far_nearness(), rows.clone(), blocks.clone());
-    lens.collect_visible(&mesh.parts, &mut frame.scratch.visible);
-    for index in 0..frame.scratch.visible.len() {
-        let part = &mesh.parts[frame.scratch.visible[index].1 as usize];
-        draw_part(mesh, part, &lens, Want { rgb: None, instances: true }, frame);
-    }
+    let want = Want { rgb: None, instances: true };
+    draw_parts(mesh, &mesh.parts, &lens, want, frame, |_| true);
     let tag = body as u32 + 1;
     let canvas = &frame.canvas;
     let drawn = rows.flat_map(|row| {

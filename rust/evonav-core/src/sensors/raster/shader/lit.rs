@@ -45,9 +45,8 @@ pub(super) struct Lit {
     scale: Vec<f32>,
     /// Results of [`Bends::open`].
     open: Vec<u16>,
-    /// Their brightness, then grey levels, by channel, and their textures' colours.
+    /// Their brightness, then grey levels, by channel.
     bright: [Vec<u16>; 3],
-    sums: [Vec<u16>; 3],
     packed: Vec<u32>,
     /// The runs of the row in which nothing is.
     empty: Vec<Range<usize>>,
@@ -79,8 +78,7 @@ impl Lit {
         self.scale.clear();
         self.scale.resize(length, 1.0);
         self.open.resize(length, u16::MAX);
-        let Self { bright, sums, .. } = self;
-        bright.iter_mut().chain(sums).for_each(|channel| channel.resize(length, 0));
+        self.bright.iter_mut().for_each(|channel| channel.resize(length, 0));
         self.packed.resize(length, 0);
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             let nearness = canvas.row(row);
@@ -113,7 +111,7 @@ impl Lit {
         canvas: &Canvas,
         row: usize,
     ) {
-        let Self { runs, surfaces, scale, bright, sums, empty, .. } = self;
+        let Self { runs, surfaces, scale, bright, empty, .. } = self;
         let shot = Shot { light, rays, row, nearness: canvas.row(row), scale };
         empty.clear();
         for (run, tag) in spans(runs.of_row(row), canvas.width_px) {
@@ -128,7 +126,7 @@ impl Lit {
             }
             shot.run(index, surface, run.clone(), bright);
             if let Some(texture) = surface.texture {
-                shot.colour(surface, texture, run, sums, bright);
+                shot.colour(surface, texture, run, bright);
             }
         }
     }
@@ -188,7 +186,7 @@ impl Shot<'_> {
                 (step, last) = (LANES, first + LANES);
                 to = place(last);
             }
-            let stop = end(to);
+            let stop = if last > first { end(to) } else { start };
             let columns = first..(first + step).min(run.end);
             self.between(surface, columns, [&start, &stop], SHARES[last - first], bright);
             (first, from, start) = (first + step, to, stop);
@@ -219,27 +217,24 @@ impl Shot<'_> {
         }
     }
 
-    /// Multiply the light on a run of pixels by a texture.
+    /// Multiply the light on a run of pixels, and on some after it, by a texture.
     #[inline(never)]
     fn colour(
         &self,
         surface: &Surface,
         texture: &Texture,
         run: Range<usize>,
-        sums: &mut [Vec<u16>; 3],
         bright: &mut [Vec<u16>; 3],
     ) {
         for first in run.clone().step_by(LANES) {
             let scale = lanes(self.scale, first);
             let middle = ((first + LANES).min(run.end - 1) - first) / 2;
             let length2 = self.rays.length2([first + middle, self.row]);
-            let found = surface.sample(texture, [first, self.row], scale, scale[middle], length2);
-            for (sums, found) in sums.iter_mut().zip(&found) {
-                sums[first..first + LANES].copy_from_slice(found);
+            let sums = surface.sample(texture, [first, self.row], scale, scale[middle], length2);
+            for (channel, (bright, sums)) in bright.iter_mut().zip(&sums).enumerate() {
+                let bright = bright[first..].first_chunk_mut().expect("rows are padded");
+                surface.colour(channel, sums, bright);
             }
-        }
-        for channel in 0..3 {
-            surface.colour(channel, &sums[channel][run.clone()], &mut bright[channel][run.clone()]);
         }
     }
 

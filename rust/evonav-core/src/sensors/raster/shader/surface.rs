@@ -127,7 +127,7 @@ impl Surface {
     /// # Arguments
     /// * `sums` - the results of [`Self::sample`] for a channel.
     #[inline(always)]
-    pub fn colour(&self, channel: usize, sums: &[u16], bright: &mut [u16]) {
+    pub fn colour(&self, channel: usize, sums: &[u16; LANES], bright: &mut [u16; LANES]) {
         const WHITE: u16 = (255.0 * RAISED * FINE) as u16;
         const LEAST: u16 = (BLACK * FINE) as u16;
         let factor = self.factor[channel];
