@@ -1,5 +1,5 @@
 from ._core import House, __version__
-from .agents.agent import Agent, Move, NavigateTo, SensorConfig, Stop
+from .agents.agent import Agent, Move, NavigateTo, PlaceBelief, SensorConfig, Stop
 from .agents.explanation import Explanation
 from .api.evaluate import evaluate
 from .api.loading import generate_tasks, load_houses, load_tasks
@@ -27,6 +27,7 @@ __all__ = [
     "ObjectMap",
     "Observation",
     "OccupancyMap",
+    "PlaceBelief",
     "Pose",
     "Run",
     "SensorConfig",

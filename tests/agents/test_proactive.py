@@ -13,13 +13,14 @@ from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.proactive.agent import Proactive, ProactiveBlind
+from evonav.agents.proactive.agent import Proactive
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.places import visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief, _Entry
 from evonav.agents.proactive.rooms import NO_ROOM, eroded, grown, numbered, rooms_of
 from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
 from evonav.agents.proactive.searched import CoarseFrame, SearchedCells
+from evonav.agents.proactive.variants import ProactiveBlind
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
 from evonav.evaluation.protocol import ProtocolConfig

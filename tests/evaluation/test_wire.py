@@ -125,7 +125,7 @@ def test_malformed_parts_are_named(part, value, message) -> None:
 
 
 def test_large_and_deep_diagnostics_are_refused() -> None:
-    with pytest.raises(InvalidArgumentError, match="diagnostics: 1000095 bytes of JSON: must be at most 1000000"):
+    with pytest.raises(InvalidArgumentError, match="diagnostics: 1000109 bytes of JSON: must be at most 1000000"):
         wire.DIAGNOSTICS.write(RoundDiagnostics(details={"a": "x" * 999_995}))
     nested: list[object] = []
     for depth in range(1, 2000):

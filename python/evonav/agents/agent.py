@@ -131,6 +131,27 @@ class EntryBelief:
     size_m: tuple[float, float, float]
     """Edge lengths of the axis-aligned box."""
     num_detections: int
+    p_present: float | None = None
+    """Probability that the object is still there, 0 to 1, if the agent has one: it is scored as a stage begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceBelief:
+    """An agent's belief of where the target is: probabilities of squares on the floor.
+
+    What their sum lacks of 1 is the probability of all other places.
+
+    Examples:
+        >>> import evonav
+        >>> belief = evonav.PlaceBelief(cell_m=0.5, centres_m=((1.25, 2.75), (1.75, 2.75)), probabilities=(0.6, 0.3))
+    """
+
+    cell_m: float
+    """Edge of the squares."""
+    centres_m: tuple[tuple[float, float], ...]
+    """Middles of the squares, `(x, z)`."""
+    probabilities: tuple[float, ...]
+    """Probability of each square, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +171,8 @@ class RoundDiagnostics:
     `[x, z]` or `[x, y, z]` under a name that ends in `position_m`, `centre_m`, `goal_m`, `mid_term_m` or `path_m` is a
     place, also in lists: where agents are told shifted places, records hold it in the house's own coordinates.
     """
+    places: PlaceBelief | None = None
+    """Belief of where the target is. That of a stage's first round is recorded and scored."""
 
 
 @runtime_checkable
@@ -193,6 +216,8 @@ class Belief:
     """The questions of the round with their answers."""
     explored: NDArray[np.bool_] | None = None
     """`(R, C)`: cells that were seen from close by, if the agent distinguishes them."""
+    places: PlaceBelief | None = None
+    """Belief of where the target is."""
 
 
 @runtime_checkable

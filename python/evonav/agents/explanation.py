@@ -14,6 +14,7 @@ from evonav.agents.agent import (
     ExplainingAgent,
     FrontierBelief,
     InspectableAgent,
+    PlaceBelief,
     RoundDiagnostics,
 )
 from evonav.sensors.observation import MapFrame
@@ -53,6 +54,8 @@ class Explanation:
     """Reason for the choice."""
     counters: Mapping[str, int] = field(default_factory=dict)
     """Cumulative counts, such as `conflicts`."""
+    places: PlaceBelief | None = None
+    """Belief of where the target is: `evonav view` draws it, and that of the first round is scored."""
     details: Mapping[str, Any] = field(default_factory=dict)
     """Further JSON-ready values."""
 
@@ -101,6 +104,7 @@ class _ExplainAdapter:
             num_entries=0 if found.objects is None else len(found.objects),
             num_frontiers=0 if found.map is None else len(found.map.frontiers),
             counters=dict(found.counters),
+            places=found.places,
             details={"reason": found.reason, **found.details} if found.reason else dict(found.details),
         )
 
@@ -120,4 +124,5 @@ class _ExplainAdapter:
             map_frame=_NO_MAP if found.map is None else found.map.map_frame,
             queries=(),
             explored=None if found.map is None else found.map.explored,
+            places=found.places,
         )

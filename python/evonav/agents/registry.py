@@ -47,11 +47,11 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "Belief-Weighted Search: goes where most of its posterior is found a metre",
     ),
     "pro-blind": (
-        "evonav.agents.proactive.agent:ProactiveBlind",
+        "evonav.agents.proactive.variants:ProactiveBlind",
         "Belief-Weighted Search that knows nothing of how homes change",
     ),
     "pro-oracle-theta": (
-        "evonav.agents.proactive.agent:ProactiveOracleTheta",
+        "evonav.agents.proactive.variants:ProactiveOracleTheta",
         "Belief-Weighted Search that knows the probabilities of changes",
     ),
     "evolving": (

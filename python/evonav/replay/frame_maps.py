@@ -15,6 +15,8 @@ from evonav.tasks.language import noun_of
 MAX_ENTRY_CM = 600.0
 UNKNOWN_COLOUR = "#d0d4da"
 """The colour of unknown cells, which also lies beyond the agent's map."""
+HEAT_COLOUR = "#b3261e"
+"""The colour of likely places of the target, as in the viewer on a light page."""
 _TAG_UNITS = 2.6
 """Height of the names of entries, in units of a frame."""
 
@@ -48,10 +50,27 @@ def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str
     )
     return (
         cells_layer(step.map.cells, step.map.cell_m, step.map.corner_m)
+        + heat_layer(step)
         + join(entries)
         + join(diamonds)
         + way_layer(stage, step, frame)
     )
+
+
+def heat_layer(step: ReplayedRound) -> str:
+    """Return where the agent believes the target to be: the more opaque, the likelier; nothing if it does not tell."""
+    places = step.places
+    most = 0.0 if places is None else max(places.probabilities, default=0.0)
+    if places is None or most <= 0.0:
+        return ""
+    edge = 100.0 * places.cell_m
+    squares = (
+        f'<rect x="{x - edge / 2:.0f}" y="{y - edge / 2:.0f}" width="{edge:.0f}" height="{edge:.0f}" '
+        f'fill="{HEAT_COLOUR}" fill-opacity="{0.75 * math.sqrt(p / most):.2f}"/>'
+        for (x, y), p in zip(map(cm, places.centres_m), places.probabilities, strict=True)
+        if p >= most / 100.0
+    )
+    return join(squares)
 
 
 def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:

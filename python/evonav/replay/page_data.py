@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import FrontierBelief
+from evonav.agents.agent import FrontierBelief, PlaceBelief
 from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.svg import clean, cm, polyline, simplified
@@ -34,6 +34,8 @@ from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+LEAST_HEAT = 100.0
+"""Factor by which a square may be less likely than the likeliest one and still be drawn."""
 _SAME = 4
 _KINDS = {
     "object": "object",
@@ -142,6 +144,8 @@ class _Rounds:
             frontiers = [_frontier(frontier) for frontier in step.frontiers]
             if frontiers != self._frontiers:
                 found["f"] = self._frontiers = frontiers
+        if step.places is not None:
+            found["heat"] = _heat(step.places)
         if step.candidate_ids:
             found["cand"] = list(step.candidate_ids)
         if step.questions:
@@ -284,6 +288,14 @@ def _entry(entry: ReplayedEntry, record: StageRecord) -> list[Any]:
         int(is_target),
         now,
     ]
+
+
+def _heat(places: PlaceBelief) -> list[Any]:
+    """`[edge, [[x, y, percent], ...]]`: the squares that are not much less likely than the likeliest."""
+    least = max(places.probabilities, default=0.0) / LEAST_HEAT
+    squares = zip(places.centres_m, places.probabilities, strict=True)
+    shown = [[*cm(centre_m), round(100.0 * p, 2)] for centre_m, p in squares if p > 0.0 and p >= least]
+    return [round(100 * places.cell_m, 1), shown]
 
 
 def _frontier(frontier: FrontierBelief) -> list[Any]:

@@ -158,6 +158,7 @@ def _legend() -> Markup:
         ("entry", f'<g class="entry"><rect {box}/></g>', 24),
         ("candidate of a question", f'<g class="entry candidate"><rect {box}/></g>', 24),
         ("chosen", f'<g class="entry chosen"><rect {box}/></g>', 24),
+        ("likely place of the target", '<rect class="heat" fill-opacity=".6" x="4" y="4" width="16" height="16"/>', 24),
         ("frontier", '<g class="frontier"><path d="M12 4l7 14l-7 -4l-7 4z"/></g>', 24),
         ("chosen frontier", '<g class="frontier chosen"><path d="M12 4l7 14l-7 -4l-7 4z"/></g>', 24),
         ("free, explored", '<rect class="cell-explored" x="2" y="4" width="20" height="16"/>', 24),

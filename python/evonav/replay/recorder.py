@@ -167,6 +167,7 @@ class Recorder:
                 candidate_ids=tuple(belief.candidate_ids),
                 frontiers=tuple(belief.frontiers),
                 map=_map_of(belief),
+                places=belief.places,
                 questions=tuple(self._question(entry) for entry in belief.queries),
             )
         except Exception as error:  # a picture is not worth an episode: the page says what is missing

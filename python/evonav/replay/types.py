@@ -9,16 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import FrontierBelief
-from evonav.evaluation.records.schema import (
-    EntryRecord,
-    FloorPlan,
-    Point2,
-    Point3,
-    PoseRecord,
-    RoundRecord,
-    StageRecord,
-)
+from evonav.agents.agent import FrontierBelief, PlaceBelief
+from evonav.evaluation.records.base import Point2, Point3
+from evonav.evaluation.records.schema import EntryRecord, FloorPlan, PoseRecord, RoundRecord, StageRecord
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `ReplayedMap.cells`; explored cells are free ones that were seen from close by."""
@@ -96,6 +89,8 @@ class ReplayedRound:
     frontiers: tuple[FrontierBelief, ...] = ()
     map: ReplayedMap | None = None
     """`None` for an agent that cannot be inspected."""
+    places: PlaceBelief | None = None
+    """Belief of where the target is, if the agent has one."""
     questions: tuple[ReplayedQuestion, ...] = ()
     note: str = ""
     """Reason why there is no belief, where the agent should have had one."""

@@ -11,8 +11,9 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import polyline_length_m
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.base import Point2
 from evonav.evaluation.records.convert import sensor_config
-from evonav.evaluation.records.schema import EndState, Point2, PoseRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
 
 TOLERANCE = 1e-9
 """Allowed difference of a claimed score, since other machines may round sums differently."""

@@ -31,6 +31,7 @@ from evonav.agents.agent import (
     EntryBelief,
     Move,
     NavigateTo,
+    PlaceBelief,
     RoundDiagnostics,
     SensorConfig,
     Stop,
@@ -53,6 +54,10 @@ MAX_M = 1e6
 """Largest coordinate and edge of a box, in metres: sums and squares of such numbers are finite."""
 MAX_LABEL = 1000
 """Longest label of an entry, in characters."""
+MAX_PLACES = 20_000
+"""Largest number of squares of a belief about places."""
+SUM_SLACK = 1e-6
+"""Rounding by which probabilities may sum to more than 1."""
 MAX_COUNTERS = 1000
 """Largest number of a round's counters."""
 MAX_COUNT = 10**15
@@ -195,7 +200,33 @@ def _possible_entry(entry: EntryBelief) -> EntryBelief:
     if not -(2**63) <= entry.entry_id < 2**63:
         raise ValueError("entry_id must have at most 64 bits")
     _check_count("num_detections", entry.num_detections, 0)
+    if entry.p_present is not None:
+        _check_probability("p_present", entry.p_present)
     return entry
+
+
+def _check_places(places: PlaceBelief) -> None:
+    if not 0.0 < places.cell_m <= MAX_M:
+        raise ValueError(f"places.cell_m = {places.cell_m!r}: must be above 0 and at most {MAX_M:g} m")
+    if len(places.centres_m) != len(places.probabilities):
+        raise ValueError(
+            f"places.probabilities: {len(places.probabilities)} values, expected one for each of the "
+            f"{len(places.centres_m)} centres_m"
+        )
+    if len(places.centres_m) > MAX_PLACES:
+        raise ValueError(f"places.centres_m: {len(places.centres_m)} squares, must be at most {MAX_PLACES}")
+    for index, (centre_m, probability) in enumerate(zip(places.centres_m, places.probabilities, strict=True)):
+        if max(map(abs, centre_m)) > MAX_M:
+            raise ValueError(f"places.centres_m.{index} = {centre_m!r}: must be within {MAX_M:g} m")
+        _check_probability(f"places.probabilities.{index}", probability)
+    total = math.fsum(places.probabilities)
+    if total > 1.0 + SUM_SLACK:
+        raise ValueError(f"places.probabilities: their sum is {total!r}, must be at most 1")
+
+
+def _check_probability(name: str, probability: float) -> None:
+    if not 0.0 <= probability <= 1.0:
+        raise ValueError(f"{name} = {probability!r}: must be 0 to 1")
 
 
 def _possible_diagnostics(diagnostics: RoundDiagnostics) -> RoundDiagnostics:
@@ -208,6 +239,8 @@ def _possible_diagnostics(diagnostics: RoundDiagnostics) -> RoundDiagnostics:
         _check_count(f"counters.{name[:MAX_VALUE]}", count, -MAX_COUNT)
     if diagnostics.chosen_entry is not None:
         _possible_entry(diagnostics.chosen_entry)
+    if diagnostics.places is not None:
+        _check_places(diagnostics.places)
     return replace(diagnostics, choice=diagnostics.choice[:MAX_MESSAGE])
 
 
@@ -225,7 +258,8 @@ def _check_depth(value: object, depth: int) -> None:
         _check_depth(part, depth - 1)
 
 
-for _kind in (SensorConfig, ViewSchedule, EntryBelief, RoundDiagnostics):  # only `details` may hold NaN or infinity
+# Only `details` may hold NaN or infinity.
+for _kind in (SensorConfig, ViewSchedule, EntryBelief, PlaceBelief, RoundDiagnostics):
     with_config(ConfigDict(allow_inf_nan=False))(_kind)
 
 SENSORS = Part("sensors", TypeAdapter(SensorConfig), MAX_DIAGNOSTICS_BYTES)

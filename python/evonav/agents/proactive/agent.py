@@ -1,10 +1,11 @@
 """Belief-Weighted Search: goes where most of the posterior over the target's place is found a metre."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from evonav.agents.agent import AgentAction, NavigateTo, Stop
+from evonav.agents.agent import AgentAction, Belief, EntryBelief, NavigateTo, PlaceBelief, RoundDiagnostics, Stop
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import identity_question
 from evonav.agents.navigator import Navigator
@@ -12,7 +13,7 @@ from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.proactive.belief import TargetBelief
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.places import visible_range_m
-from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings
+from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings, place_belief
 from evonav.agents.proactive.search import (
     SAME_PLACE_M,
     Option,
@@ -24,13 +25,21 @@ from evonav.agents.proactive.search import (
     with_ways,
 )
 from evonav.agents.proactive.sightings import Sighting
-from evonav.agents.proactive.standing import ALIKE, Placed, covered, likeliest_places, place_by, places_before
+from evonav.agents.proactive.standing import (
+    ALIKE,
+    Placed,
+    best_entry,
+    covered,
+    likeliest_places,
+    place_by,
+    places_before,
+)
 from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import similarity
 from evonav.decision.text.matcher import matcher_of
 from evonav.memory.objects import ObjectEntry
-from evonav.memory.presence import Presence, judge_presence
+from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 
@@ -68,6 +77,8 @@ class Proactive(NavigatorAgent):
         self._is_final = False
         """Whether the agent goes to an entry because nothing else is left, or no time."""
         self._summary: dict[str, Any] = {}
+        self._posterior_now: tuple[Posterior, Placed] | None = None
+        """The last round's posterior, and the places of what it names, for records and pictures."""
         self._searched_from: list[Point2] = []
         """Places from which the agent has searched in this stage."""
         self._belief.begin_stage(self._parsed, goal.stage)
@@ -121,10 +132,8 @@ class Proactive(NavigatorAgent):
 
     def _may_have_missed(self, chosen: Option | None, observation: Observation) -> bool:
         """Return whether nothing is left to go to but what was denied, while there is time to search all anew."""
-        if observation.num_rounds_left <= self.config.anew_rounds:
-            return False
-        if chosen is None:
-            return True
+        if observation.num_rounds_left <= self.config.anew_rounds or chosen is None:
+            return observation.num_rounds_left > self.config.anew_rounds
         return chosen.kind == "object" and self._is_final and (chosen.key in self._belief.factors or chosen.gain <= 0.0)
 
     def _stop_at_sighting(self, posterior: Posterior, last: Option, observation: Observation) -> Stop | None:
@@ -151,16 +160,14 @@ class Proactive(NavigatorAgent):
         navigator = self._navigator
         if navigator.objects.entry(entry_id) is None or navigator.is_detected(entry_id):
             return
-        view = observation.views[-1]
-        (evidence,) = navigator.objects.depth_evidence([entry_id], view)
+        view, evidence = observation.views[-1], self._evidence(entry_id, observation)
         self._belief.presence.see_nothing_on_arrival(navigator.objects, entry_id, view, evidence)
         self._belief.presence.update()
         self._belief.factors[entry_id] = self.config.unfit
 
-    def _is_empty(self, entry_id: int, observation: Observation) -> bool:
-        """Return whether the view towards an entry sees through its place."""
-        (evidence,) = self._navigator.objects.depth_evidence([entry_id], observation.views[-1])
-        return judge_presence(evidence, is_detected=False) is Presence.NO
+    def _evidence(self, entry_id: int, observation: Observation) -> DepthEvidence:
+        """Return what the view towards an entry shows at its place."""
+        return self._navigator.objects.depth_evidence([entry_id], observation.views[-1])[0]
 
     def _is_settled(self, entry_id: int, posterior: Posterior) -> bool:
         """Return whether no search is worth more than to stop at an entry, and at those beside it, if they are there.
@@ -197,7 +204,8 @@ class Proactive(NavigatorAgent):
                 continue
             is_near = math.dist((entry.centre_m[0], entry.centre_m[2]), here) < self.config.stop_within_m
             is_detected = navigator.is_detected(entry_id)
-            has_arrived = entry_id == arrived_at and (is_detected or not self._is_empty(entry_id, observation))
+            seen = judge_presence(self._evidence(entry_id, observation), is_detected=is_detected)
+            has_arrived = entry_id == arrived_at and seen is not Presence.NO
             if not has_arrived and not (is_near and is_detected):
                 continue
             if entry_id != arrived_at and not self._is_well_placed(entry, posterior, around, here):
@@ -265,7 +273,7 @@ class Proactive(NavigatorAgent):
         max_way_m = observation.num_rounds_left * self.sensors.max_travel_m
         self._hope = math.fsum(one.gain for one in options if one.way_m <= max_way_m)
         self._candidates = tuple(one.key for one in sorted(entries, key=lambda one: (-one.gain, one.key))[:5])
-        best = self._best_entry(entries)
+        best = best_entry(entries)
         if best is not None:
             rounds = math.ceil(best.way_m / self.sensors.max_travel_m) + config.reserve_rounds
             if config.keeps_reserve and observation.num_rounds_left <= rounds:
@@ -318,12 +326,6 @@ class Proactive(NavigatorAgent):
         place = min(places, key=lambda place: (math.dist(place, one.ground_m), place), default=one.ground_m)
         return Option("sighting", number, place, one.ground_m, weight, 0.0)
 
-    def _best_entry(self, entries: list[Option]) -> Option | None:
-        """Return the nearest of the entries with about the largest weight."""
-        top = max((one.gain for one in entries), default=0.0)
-        good = [one for one in entries if one.gain >= ALIKE * top and one.gain > 0.0]
-        return min(good, key=lambda one: (one.way_m, one.key), default=None)
-
     def _related(self, around: Surroundings, here: Point2) -> Option | None:
         """Return the nearest thing that the goal should be on or near."""
         near = [one for one in around.remembered if self._matcher.label_score(self._parsed, one.label) > 0.0]
@@ -367,12 +369,27 @@ class Proactive(NavigatorAgent):
 
     def _note(self, posterior: Posterior) -> None:
         """Store the summary of the posterior for the records."""
-        total = posterior.total or 1.0
-        self._summary = {
-            "p_entries": {str(one): round(weight / total, 4) for one, weight in sorted(posterior.entries.items())},
-            "p_moved": round(float(posterior.moved.sum()) / total, 4),
-            "p_unseen": round(float(posterior.unseen.sum()) / total, 4),
-        }
+        sightings = [(one.ground_m, weight) for one, weight in posterior.sightings]
+        self._posterior_now = posterior, [*self._entry_places(posterior), *sightings]
+        self._summary = posterior.summary()
+
+    def _places(self) -> PlaceBelief | None:
+        """Return where the target is believed to be, as of the last round."""
+        now = self._posterior_now
+        return None if now is None else place_belief(*now, self._belief.searched.coarse)
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Return the choice, the details and the counters of the last round, and in the first the belief of places."""
+        return replace(super().diagnostics(), places=self._places() if self._navigator.round == 0 else None)
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """Return the object memory, with the probability that each object is still there."""
+        p_present = self._belief.presence.p_present
+        return [replace(entry, p_present=p_present(entry.entry_id)) for entry in super().entries()]
+
+    def belief(self) -> Belief:
+        """Return all that the agent believes after a round."""
+        return replace(super().belief(), places=self._places())
 
     def _round_counters(self) -> Mapping[str, int]:
         own = {"identity_checks": 0, "identities_denied": 0, "maps_forgotten": 0}
@@ -380,17 +397,3 @@ class Proactive(NavigatorAgent):
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         return {**super()._round_details(reason), **self._summary}
-
-
-class ProactiveBlind(Proactive):
-    """Belief-Weighted Search that knows nothing of how homes change."""
-
-    def __init__(self, config: ProactiveConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or ProactiveConfig(prior="blind"), decision)
-
-
-class ProactiveOracleTheta(Proactive):
-    """Belief-Weighted Search that knows by which probabilities homes change, not what changed."""
-
-    def __init__(self, config: ProactiveConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or ProactiveConfig(prior="oracle-theta"), decision)

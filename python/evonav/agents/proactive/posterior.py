@@ -3,24 +3,28 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.agent import PlaceBelief
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.places import prior_of, visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief
 from evonav.agents.proactive.priors import room_ratios
 from evonav.agents.proactive.rooms import NO_ROOM, box_distance_m
-from evonav.agents.proactive.searched import SearchedCells
+from evonav.agents.proactive.searched import CoarseFrame, SearchedCells
 from evonav.agents.proactive.sightings import Sighting
-from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
 
 AT_DOOR_M = 0.75
 """Largest distance between a frontier and the box of a door that leads to what is behind it."""
+SQUARE_CELLS = 3
+"""Edge of a square of `place_belief`, in coarse cells."""
 NAMED = 0.99
 """Similarity from which a label is the goal's name."""
 SIGHTED = 0.9
@@ -47,10 +51,44 @@ class Posterior:
         """Return the probability that the target is at the stored place of an entry."""
         return self.entries.get(entry_id, 0.0) / self.total if self.total > 0.0 else 0.0
 
+    def summary(self) -> dict[str, Any]:
+        """Return the probabilities of the entries, of what moved and of what was never seen, for records."""
+        total = self.total or 1.0
+        return {
+            "p_entries": {str(one): round(weight / total, 4) for one, weight in sorted(self.entries.items())},
+            "p_moved": round(float(self.moved.sum()) / total, 4),
+            "p_unseen": round(float(self.unseen.sum()) / total, 4),
+        }
+
     @property
     def elsewhere(self) -> float:
         """Weight of all places without an entry of the goal's name."""
         return float(self.moved.sum() + self.unseen.sum()) + math.fsum(weight for _, weight in self.sightings)
+
+
+def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], coarse: CoarseFrame) -> PlaceBelief:
+    """Return the posterior as probabilities of squares of `SQUARE_CELLS` coarse cells, for records and pictures.
+
+    Args:
+        posterior: The posterior.
+        placed: Middles of the entries and sightings, and their weights.
+        coarse: The grid of the posterior.
+    """
+    weights = posterior.moved + posterior.unseen
+    for place_m, weight in placed:
+        weights[coarse.cell_at(place_m)] += weight
+    rows, cols = (-(-size // SQUARE_CELLS) for size in weights.shape)
+    padded = np.zeros((rows * SQUARE_CELLS, cols * SQUARE_CELLS))
+    padded[: weights.shape[0], : weights.shape[1]] = weights
+    shares = padded.reshape(rows, SQUARE_CELLS, cols, SQUARE_CELLS).sum(axis=(1, 3))
+    shares = np.floor(shares / max(float(shares.sum()), 1e-300) * 1e5) / 1e5
+    half = 0.5 * (SQUARE_CELLS - 1)
+    likely = np.argwhere(shares > 0.0).tolist()
+    return PlaceBelief(
+        cell_m=coarse.frame.cell_m * SQUARE_CELLS,
+        centres_m=tuple(coarse.centre_m(row * SQUARE_CELLS + half, col * SQUARE_CELLS + half) for row, col in likely),
+        probabilities=tuple(float(shares[row, col]) for row, col in likely),
+    )
 
 
 @dataclass(frozen=True, slots=True)

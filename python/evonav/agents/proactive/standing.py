@@ -77,3 +77,10 @@ def likeliest_places(
 def covered(placed: Sequence[tuple[Point2, float]], place_m: Point2) -> float:
     """Return the weight of what is within the reach of an agent that stops at a place."""
     return math.fsum(weight for centre_m, weight in placed if math.dist(centre_m, place_m) < STOP_REACH_M)
+
+
+def best_entry(entries: Sequence[Option]) -> Option | None:
+    """Return the nearest of the entries with about the largest weight."""
+    top = max((one.gain for one in entries), default=0.0)
+    good = [one for one in entries if one.gain >= ALIKE * top and one.gain > 0.0]
+    return min(good, key=lambda one: (one.way_m, one.key), default=None)

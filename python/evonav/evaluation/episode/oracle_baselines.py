@@ -15,7 +15,7 @@ from evonav.agents.registry import new_agent
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
-from evonav.evaluation.records.schema import Point3
+from evonav.evaluation.records.base import Point3
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

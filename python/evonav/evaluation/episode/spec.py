@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from evonav.evaluation.records.base import Point2
 from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
 from evonav.evaluation.records.oracle import target_record, transition_record
 from evonav.evaluation.records.schema import (
     EndState,
     FloorPlan,
     GoalRecord,
-    Point2,
     StageRecord,
     TargetRecord,
     TransitionRecord,

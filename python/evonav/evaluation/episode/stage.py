@@ -16,11 +16,11 @@ from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.convert import action_record, pose_record, sensing_record
+from evonav.evaluation.records.base import BeliefRecord
+from evonav.evaluation.records.convert import action_record, pose_record, sensing_record, with_places
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import (
     EndState,
-    EntryRecord,
     ErrorKind,
     MemoryRecord,
     RoundRecord,
@@ -92,6 +92,7 @@ class Stage:
         self._stopwatch = stopwatch
         self._staleness = StalenessTracker((), "", (), state.tracked, 1)
         self._memory_at_start: MemoryRecord | None = None
+        self._belief_at_start: BeliefRecord | None = None
         self._beliefs: Sequence[EntryBelief] | None = None
         """The agent's entries after the last round, if they were read."""
         self._trace: list[RoundRecord] = []
@@ -155,6 +156,7 @@ class Stage:
                 self._baseline.reveal_stale(self._staleness.stale_ids(beliefs))
                 beliefs = self._entries()
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
+        self._belief_at_start = self._staleness.presence(beliefs or ())
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensor_config)})
 
     def _is_agent_in_evolved_room(self) -> bool:
@@ -259,13 +261,8 @@ class Stage:
         )
 
     def _sensors(self) -> Sensors:
-        scene = StageScene(
-            task_id=self._spec.task_id,
-            goal=self._stage.public,
-            agent=self._record.agent,
-            seed=self._perception_seed,
-            objects=self._simulator.objects,
-        )
+        spec, objects = self._spec, self._simulator.objects
+        scene = StageScene(spec.task_id, self._stage.public, self._record.agent, self._perception_seed, objects)
         with attribute_errors(ErrorKind.SIMULATION):
             return Sensors(
                 self._simulator, self._perception, self._sensor_config, scene, self._staleness, self._stopwatch
@@ -282,9 +279,8 @@ class Stage:
                 )
             action = self._agent.act(observation)
             if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
-                raise InvalidArgumentError(
-                    "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
-                )
+                message = "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
+                raise InvalidArgumentError(message)
             return action
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
@@ -312,7 +308,10 @@ class Stage:
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):
-            diagnostics = self._agent.diagnostics()
+            diagnostics, bodies = self._agent.diagnostics(), self._staleness.bodies
+            chosen = diagnostics.chosen_entry
+            if number == 0:
+                self._belief_at_start = with_places(self._belief_at_start, diagnostics.places)
             return RoundRecord(
                 round=number,
                 pose=pose_record(pose),
@@ -321,7 +320,7 @@ class Stage:
                 is_action_success=done.is_success,
                 is_target_visible=self._staleness.is_target_visible,
                 choice=diagnostics.choice,
-                chosen_entry=None if diagnostics.chosen_entry is None else self._entry_record(diagnostics.chosen_entry),
+                chosen_entry=None if chosen is None else entry_record(chosen, bodies),
                 num_entries=diagnostics.num_entries,
                 num_frontiers=diagnostics.num_frontiers,
                 counters=dict(diagnostics.counters),
@@ -372,7 +371,7 @@ class Stage:
         memory, num_forgotten = self._staleness.end(beliefs)
         return record.model_copy(
             update={
-                "entries": tuple(self._entry_record(belief) for belief in beliefs),
+                "entries": tuple(entry_record(belief, self._staleness.bodies) for belief in beliefs),
                 "memory_at_start": self._memory_at_start,
                 "memory_at_end": memory,
                 "num_forgotten": num_forgotten,
@@ -386,6 +385,7 @@ class Stage:
             update={
                 "num_rounds": len(self._trace),
                 "num_target_visible_rounds": sum(entry.is_target_visible for entry in self._trace),
+                "belief_at_start": self._belief_at_start,
                 "trace": tuple(self._trace),
             }
         )
@@ -394,6 +394,3 @@ class Stage:
         """Return the agent's object memory; None if it does not explain itself."""
         with self._stopwatch.timing("agent"):
             return self._agent.entries()
-
-    def _entry_record(self, belief: EntryBelief) -> EntryRecord:
-        return entry_record(belief, self._staleness.bodies)

@@ -16,14 +16,8 @@ import numpy as np
 
 from evonav import _core
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.records.schema import (
-    EntryRecord,
-    MemoryRecord,
-    MovedObjectRecord,
-    Point3,
-    Relocation,
-    StaleEntryRecord,
-)
+from evonav.evaluation.records.base import BeliefRecord, Point3
+from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, Relocation, StaleEntryRecord
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
 from evonav.world.simulator import Frame, SceneObject
@@ -208,6 +202,13 @@ class StalenessTracker:
         beliefs = movable(beliefs)
         matches = matched_objects(beliefs, self.bodies)
         return [belief.entry_id for belief, body in zip(beliefs, matches, strict=True) if body is None]
+
+    def presence(self, beliefs: Sequence[EntryBelief]) -> BeliefRecord | None:
+        """Return the probabilities of the entries that have one, and whether these are right; `None` without any."""
+        stated = [belief for belief in movable(beliefs) if belief.p_present is not None]
+        matches = matched_objects(stated, self.bodies)
+        pairs = tuple((one.p_present or 0.0, body is not None) for one, body in zip(stated, matches, strict=True))
+        return BeliefRecord(presence=pairs) if pairs else None
 
     def begin_round(self, number: int) -> None:
         """Begin a round (0-based), whose views come next."""

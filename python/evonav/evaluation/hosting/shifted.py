@@ -8,7 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from evonav.agents.agent import AgentAction, Belief, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig
+from evonav.agents.agent import (
+    AgentAction,
+    Belief,
+    EntryBelief,
+    NavigateTo,
+    PlaceBelief,
+    RoundDiagnostics,
+    SensorConfig,
+)
 from evonav.agents.hosting.wire import MAX_M
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import HostedAgent
@@ -75,6 +83,7 @@ class Shift:
         return replace(
             diagnostics,
             chosen_entry=None if chosen is None else self.unshifted_entry(chosen),
+            places=self._unshifted_places(diagnostics.places),
             details={name: self._unshifted_detail(name, value) for name, value in diagnostics.details.items()},
         )
 
@@ -92,7 +101,14 @@ class Shift:
                 for frontier in belief.frontiers
             ],
             map_frame=self._map_frame(belief.map_frame, -1),
+            places=self._unshifted_places(belief.places),
         )
+
+    def _unshifted_places(self, places: PlaceBelief | None) -> PlaceBelief | None:
+        if places is None:
+            return None
+        centres_m = (self._unshifted_point(centre_m, "places.centres_m") for centre_m in places.centres_m)
+        return replace(places, centres_m=tuple(centres_m))
 
     def _pose(self, pose: Pose) -> Pose:
         return replace(pose, x_m=pose.x_m + self.x_m, z_m=pose.z_m + self.z_m)

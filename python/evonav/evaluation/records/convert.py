@@ -1,6 +1,7 @@
 """Convert poses, sensors and actions to the parts of records that describe them."""
 
-from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig, ViewSchedule
+from evonav.agents.agent import AgentAction, Move, NavigateTo, PlaceBelief, SensorConfig, ViewSchedule
+from evonav.evaluation.records.base import BeliefRecord, PlacesRecord
 from evonav.evaluation.records.schema import ActionRecord, PoseRecord, SensingRecord
 from evonav.world.pose import Pose
 
@@ -40,3 +41,11 @@ def action_record(action: AgentAction) -> ActionRecord:
     if isinstance(action, Move):
         return ActionRecord(kind="move", action=action.action.value)
     return ActionRecord(kind="stop", reason=str(action.reason))
+
+
+def with_places(belief: BeliefRecord | None, places: PlaceBelief | None) -> BeliefRecord | None:
+    """Return an agent's belief, for the record, with where it believes the target to be."""
+    if places is None:
+        return belief
+    record = PlacesRecord(cell_m=places.cell_m, centres_m=places.centres_m, probabilities=places.probabilities)
+    return (belief or BeliefRecord()).model_copy(update={"places": record})

@@ -9,28 +9,12 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+
+from evonav.evaluation.records.base import BeliefRecord, Point2, Point3, Real, Record, Whole
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
-
-Real = Annotated[float, Field(ge=-1e9, le=1e9)]
-"""Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
-Whole = Annotated[int, Field(ge=-(2**63), lt=2**63)]
-"""A count or number of a record: 64 bits."""
-Point2 = tuple[Real, Real]
-"""`(x, z)`."""
-Point3 = tuple[Real, Real, Real]
-"""`(x, y, z)`."""
-
-
-class _Record(BaseModel):
-    """A frozen record that rejects unknown fields."""
-
-    # Parts of a record are validated again with the whole: `model_copy` does not validate.
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always", allow_inf_nan=False
-    )
 
 
 class EndState(str, Enum):
@@ -92,7 +76,7 @@ _PHRASES = {
 }
 
 
-class StageError(_Record):
+class StageError(Record):
     """The reason why a stage is errored or was not run."""
 
     kind: ErrorKind
@@ -110,7 +94,7 @@ class StageFailure:
     traceback: str = ""
 
 
-class PoseRecord(_Record):
+class PoseRecord(Record):
     """A pose of the agent."""
 
     x_m: Real
@@ -120,7 +104,7 @@ class PoseRecord(_Record):
     horizon_rad: Real
 
 
-class GoalRecord(_Record):
+class GoalRecord(Record):
     """The goal that the agent received, without the image."""
 
     category: str
@@ -129,7 +113,7 @@ class GoalRecord(_Record):
     basic_instruction: str
 
 
-class TargetRecord(_Record):
+class TargetRecord(Record):
     """The instance to be found. Oracle."""
 
     object_id: str
@@ -144,7 +128,7 @@ class TargetRecord(_Record):
     """Its place in stage 1, if `is_relocated`."""
 
 
-class Relocation(_Record):
+class Relocation(Record):
     """One object moved in a transition. Oracle."""
 
     object_id: str
@@ -153,7 +137,7 @@ class Relocation(_Record):
     to_m: Point3
 
 
-class TransitionRecord(_Record):
+class TransitionRecord(Record):
     """The change between the previous stage and this one. Oracle."""
 
     mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
@@ -178,7 +162,7 @@ class TransitionRecord(_Record):
         return "extensions" if self.num_added or self.num_removed or self.num_states else "static"
 
 
-class EntryRecord(_Record):
+class EntryRecord(Record):
     """An object entry as the agent believed it, judged by the evaluator."""
 
     entry_id: Whole
@@ -190,7 +174,7 @@ class EntryRecord(_Record):
     """The entry is stale, as `evonav.evaluation.episode.staleness` defines it."""
 
 
-class MemoryRecord(_Record):
+class MemoryRecord(Record):
     """The agent's entries compared with the stage's house."""
 
     num_entries: Whole
@@ -206,7 +190,7 @@ class MemoryRecord(_Record):
     """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
 
 
-class StaleEntryRecord(_Record):
+class StaleEntryRecord(Record):
     """An entry that was stale at the start, the round from which this was evident, and the round of its correction."""
 
     label: str
@@ -217,7 +201,7 @@ class StaleEntryRecord(_Record):
     """The round, from the evident one on, after which the entry is gone or corrected."""
 
 
-class MovedObjectRecord(_Record):
+class MovedObjectRecord(Record):
     """An object moved in the transition before the stage, far enough that an entry of it would be stale."""
 
     object_id: str
@@ -227,7 +211,7 @@ class MovedObjectRecord(_Record):
     """The round, from that one on, after which an entry stands for it."""
 
 
-class ActionRecord(_Record):
+class ActionRecord(Record):
     """The agent's answer."""
 
     kind: Literal["move", "navigate_to", "stop"]
@@ -241,7 +225,7 @@ class ActionRecord(_Record):
     """The reason of a `stop`."""
 
 
-class SensingRecord(_Record):
+class SensingRecord(Record):
     """The sensing and motion that the agent was granted in a stage, without colours.
 
     Together with the actions, this is enough to carry them out again (`evonav.submission.rescore`).
@@ -255,7 +239,7 @@ class SensingRecord(_Record):
     occupancy_range_m: Real
 
 
-class RoundRecord(_Record):
+class RoundRecord(Record):
     """One decision round: where the agent stood, what it chose, how it went."""
 
     round: Whole
@@ -278,7 +262,7 @@ class RoundRecord(_Record):
     details: dict[str, Any]
 
 
-class StageRecord(_Record):
+class StageRecord(Record):
     """One stage of one agent's episode. Metrics are `None` unless the state is success or failure."""
 
     schema_version: Literal[1] = 1
@@ -335,6 +319,8 @@ class StageRecord(_Record):
     memory_at_end: MemoryRecord | None = None
     num_forgotten: Whole | None = None
     """Objects that an entry stood for at the start and none at the end, though they stand where they stood."""
+    belief_at_start: BeliefRecord | None = None
+    """`None`, and left out of the JSON, for an agent that tells no probabilities."""
     stale_entries: tuple[StaleEntryRecord, ...] = ()
     moved_objects: tuple[MovedObjectRecord, ...] = ()
 
@@ -347,8 +333,16 @@ class StageRecord(_Record):
         """True if the stage counts in rates."""
         return self.state.is_scored
 
+    @model_serializer(mode="wrap")
+    def _without_untold(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what is newer than the records of agents that do not tell it."""
+        values: dict[str, Any] = handler(self)
+        if self.belief_at_start is None:
+            del values["belief_at_start"]
+        return values
 
-class RoomFootprint(_Record):
+
+class RoomFootprint(Record):
     """A room's floor."""
 
     room_id: str
@@ -356,7 +350,7 @@ class RoomFootprint(_Record):
     polygon_m: tuple[Point2, ...]
 
 
-class ObjectFootprint(_Record):
+class ObjectFootprint(Record):
     """An object seen from above."""
 
     object_id: str
@@ -373,7 +367,7 @@ class ObjectFootprint(_Record):
 OpeningKind = Literal["door", "window"]
 
 
-class Opening(_Record):
+class Opening(Record):
     """A door, doorway or window from above."""
 
     kind: OpeningKind
@@ -381,7 +375,7 @@ class Opening(_Record):
     to_m: Point2
 
 
-class FloorPlan(_Record):
+class FloorPlan(Record):
     """A stage's house from above, the background of maps. It is the same for all agents."""
 
     schema_version: Literal[1] = 1

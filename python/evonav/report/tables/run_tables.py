@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from evonav.counted import counted
+from evonav.evaluation.metrics.belief import belief_summary
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
@@ -26,6 +27,7 @@ def run_tables(run: RecordedRun) -> list[tables.Table]:
         tables.mode_table(run.summaries),
         tables.cause_table(run.cause_counts()),
         effort_table(run),
+        belief_table(run),
         failure_table(run),
         *(breakdown_table(one) for one in run_breakdowns(run)),
     ]
@@ -52,6 +54,29 @@ def effort_table(run: RecordedRun) -> tables.Table:
         "of its label there. Stale entries: in memory at the end of a stage."
     )
     return tables.Table("Effort and staleness", columns, tuple(rows), (note,))
+
+
+def belief_table(run: RecordedRun) -> tables.Table:
+    """Build the table of the probabilities that agents told as stages began; no row for an agent that tells none."""
+    columns = ("Agent", "stages", "NLL", "Brier", "ECE", "rank", "entries", "NLL", "Brier", "ECE")
+    rows = []
+    for agent, records in run.records_by_agent().items():
+        found = belief_summary(records, run.success_radius_m)
+        place = (found.place_nll, found.place_brier, found.place_ece)
+        presence = found.presence
+        if found.num_placed == 0 and presence is None:
+            continue
+        rank = NONE if found.median_rank is None else f"{found.median_rank:.0f}"
+        entries = (None, None, None) if presence is None else (presence.nll, presence.brier, presence.ece)
+        numbers = [NONE if one is None else f"{one:.2f}" for one in (*place, *entries)]
+        counts = str(found.num_placed), "0" if presence is None else str(presence.n)
+        rows.append((agent, counts[0], *numbers[:3], rank, counts[1], *numbers[3:]))
+    note = (
+        "Lower is better. Stages: the belief of where the target is, after the first look; NLL in nats, of the "
+        "probability within the success radius of the target; ECE, of the likeliest place; rank, the median of that "
+        "of the target's square. Entries: the belief that their objects are still there, as stages begin."
+    )
+    return tables.Table("Belief as stages began", columns, tuple(rows), (note,))
 
 
 def failure_table(run: RecordedRun) -> tables.Table:

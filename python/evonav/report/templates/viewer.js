@@ -144,6 +144,17 @@
     return `stale${target ? ` (${target})` : ""}: ${where}`;
   };
 
+  const drawHeat = (round) => {
+    const group = $("heat"), [edge, squares] = round.heat ?? [0, []];
+    group.replaceChildren();
+    const most = Math.max(...squares.map((square) => square[2]), 1e-9);
+    for (const [x, y, percent] of squares) {
+      // The root shows small probabilities, too.
+      const opacity = (0.75 * Math.sqrt(percent / most)).toFixed(3);
+      svg("rect", { x: x - edge / 2, y: y - edge / 2, width: edge, height: edge, "fill-opacity": opacity }, group, `${percent}% likely here`);
+    }
+  };
+
   const drawFrontiers = (stage, round) => {
     const u = stage.unit, group = $("frontiers");
     group.replaceChildren();
@@ -362,7 +373,7 @@
     slider.disabled = rounds.length < 2;
     if (!rounds.length) {
       $("where").textContent = "no rounds";
-      for (const id of ["entries", "tags", "frontiers", "way", "agent", "fov"]) $(id).replaceChildren();
+      for (const id of ["heat", "entries", "tags", "frontiers", "way", "agent", "fov"]) $(id).replaceChildren();
       $("cells").removeAttribute("href");
       $("fog").setAttribute("d", "");
       $("heading").hidden = true;
@@ -382,6 +393,7 @@
     slider.setAttribute("aria-valuetext", `round ${now + 1}: ${round.choice ?? "error"}`);
     timeline.querySelector(".now").setAttribute("x", now * 1000 / rounds.length);
     drawCells(round);
+    drawHeat(round);
     drawEntries(stage, round);
     drawFrontiers(stage, round);
     drawWay(stage, rounds);

@@ -1,0 +1,116 @@
+"""Score the probabilities that agents stated as stages began (defined in docs/measures.md)."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from evonav.evaluation.records.base import PlacesRecord, Point2
+from evonav.evaluation.records.schema import StageRecord
+
+NUM_BINS = 10
+"""Number of bins of the expected calibration error, all of the same width."""
+MIN_P = 1e-4
+"""Smallest probability in a logarithm: one certain mistake must not outweigh all other stages."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceScore:
+    """A belief about places compared with the place of the target."""
+
+    p_near: float
+    """Probability of the squares whose middles are within the success radius of the target."""
+    brier: float
+    """Brier score of the squares and of all other places: from 0, for certainty that is right, to 2."""
+    rank: int
+    """Number of squares that are likelier than the target's own, plus 1; one more than all if it is in none."""
+    top: float
+    """Largest probability within the success radius of the middle of a square."""
+    is_top_right: bool
+    """Whether the target is within the success radius of that middle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Scores of probabilities of which some came true."""
+
+    n: int
+    nll: float
+    """Mean negative logarithm of the probability of what is true, in nats."""
+    brier: float
+    """Mean squared difference between probability and truth."""
+    ece: float
+    """Expected calibration error: mean gap between probability and share of truths, over `NUM_BINS` bins by size."""
+
+
+def place_score(places: PlacesRecord, target_m: Point2, radius_m: float) -> PlaceScore:
+    """Score a belief about places.
+
+    Args:
+        places: The belief.
+        target_m: `(x, z)` of the target.
+        radius_m: The success radius.
+    """
+    cells = list(zip(places.centres_m, places.probabilities, strict=True))
+    p_near = math.fsum(p for centre_m, p in cells if math.dist(centre_m, target_m) < radius_m)
+    half_m = places.cell_m / 2.0
+    own = next((p for c, p in cells if max(abs(c[0] - target_m[0]), abs(c[1] - target_m[1])) <= half_m), None)
+    rest = max(0.0, 1.0 - math.fsum(p for _, p in cells))
+    squares = math.fsum(p * p for _, p in cells) + rest * rest
+    brier = squares - 2.0 * (rest if own is None else own) + 1.0
+    rank = 1 + (len(cells) if own is None else sum(p > own for _, p in cells))
+    top, centre_m = max(((_mass_within(cells, c, radius_m), c) for c, p in cells if p > 0.0), default=(0.0, None))
+    is_right = centre_m is not None and math.dist(centre_m, target_m) < radius_m
+    return PlaceScore(min(p_near, 1.0), brier, rank, min(top, 1.0), is_right)
+
+
+def _mass_within(cells: Sequence[tuple[Point2, float]], centre_m: Point2, radius_m: float) -> float:
+    return math.fsum(p for other_m, p in cells if math.dist(other_m, centre_m) < radius_m)
+
+
+def calibration(probabilities: Iterable[tuple[float, bool]]) -> Calibration | None:
+    """Score probabilities, each with whether it came true; `None` without any."""
+    pairs = list(probabilities)
+    if not pairs:
+        return None
+    nll = math.fsum(-math.log(max(p if is_true else 1.0 - p, MIN_P)) for p, is_true in pairs)
+    brier = math.fsum((p - is_true) ** 2 for p, is_true in pairs)
+    bins: dict[int, list[tuple[float, bool]]] = {}
+    for p, is_true in pairs:
+        bins.setdefault(min(int(p * NUM_BINS), NUM_BINS - 1), []).append((p, is_true))
+    gaps = (abs(math.fsum(p - is_true for p, is_true in part)) for part in bins.values())
+    n = len(pairs)
+    return Calibration(n, nll / n, brier / n, math.fsum(gaps) / n)
+
+
+@dataclass(frozen=True, slots=True)
+class BeliefSummary:
+    """Scores of an agent's probabilities over all of its stages."""
+
+    presence: Calibration | None
+    """Scores of entries: whether their objects are still there."""
+    num_placed: int
+    """Stages with a belief about places; the next fields are means over them, and a median."""
+    place_nll: float | None
+    place_brier: float | None
+    place_ece: float | None
+    median_rank: float | None
+
+
+def belief_summary(records: Iterable[StageRecord], radius_m: float) -> BeliefSummary:
+    """Score an agent's probabilities over its stages, at a success radius."""
+    beliefs = [(record.target.position_m, record.belief_at_start) for record in records if record.belief_at_start]
+    presence = calibration(pair for _, belief in beliefs for pair in belief.presence)
+    scores = [place_score(b.places, (at[0], at[2]), radius_m) for at, b in beliefs if b.places is not None]
+    n = len(scores)
+    if n == 0:
+        return BeliefSummary(presence, 0, None, None, None, None)
+    tops = calibration((one.top, one.is_top_right) for one in scores)
+    return BeliefSummary(
+        presence,
+        n,
+        math.fsum(-math.log(max(one.p_near, MIN_P)) for one in scores) / n,
+        math.fsum(one.brier for one in scores) / n,
+        None if tops is None else tops.ece,
+        median(one.rank for one in scores),
+    )
