@@ -1,4 +1,4 @@
-"""A policy that learns on a laptop in about a minute: REINFORCE on a linear policy, with NumPy alone.
+"""A policy that learns on a laptop in minutes: REINFORCE on a linear policy, with NumPy alone.
 
     python examples/train_gym.py [updates]
 

@@ -2,8 +2,8 @@
 
 They have the sizes of ProcTHOR-10k's splits and the assets of the split of their name. The checksums below are those of
 the houses' text, one a line, which does not depend on how a file is packed. Positions are rounded to 0.1 mm and angles
-to 0.1 thousandths of a degree before they are written, so the last bits of a machine's sines and powers do not show. A
-generator that makes other houses must get another name.
+to 0.001 degrees before they are written, so the last bits of a machine's sines and powers do not show. A generator that
+makes other houses must get another name; other sizes or shapes of assets make other houses, too.
 """
 
 import gzip
