@@ -15,6 +15,7 @@ NAMES = {
     "write an agent": (
         "Agent",
         "Explanation",
+        "PlaceBelief",
         "SensorConfig",
         "TaskInfo",
         "Goal",
@@ -32,7 +33,7 @@ SIGNATURES = Path(__file__).with_name("signatures.txt")
 
 
 def test_the_names_are_those_of_the_front_door() -> None:
-    assert len(ALL) == 25
+    assert len(ALL) == 26
     assert sorted(evonav.__all__) == sorted(dir(evonav)) == ALL
 
 

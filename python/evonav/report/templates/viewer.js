@@ -387,7 +387,10 @@
     const round = rounds[now];
     cardOf("memory").hidden = !stage.hasBelief;
     cardOf("questions").hidden = !stage.rounds.some(({ q }) => q);
-    for (const part of document.querySelectorAll(".belief")) part.hidden = !stage.hasBelief;
+    const hasPlaces = stage.rounds.some((round) => round.heat);
+    for (const part of document.querySelectorAll(".belief")) {
+      part.hidden = !stage.hasBelief || (part.classList.contains("places") && !hasPlaces);
+    }
     $("untold").hidden = stage.hasBelief || Boolean(stage.whyNot);
     $("where").textContent = `round ${now + 1} of ${rounds.length} (budget ${stage.budget})`;
     slider.setAttribute("aria-valuetext", `round ${now + 1}: ${round.choice ?? "error"}`);
