@@ -8,7 +8,7 @@ from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.khronos.agent import KhronosFrontierUpdate
-from evonav.agents.khronos.votes import Change, RayVotes, VotesConfig, change_of, thinned
+from evonav.agents.khronos.votes import Change, RayVotes, VotesConfig, change_of, rays_of
 from evonav.memory import ObjectMap
 
 CONFIG = VotesConfig()
@@ -90,15 +90,15 @@ def test_a_change_is_that_of_the_definition(bins, window, forward):
 
 def test_a_thinned_view_has_the_same_rays():
     view = a_cup()
-    rays = thinned(view, 4)
+    rays = rays_of(view, 4)
     assert rays.depth_m.shape == (15, 15)
     assert (rays.depth_m == view.depth_m[2::4, 2::4]).all()
     assert rays.intrinsics.focal_px * 4 == pytest.approx(view.intrinsics.focal_px)
-    assert thinned(view, 7).depth_m.shape == (60, 60)  # 7 does not divide 60
+    assert rays_of(view, 7).depth_m.shape == (60, 60)  # 7 does not divide 60
     memory = ObjectMap()
     memory.update(view)
     for look in (GONE, UNDETECTED):
-        (all_rays,), (few,) = (memory.depth_evidence([1], one) for one in (look, thinned(look, 4)))
+        (all_rays,), (few,) = (memory.depth_evidence([1], one) for one in (look, rays_of(look, 4)))
         assert few.see_through_share == pytest.approx(all_rays.see_through_share, abs=0.1)
 
 

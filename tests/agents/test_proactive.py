@@ -185,15 +185,15 @@ def test_a_place_shows_what_no_wall_hides():
     coarse = CoarseFrame.over(FRAME)
     cells = two_rooms(door_cells=10)
     rows, cols = shown_from((4.0, 1.0), coarse, walls_of(cells, FRAME, []), 2.5)
-    shown_m = [coarse.centre_m(row, col) for row, col in zip(rows, cols, strict=True)]
+    shown_m = [coarse.frame.centre_m(row, col) for row, col in zip(rows, cols, strict=True)]
     assert all(math.dist(one, (4.0, 1.0)) <= 2.5 + 1e-9 for one in shown_m)
     assert max(x_m for x_m, _ in shown_m) < 5.3
     assert sum(math.dist(one, (3.0, 1.0)) < 0.9 for one in shown_m) > 50
     through = shown_from((4.0, 3.5), coarse, walls_of(cells, FRAME, []), 2.5)
-    assert max(coarse.centre_m(0, col)[0] for col in through[1]) > 6.0  # through the doorway
+    assert max(coarse.frame.centre_m(0, col)[0] for col in through[1]) > 6.0  # through the doorway
     shelf = ObjectCandidate(1, "ShelvingUnit", (5.0, 0.9, 1.0), (0.2, 1.8, 2.0), 3)
     over = shown_from((4.0, 1.0), coarse, walls_of(cells, FRAME, [shelf]), 2.5)
-    assert max(coarse.centre_m(0, col)[0] for col in over[1]) > 6.0  # furniture is no wall
+    assert max(coarse.frame.centre_m(0, col)[0] for col in over[1]) > 6.0  # furniture is no wall
 
 
 def test_what_was_searched_in_vain_counts_less():

@@ -76,6 +76,15 @@ class MapFrame:
     corner_m: tuple[float, float]
     """`(x, z)` of the smallest corner of cell (0, 0)."""
 
+    def centre_m(self, row: float, col: float) -> tuple[float, float]:
+        """Return the middle of a cell, `(x, z)`."""
+        return (self.corner_m[0] + (col + 0.5) * self.cell_m, self.corner_m[1] + (row + 0.5) * self.cell_m)
+
+    def cell_at(self, place_m: tuple[float, float]) -> tuple[int, int]:
+        """Return row and column of the cell at `(x, z)`, or of the nearest one."""
+        row, col = ((place_m[axis] - self.corner_m[axis]) / self.cell_m for axis in (1, 0))
+        return min(max(int(row), 0), self.rows - 1), min(max(int(col), 0), self.cols - 1)
+
 
 @dataclass(frozen=True, slots=True)
 class Observation:

@@ -42,6 +42,26 @@ class Images(NamedTuple):
     """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the body; `None` if not requested."""
 
 
+def thinned(
+    depth_m: NDArray[np.float32], intrinsics: Intrinsics, *strides_px: int
+) -> tuple[NDArray[np.float32], Intrinsics, slice]:
+    """Return every n-th pixel of every n-th row of a depth image, and the camera that has such pixels.
+
+    Args:
+        depth_m: `(H, W)` planar depth.
+        intrinsics: Intrinsics of the image.
+        strides_px: Values for n; the first that divides height and width is taken, else 1.
+
+    Returns:
+        `(H / n, W / n)` depth, its intrinsics, and the rows and columns that were taken.
+    """
+    height_px, width_px = depth_m.shape
+    stride = next((one for one in strides_px if height_px % one == width_px % one == 0), 1)
+    taken = slice(stride // 2, None, stride)
+    fewer = Intrinsics(width_px // stride, height_px // stride, intrinsics.vertical_fov_rad)
+    return np.ascontiguousarray(depth_m[taken, taken]), fewer, taken
+
+
 def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
     """Return the world points behind a depth image.
 

@@ -55,7 +55,7 @@ class LastSeen:
 
     def give_up(self, place_m: Point2) -> None:
         """Treat the cell at `(x, z)` as seen: the agent went there in vain."""
-        self._at[self._cell(place_m)] = max(0, self._num_views - 1)
+        self._at[self._frame.cell_at(place_m)] = max(0, self._num_views - 1)
 
     def values(self) -> NDArray[np.float64]:
         """Return the `(R, C)` value of looking at each cell again: 1 for one that was never seen."""
@@ -97,20 +97,13 @@ class LastSeen:
         padded = np.pad(reached, 1)
         beside = [(row + r, col + c) for r, c in _AROUND if padded[1 + row + r, 1 + col + c]]
         row, col = min(beside, key=lambda one: math.dist(one, (row, col)))
-        stand_m = self._middles_m(np.array([row]), np.array([col]))[0].tolist()
         face_m = places_m[best].tolist()
-        return (stand_m[0], stand_m[1]), (face_m[0], face_m[1]), float(values[best])
+        return self._frame.centre_m(row, col), (face_m[0], face_m[1]), float(values[best])
 
     def _middles_m(self, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> NDArray[np.float64]:
         frame = self._frame
         x_m = frame.corner_m[0] + (cols + 0.5) * frame.cell_m
         return np.stack([x_m, frame.corner_m[1] + (rows + 0.5) * frame.cell_m], axis=1)
-
-    def _cell(self, place_m: Point2) -> tuple[int, int]:
-        frame = self._frame
-        row = math.floor((place_m[1] - frame.corner_m[1]) / frame.cell_m)
-        col = math.floor((place_m[0] - frame.corner_m[0]) / frame.cell_m)
-        return min(max(row, 0), frame.rows - 1), min(max(col, 0), frame.cols - 1)
 
 
 def _grown(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from evonav.memory.forgetting.rule import EntryStates, detected_ids
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import EvidenceConfig
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
-from evonav.world.simulator import Intrinsics
+from evonav.world.camera import thinned
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class RayVotes:
             track = self._tracks.setdefault(entry_id, _Track(self._round, self._round))
             track.last = self._round
             track.after.clear()  # it was observed again: what was said of it is out of date
-        self._views.append(thinned(view, self.config.stride_px))
+        self._views.append(rays_of(view, self.config.stride_px))
 
     def end_round(self, map_: ObjectMap) -> None:
         """Count the votes of the round's rays about what it did not detect; date what it detected first."""
@@ -159,17 +159,14 @@ class RayVotes:
         return [self._rays[index] for index in np.flatnonzero(gaps_m <= map_.config.max_distance_m)]
 
 
-def thinned(view: View, stride_px: int) -> View:
+def rays_of(view: View, stride_px: int) -> View:
     """Return a view with fewer pixels and without detections: the rays that are kept of it.
 
     Args:
         view: The view.
         stride_px: Every such pixel of every such row is kept, if the size of the image allows it; else all are.
     """
-    height_px, width_px = view.depth_m.shape
-    stride = stride_px if height_px % stride_px == width_px % stride_px == 0 else 1
-    depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
+    depth_m, intrinsics, _ = thinned(view.depth_m, view.intrinsics, stride_px)
     nothing = Detections(np.full(depth_m.shape, -1, np.int32), (), np.empty(0, np.float32))
-    intrinsics = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
     no_cells = VisibleOccupancy(np.empty((0, 2), np.int32), np.empty((0, 2), np.int32))
     return replace(view, intrinsics=intrinsics, depth_m=depth_m, detections=nothing, occupancy=no_cells, rgb=None)

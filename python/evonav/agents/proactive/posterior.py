@@ -76,7 +76,7 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
     """
     weights = posterior.moved + posterior.unseen
     for place_m, weight in placed:
-        weights[coarse.cell_at(place_m)] += weight
+        weights[coarse.frame.cell_at(place_m)] += weight
     rows, cols = (-(-size // SQUARE_CELLS) for size in weights.shape)
     padded = np.zeros((rows * SQUARE_CELLS, cols * SQUARE_CELLS))
     padded[: weights.shape[0], : weights.shape[1]] = weights
@@ -86,7 +86,9 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
     likely = np.argwhere(shares > 0.0).tolist()
     return PlaceBelief(
         cell_m=coarse.frame.cell_m * SQUARE_CELLS,
-        centres_m=tuple(coarse.centre_m(row * SQUARE_CELLS + half, col * SQUARE_CELLS + half) for row, col in likely),
+        centres_m=tuple(
+            coarse.frame.centre_m(row * SQUARE_CELLS + half, col * SQUARE_CELLS + half) for row, col in likely
+        ),
         probabilities=tuple(float(shares[row, col]) for row, col in likely),
     )
 

@@ -110,12 +110,12 @@ def places_to_search(
         if sums[row, col] <= 0.0:
             break
         sums[max(0, row - spacing) : row + spacing + 1, max(0, col - spacing) : col + spacing + 1] = 0.0
-        eye = coarse.centre_m(row, col)
+        eye = coarse.frame.centre_m(row, col)
         rows, cols = shown_from(eye, coarse, around.walls, radius_m)
         gains = weights[rows, cols]
         gain = float(gains.sum())
         if gain > 0.0:
-            x_m, z_m = coarse.centre_m(float(gains @ rows) / gain, float(gains @ cols) / gain)
+            x_m, z_m = coarse.frame.centre_m(float(gains @ rows) / gain, float(gains @ cols) / gain)
             found.append((row * coarse.frame.cols + col, eye, (x_m, z_m), gain))
     return found
 

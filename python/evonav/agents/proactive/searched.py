@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.presence import NUM_SECTORS
 from evonav.sensors.observation import MapFrame, View
-from evonav.world.camera import unproject
-from evonav.world.simulator import Intrinsics
+from evonav.world.camera import thinned, unproject
 
 CELL_M = 0.25
 """Wanted edge of a cell, which is a whole number of the map's cells."""
@@ -44,20 +43,9 @@ class CoarseFrame:
         padded = np.pad(cells, ((0, missing[0]), (0, missing[1])), constant_values=rest)
         return padded.reshape(rows, step, cols, step).transpose(0, 2, 1, 3).reshape(rows, cols, step * step)
 
-    def centre_m(self, row: float, col: float) -> tuple[float, float]:
-        """Return the middle of a cell, `(x, z)`."""
-        frame = self.frame
-        return (frame.corner_m[0] + (col + 0.5) * frame.cell_m, frame.corner_m[1] + (row + 0.5) * frame.cell_m)
-
     def value_at(self, values: NDArray[np.float64], place_m: tuple[float, float]) -> float:
         """Return the value of the `(R, C)` cells at a place, or at the nearest cell."""
-        return float(values[self.cell_at(place_m)])
-
-    def cell_at(self, place_m: tuple[float, float]) -> tuple[int, int]:
-        """Return row and column of the cell at a place, or of the nearest one."""
-        frame = self.frame
-        row, col = ((place_m[axis] - frame.corner_m[axis]) / frame.cell_m for axis in (1, 0))
-        return min(max(int(row), 0), frame.rows - 1), min(max(int(col), 0), frame.cols - 1)
+        return float(values[self.frame.cell_at(place_m)])
 
 
 class SearchedCells:
@@ -127,11 +115,8 @@ def _class_of(range_m: float) -> int:
 
 def seen_cells(view: View, frame: MapFrame, range_m: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows and columns of the cells with a surface that a view shows within a distance on the ground plane."""
-    height_px, width_px = view.depth_m.shape
-    stride = next((s for s in STRIDES if height_px % s == 0 and width_px % s == 0), 1)
-    depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
-    coarse = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
-    points_m = unproject(depth_m, view.pose, coarse)[np.isfinite(depth_m)]
+    depth_m, intrinsics, _ = thinned(view.depth_m, view.intrinsics, *STRIDES)
+    points_m = unproject(depth_m, view.pose, intrinsics)[np.isfinite(depth_m)]
     dx_m, dz_m = points_m[:, 0] - view.pose.x_m, points_m[:, 2] - view.pose.z_m
     points_m = points_m[dx_m**2 + dz_m**2 <= range_m**2]
     cols = np.floor((points_m[:, 0] - frame.corner_m[0]) / frame.cell_m).astype(np.int64)

@@ -23,7 +23,7 @@ def places_before(centre_m: Point2, coarse: CoarseFrame, around: Surroundings, w
     """Return the free places within a distance of another that no wall hides from it."""
     rows, cols = shown_from(centre_m, coarse, around.walls, within_m)
     is_free = around.free[rows, cols]
-    return [coarse.centre_m(row, col) for row, col in zip(rows[is_free], cols[is_free], strict=True)]
+    return [coarse.frame.centre_m(row, col) for row, col in zip(rows[is_free], cols[is_free], strict=True)]
 
 
 def place_by(places: Sequence[Point2], placed: Placed, occupancy: OccupancyMap, here_m: Point2) -> Point2 | None:
@@ -59,7 +59,7 @@ def likeliest_places(
     """
     weights = posterior.moved + posterior.unseen
     for (x_m, z_m), weight in placed:
-        row, col = coarse.cell_at((x_m, z_m))
+        row, col = coarse.frame.cell_at((x_m, z_m))
         weights[row, col] += weight
     half = max(1, round(STOP_REACH_M / math.sqrt(2.0) / coarse.frame.cell_m))
     sums = np.where(around.free, window_sums(weights, half), 0.0)
@@ -68,7 +68,7 @@ def likeliest_places(
         row, col = (int(one) for one in np.unravel_index(int(sums.argmax()), sums.shape))
         if sums[row, col] <= 0.0:
             break
-        place = coarse.centre_m(row, col)
+        place = coarse.frame.centre_m(row, col)
         found.append(Option("place", row * coarse.frame.cols + col, place, place, float(sums[row, col]), 0.0))
         sums[max(0, row - half) : row + half + 1, max(0, col - half) : col + half + 1] = 0.0
     return found

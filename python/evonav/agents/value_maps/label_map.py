@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from evonav.agents.proactive.rooms import numbered
 from evonav.agents.relatedness import Feature, Relatedness
 from evonav.sensors.observation import MapFrame, View
-from evonav.world.camera import unproject
+from evonav.world.camera import thinned, unproject
 from evonav.world.simulator import Intrinsics
 
 BACKGROUND = ""
@@ -66,11 +66,8 @@ class LabelMap:
     def see(self, view: View) -> None:
         """Take in the surfaces of a view."""
         config, frame = self.config, self._frame
-        height_px, width_px = view.depth_m.shape
-        stride = config.stride_px if height_px % config.stride_px == width_px % config.stride_px == 0 else 1
-        depth_m = np.ascontiguousarray(view.depth_m[stride // 2 :: stride, stride // 2 :: stride])
-        masks = view.detections.masks[stride // 2 :: stride, stride // 2 :: stride]
-        intrinsics = Intrinsics(width_px // stride, height_px // stride, view.intrinsics.vertical_fov_rad)
+        depth_m, intrinsics, taken = thinned(view.depth_m, view.intrinsics, config.stride_px)
+        masks = view.detections.masks[taken, taken]
         weights = pixel_weights(depth_m, intrinsics, config)
         points_m = unproject(depth_m, view.pose, intrinsics)
         with np.errstate(invalid="ignore"):

@@ -88,10 +88,7 @@ class OneMap(OwnExploration):
         for row, col, value in clusters_of(
             similarity, is_open, share=config.cluster_share, min_cells=config.min_cluster_cells
         ):
-            middle_m = (
-                frame.corner_m[0] + (col + 0.5) * frame.cell_m,
-                frame.corner_m[1] + (row + 0.5) * frame.cell_m,
-            )
+            middle_m = frame.centre_m(row, col)
             stand_m = self._navigator.observation_point(middle_m)
             if stand_m is not None and all(math.dist(middle_m, one) > SAME_M for one in self._looked_at):
                 places.append(Place(stand_m, middle_m, value))
