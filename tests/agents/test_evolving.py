@@ -9,14 +9,14 @@ from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.evolving.agent import Evolving, EvolvingConfig, hidden_behind
-from evonav.agents.evolving.belief import MIN_WEIGHT, BeliefConfig, Coverage, Seen, belief_of, best_of
-from evonav.agents.proactive.searched import CoarseFrame
+from evonav.agents.evolving.belief import MIN_WEIGHT, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
+from evonav.agents.grid import CoarseFrame
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.memory import OccupancyMap
 from evonav.sensors.observation import MapFrame, VisibleOccupancy
 
 CONFIG = BeliefConfig()
-SEEN = {1: Seen(fit=1.0, num_stages=1)}
+SEEN = {1: Seen(ratio=9.0, num_stages=1)}
 PLACES = {2: 3.0, 3: 1.0}
 
 
@@ -25,10 +25,23 @@ def belief(coverage=None, seen=SEEN, places=PLACES, unknown_share=0.5):
 
 
 def test_the_place_where_it_was_last_seen_keeps_most_and_loses_some_with_each_stage():
-    new, old, older = (belief(seen={1: Seen(1.0, stages)}).sites[1] for stages in (0, 1, 3))
+    new, old, older = (belief(seen={1: Seen(9.0, stages)}).sites[1] for stages in (0, 1, 3))
     assert new == pytest.approx(0.9)
     assert old == pytest.approx(0.9 * 0.8)
     assert older == pytest.approx(0.9 * 0.8**3)
+
+
+def test_of_two_namesakes_the_one_that_fits_the_description_has_the_belief():
+    found = belief(seen={1: Seen(5.0, 0), 4: Seen(0.05, 0)})
+    assert found.sites[1] / found.sites[4] == pytest.approx(100.0)
+    assert found.sites[1] == pytest.approx(5.0 / 6.05)  # 1 is the share of one that was never seen
+    alike = belief(seen={1: Seen(5.0, 0), 4: Seen(5.0, 0)})
+    assert alike.sites[1] == alike.sites[4] == pytest.approx(5.0 / 11.0)
+
+
+def test_an_object_is_believed_present_by_its_stages_and_its_looks():
+    assert [p_present(stages, 1.0, CONFIG) for stages in (0, 1, 2)] == pytest.approx([1.0, 0.8, 0.64])
+    assert p_present(1, 0.1, CONFIG) == pytest.approx(0.08 / 0.28)
 
 
 def test_what_moved_may_be_at_any_site_or_at_an_unknown_place():
@@ -92,23 +105,20 @@ def test_an_inspected_site_is_closed_until_its_belief_is_large():
 
 
 @given(
-    fits=st.lists(st.tuples(st.floats(0.01, 1.0), st.integers(0, 4)), max_size=4),
+    ratios=st.lists(st.tuples(st.floats(0.01, 50.0), st.integers(0, 4)), max_size=4),
     places=st.lists(st.floats(0.0, 5.0), max_size=5),
     unknown_share=st.floats(0.0, 1.0),
     looks=st.lists(st.tuples(st.integers(0, 8), st.floats(0.0, 1.0)), max_size=12),
 )
-def test_the_belief_is_a_distribution(fits, places, unknown_share, looks):
+def test_the_belief_is_a_distribution(ratios, places, unknown_share, looks):
     coverage = Coverage(CONFIG)
     for site, share in looks:
         coverage.look(site, share)
-    seen = {site: Seen(*one) for site, one in enumerate(fits)}
-    found = belief_of(seen, dict(enumerate(places, len(fits))), unknown_share, coverage, CONFIG)
+    seen = {site: Seen(*one) for site, one in enumerate(ratios)}
+    found = belief_of(seen, dict(enumerate(places, len(ratios))), unknown_share, coverage, CONFIG)
     assert all(p >= 0.0 for p in found.sites.values())
     assert sum(found.sites.values()) + found.unknown == pytest.approx(1.0)
-    naive = {}
-    best = 0.9 * max((fit for fit, _ in fits), default=0.0)
-    for site, (fit, stages) in enumerate(fits):
-        naive[site] = best * fit / sum(one for one, _ in fits) * 0.8**stages * coverage.weight(site)
+    naive = {site: ratio * 0.8**stages * coverage.weight(site) for site, (ratio, stages) in enumerate(ratios)}
     for one, other in zip(list(naive)[1:], naive, strict=False):
         if found.sites[other] > 1e-9:
             assert found.sites[one] / found.sites[other] == pytest.approx(naive[one] / naive[other], rel=1e-6)
@@ -165,9 +175,11 @@ def test_it_stops_only_where_the_target_is_verified():
 
 def test_its_belief_is_told_and_sites_of_furniture_are_inspected():
     model = scripted(verify=lambda question: "no")
-    _, rounds = rounds_of(Evolving(decision=model), stage_case(1, "Mug|1"))
+    agent = Evolving(decision=model)
+    _, rounds = rounds_of(agent, stage_case(1, "Mug|1"))
     details = [diagnostics.details for _, _, diagnostics, _ in rounds]
     assert all(0.0 <= one["p_unknown"] <= 1.0 for one in details)
+    assert all(0.0 < one.p_present <= 1.0 for one in agent.entries())
     assert rounds[-1][2].counters["sites_inspected"] > 0
 
 

@@ -7,19 +7,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
+from evonav.agents.grid import CoarseFrame
 from evonav.agents.proactive.agent import Proactive
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.places import visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief, _Entry
-from evonav.agents.proactive.rooms import NO_ROOM, eroded, grown, numbered, rooms_of
+from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
 from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
-from evonav.agents.proactive.searched import CoarseFrame, SearchedCells
+from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.variants import ProactiveBlind
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
@@ -57,52 +56,6 @@ def test_furniture_does_not_divide_a_room_but_a_shelf_on_the_wall_is_none():
     assert divided[30, 10] != divided[30, 90]
     assert whole[30, 10] == whole[30, 90]
     assert (on_wall == divided).all()
-
-
-def groups_naive(cells, min_cells):
-    """Flood fill, cell by cell."""
-    rooms, number = np.full(cells.shape, NO_ROOM, np.int32), 0
-    seen = np.zeros(cells.shape, bool)
-    for start in map(tuple, np.argwhere(cells)):
-        if seen[start]:
-            continue
-        group, seen[start] = [start], True
-        for row, col in group:
-            for after in ((row - 1, col), (row + 1, col), (row, col - 1), (row, col + 1)):
-                is_inside = 0 <= after[0] < cells.shape[0] and 0 <= after[1] < cells.shape[1]
-                if is_inside and cells[after] and not seen[after]:
-                    seen[after] = True
-                    group.append(after)
-        if len(group) >= min_cells:
-            for cell in group:
-                rooms[cell] = number
-            number += 1
-    return rooms
-
-
-@given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([0.2, 0.55, 0.9]), min_cells=st.integers(1, 6))
-def test_groups_are_those_of_a_flood_fill(seed, share, min_cells):
-    cells = np.random.default_rng(seed).random((13, 17)) < share
-    assert (numbered(cells, min_cells) == groups_naive(cells, min_cells)).all()
-
-
-@given(seed=st.integers(0, 2**32 - 1), depth=st.integers(0, 3), steps=st.integers(0, 5))
-def test_erosion_and_growth_are_those_of_their_definitions(seed, depth, steps):
-    draws = np.random.default_rng(seed)
-    floor = draws.random((12, 15)) < 0.85
-    padded = np.pad(floor, depth)
-    naive = [[padded[r : r + 2 * depth + 1, c : c + 2 * depth + 1].all() for c in range(15)] for r in range(12)]
-    assert (eroded(floor, depth) == np.array(naive)).all()
-    seeds = np.where((draws.random((12, 15)) < 0.05) & floor, 1, NO_ROOM).astype(np.int32)
-    reached = {tuple(cell) for cell in np.argwhere(seeds == 1)}
-    for _ in range(steps):
-        reached |= {
-            (r + dr, c + dc)
-            for r, c in reached
-            for dr, dc in ((0, 1), (1, 0), (0, -1), (-1, 0))
-            if 0 <= r + dr < 12 and 0 <= c + dc < 15 and floor[r + dr, c + dc]
-        }
-    assert {tuple(cell) for cell in np.argwhere(grown(seeds, floor, steps) == 1)} == reached
 
 
 def belief(rooms, evidence, **config):

@@ -13,7 +13,7 @@ from PIL import Image
 from recorded_data import data_path, needs_data
 
 from evonav.errors import InvalidArgumentError
-from evonav.world.camera import project, unproject
+from evonav.world.camera import project, unproject, unproject_pixels
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SimulatorConfig
 
@@ -85,6 +85,14 @@ def test_projection_inverts_unprojection() -> None:
     seen = project(points_m.reshape(-1, 3), pose, intrinsics).reshape(20, 30, 3)
     rows, cols = np.indices((20, 30)) + 0.5
     np.testing.assert_allclose(seen, np.stack([cols, rows, depth_m], axis=-1), atol=1e-9)
+
+
+def test_single_pixels_are_unprojected_as_the_whole_image() -> None:
+    pose, intrinsics = Pose(1.0, 1.575, -2.0, 0.7, 0.4), Intrinsics(30, 20, 1.2)
+    depth_m = np.linspace(0.5, 9.0, 600, dtype=np.float32).reshape(20, 30)
+    rows, cols = np.array([0, 19, 7, 7]), np.array([29, 0, 14, 3])
+    few_m = unproject_pixels(rows, cols, depth_m, pose, intrinsics)
+    np.testing.assert_allclose(few_m, unproject(depth_m, pose, intrinsics)[rows, cols], rtol=1e-5)
 
 
 def test_points_behind_the_camera_are_nan() -> None:

@@ -79,6 +79,38 @@ def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) 
     return _core.unproject_image(depth_m, pose, intrinsics)
 
 
+def unproject_pixels(
+    rows: NDArray[np.int64], cols: NDArray[np.int64], depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics
+) -> NDArray[np.float64]:
+    """Return the world points behind some pixels of a depth image; to a rounding error those of `unproject`.
+
+    Args:
+        rows: `(N,)` of the pixels, all of which have a finite depth.
+        cols: `(N,)` of the pixels.
+        depth_m: `(H, W)` planar depth.
+        pose: Pose of the camera itself, as `Frame.pose`.
+        intrinsics: Intrinsics of the image.
+
+    Returns:
+        `(N, 3)` metres.
+    """
+    height_px, width_px = depth_m.shape
+    depth_m = depth_m[rows, cols]
+    focal_px = 0.5 * height_px / math.tan(0.5 * intrinsics.vertical_fov_rad)
+    right_m = (cols + 0.5 - 0.5 * width_px) / focal_px * depth_m
+    up_m = (0.5 * height_px - rows - 0.5) / focal_px * depth_m
+    yaw, horizon = pose.yaw_rad, pose.horizon_rad
+    ahead_m = depth_m * math.cos(horizon) + up_m * math.sin(horizon)
+    return np.stack(
+        [
+            pose.x_m + right_m * math.cos(yaw) + ahead_m * math.sin(yaw),
+            pose.y_m + up_m * math.cos(horizon) - depth_m * math.sin(horizon),
+            pose.z_m - right_m * math.sin(yaw) + ahead_m * math.cos(yaw),
+        ],
+        axis=1,
+    )
+
+
 def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
     """Return the image positions of world points.
 

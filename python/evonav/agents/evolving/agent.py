@@ -2,21 +2,20 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import AgentAction
-from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, Seen, belief_of, best_of
+from evonav.agents.agent import AgentAction, EntryBelief
+from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.furniture import is_furniture
+from evonav.agents.grid import NO_GROUP, CoarseFrame, owners_of
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.proactive.priors import room_ratios
-from evonav.agents.proactive.rooms import NO_ROOM, grown
-from evonav.agents.proactive.searched import CoarseFrame
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import matcher_of
@@ -144,11 +143,11 @@ class Evolving(FailThenUpdate):
     def _seen(self, remembered: list[ObjectCandidate], entries: Mapping[int, ObjectEntry]) -> dict[int, Seen]:
         """Return the sites where an object of the goal's name was seen."""
         named = [one for one in remembered if self._matcher.names_goal(self._parsed, one)]
-        fits = self._matcher.scores(self._parsed, named, remembered, self._unseen_m2())
-        stage = self._goal.stage
+        appearances = self._matcher.appearance_ratios(self._parsed, named)
+        contexts = self._matcher.context_ratios(self._parsed, named, remembered)
         return {
-            one.entry_id: Seen(max(fit, 0.05), stage - entries[one.entry_id].last_seen_stage)
-            for one, fit in zip(named, fits, strict=True)
+            one.entry_id: Seen(appearance * context, self._goal.stage - entries[one.entry_id].last_seen_stage)
+            for one, appearance, context in zip(named, appearances, contexts, strict=True)
         }
 
     def _likely_places(self, remembered: list[ObjectCandidate]) -> dict[int, float]:
@@ -183,6 +182,18 @@ class Evolving(FailThenUpdate):
         self._accepts_any = True
         return self._approach(self._target(entries[best]), "nothing else is left")
 
+    def entries(self) -> Sequence[EntryBelief]:
+        """Return the object memory, with the probability that each object is still where it was last seen."""
+        return [replace(one, p_present=self._p_present(one.entry_id)) for one in super().entries()]
+
+    def _p_present(self, entry_id: int) -> float | None:
+        """Return that probability: only looks at objects of the goal's name count in a stage."""
+        entry = self._navigator.objects.entry(entry_id)
+        if entry is None:
+            return None
+        weight = self._coverage.weight(entry_id) if self._is_named(entry_id) else 1.0
+        return p_present(self._goal.stage - entry.last_seen_stage, weight, self._own.belief)
+
     def _round_counters(self) -> Mapping[str, int]:
         return {"sites_inspected": 0, **super()._round_counters()}
 
@@ -211,13 +222,10 @@ def hidden_behind(
         first without crossing a blocked cell.
     """
     blocks = coarse.taken(cells, BLOCKED)
-    is_unknown = (blocks == UNKNOWN).any(axis=2) & (blocks != BLOCKED).all(axis=2)
-    owners = np.full(is_unknown.shape, NO_ROOM, np.int32)
-    for index, frontier in enumerate(frontiers):
-        owners[frontier.cells[:, 0] // coarse.step, frontier.cells[:, 1] // coarse.step] = index
-    owners = grown(owners, is_unknown, round(REACH_M / coarse.frame.cell_m))
-    counts = np.bincount(owners[owners != NO_ROOM], minlength=len(frontiers)).astype(np.float64)
+    is_unknown = (blocks == UNKNOWN).any(axis=0) & (blocks != BLOCKED).all(axis=0)
+    owners = owners_of(frontiers, is_unknown, coarse, REACH_M)
+    counts = np.bincount(owners[owners != NO_GROUP], minlength=len(frontiers)).astype(np.float64)
     if len(frontiers) == 0:
         return [], 0.0
-    num_free = int(((blocks == FREE).any(axis=2) & (owners == NO_ROOM)).sum())
+    num_free = int(((blocks == FREE).any(axis=0) & (owners == NO_GROUP)).sum())
     return (counts / counts.sum()).tolist(), float(counts.sum() / (counts.sum() + num_free))

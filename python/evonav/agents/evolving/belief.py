@@ -13,8 +13,6 @@ class BeliefConfig:
 
     persistence: float = 0.8
     """Probability that an object is still where it was last seen, a stage later (rho); ours."""
-    known: float = 0.9
-    """Probability that an entry that fits the whole description is the target; ours."""
     recall: float = 0.9
     """Probability that a look at all of a site finds the target if it is there (as the rule `bayes`); ours."""
     min_new_coverage: float = 0.05
@@ -29,8 +27,8 @@ class BeliefConfig:
 class Seen:
     """A place where an object of the goal's name was seen."""
 
-    fit: float
-    """Share of the description that fits what is around it."""
+    ratio: float
+    """Likelihood of its description if it is the target, relative to that if the target was never seen."""
     num_stages: int
     """Number of stages since it was last seen; 0 if it was seen in this one."""
 
@@ -111,12 +109,8 @@ def belief_of(
         coverage: The evidence of this stage.
         config: The constants.
     """
-    best = config.known * max((one.fit for one in seen.values()), default=0.0)
-    sum_fit = sum(one.fit for one in seen.values())
-    prior: dict[int, float] = {}
-    for site, one in seen.items():
-        is_it = best * one.fit / sum_fit if sum_fit > 0.0 else 0.0
-        prior[site] = is_it * config.persistence**one.num_stages
+    total_ratio = 1.0 + sum(one.ratio for one in seen.values())  # 1: the target was never seen
+    prior = {site: one.ratio / total_ratio * config.persistence**one.num_stages for site, one in seen.items()}
     rest = 1.0 - sum(prior.values())
     sum_places = sum(places.values())
     share = 1.0 - unknown_share if sum_places > 0.0 else 0.0
@@ -128,6 +122,18 @@ def belief_of(
     if total <= 0.0:
         return Belief(posterior, 1.0 if not posterior else 0.0)
     return Belief({site: p / total for site, p in posterior.items()}, unknown / total)
+
+
+def p_present(num_stages: int, weight: float, config: BeliefConfig) -> float:
+    """Return the probability that an object is still where it was seen.
+
+    Args:
+        num_stages: Number of stages since it was last seen.
+        weight: The likelihood of this stage's looks if it is there, relative to that if it is not.
+        config: The constants.
+    """
+    prior = config.persistence**num_stages
+    return prior * weight / (prior * weight + (1.0 - prior))
 
 
 def best_of(chances: Sequence[tuple[int, float, float]], inspect_m: float) -> int | None:

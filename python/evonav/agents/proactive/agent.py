@@ -106,14 +106,14 @@ class Proactive(NavigatorAgent):
         self._belief.presence.update()
         posterior = self._belief.posterior(around)
         stopped = self._stop_in_reach(posterior, around, observation, arrived_at)
-        if stopped is None and last is not None and last.kind == "sighting" and is_done and last.is_reached:
+        is_at_sighting = last is not None and last.kind == "sighting" and is_done and last.is_reached
+        if stopped is None and last is not None and is_at_sighting:
             stopped = self._stop_at_sighting(posterior, last, observation)
-            posterior = self._belief.posterior(around)
         if stopped is not None:
             return stopped
         if arrived_at is not None:
             self._leave(arrived_at, observation)
-        if self._queries.log or arrived_at is not None:  # an identity was denied, or a way was in vain
+        if self._queries.log or is_at_sighting or arrived_at is not None:  # something was denied, or a way was in vain
             posterior = self._belief.posterior(around)
         chosen = self._chosen(posterior, around, observation)
         if self._may_have_missed(chosen, observation):

@@ -5,20 +5,23 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.grid import box_slices, owners_of
 from evonav.agents.navigator import Navigator
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings, posterior_of
 from evonav.agents.proactive.presence import PresenceBelief
-from evonav.agents.proactive.rooms import NO_ROOM, box_slices, rooms_of
-from evonav.agents.proactive.search import owners_of, unknown_cells, walls_of
+from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
+from evonav.agents.proactive.search import unknown_cells, walls_of
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.sightings import Sightings
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.text.language import ParsedGoal, similarity
 from evonav.decision.text.matcher import Matcher
-from evonav.memory.occupancy import FREE, UNKNOWN
+from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
 from evonav.sensors.observation import MapFrame
 
+FRONTIER_REACH_M = 4.0
+"""Distance over unknown cells up to which they count as behind a frontier."""
 FURNITURE_M = 0.3
 """Distance from an object's box within which its room is looked up."""
 
@@ -71,17 +74,18 @@ class TargetBelief:
         ]
         cells, frontiers = navigator.explorer.map.cells, navigator.explorer.frontiers
         rooms = rooms_of(cells, frame, remembered)
-        unknown = unknown_cells(coarse, cells, remembered)
+        blocks = coarse.taken(cells, UNKNOWN)
+        unknown = unknown_cells(coarse, blocks, remembered)
         return Surroundings(
             cells=cells,
             rooms=rooms,
             remembered=remembered,
             room_of={one.entry_id: _room_by(rooms, frame, one) for one in remembered},
             unknown=unknown,
-            free=(coarse.taken(cells, UNKNOWN) == FREE).all(axis=2),
+            free=(blocks == FREE).all(axis=0),
             walls=walls_of(cells, frame, remembered),
             frontiers=frontiers,
-            owners=owners_of(coarse, cells, unknown, frontiers),
+            owners=owners_of(frontiers, unknown & (blocks != BLOCKED).all(axis=0), coarse, FRONTIER_REACH_M),
         )
 
     def posterior(self, around: Surroundings) -> Posterior:

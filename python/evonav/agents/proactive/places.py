@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
+from evonav.agents.grid import CoarseFrame, box_slices
 from evonav.agents.proactive.config import ProactiveConfig
-from evonav.agents.proactive.rooms import box_slices
-from evonav.agents.proactive.searched import CoarseFrame
 from evonav.agents.proactive.sightings import Sighting
 from evonav.decision.appearance.statistics import PER_100_M2, UNKNOWN_PER_100_M2
 from evonav.decision.candidates import ObjectCandidate

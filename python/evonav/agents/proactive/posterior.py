@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import PlaceBelief
+from evonav.agents.grid import NO_GROUP, CoarseFrame, box_distance_m
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.places import prior_of, visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief
 from evonav.agents.proactive.priors import room_ratios
-from evonav.agents.proactive.rooms import NO_ROOM, box_distance_m
-from evonav.agents.proactive.searched import CoarseFrame, SearchedCells
+from evonav.agents.proactive.rooms import NO_ROOM
+from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.sightings import Sighting
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
@@ -112,7 +113,7 @@ class Surroundings:
     """`(R, C)` cells of its map that are blocked, and by nothing remembered."""
     frontiers: Sequence[Frontier]
     owners: NDArray[np.int32]
-    """`(R, C)` index of the frontier behind which each coarse cell lies; `NO_ROOM` elsewhere."""
+    """`(R, C)` index of the frontier behind which each coarse cell lies; `NO_GROUP` elsewhere."""
 
 
 def posterior_of(
@@ -145,7 +146,7 @@ def posterior_of(
     range_m = visible_range_m(goal.noun)
     coarse = searched.coarse
     unknown = around.unknown
-    rooms = np.asarray(coarse.taken(around.rooms, NO_ROOM).max(axis=2), np.int32)
+    rooms = np.asarray(coarse.taken(around.rooms, NO_ROOM).max(axis=0), np.int32)
     prior, leads = prior_of(goal, around.remembered, sightings, coarse, unknown, config)
 
     entries: dict[int, float] = {}
@@ -168,7 +169,7 @@ def posterior_of(
     unseen = np.zeros_like(prior)
     if around.frontiers or not unknown.all():
         unseen = prior * room_factors * searched.ever_missed(range_m)
-        unseen[unknown & (around.owners == NO_ROOM)] *= config.far_beyond
+        unseen[unknown & (around.owners == NO_GROUP)] *= config.far_beyond
         if not around.frontiers:
             unseen[unknown] = 0.0  # nothing leads there
     total = math.fsum(entries.values()) + float(moved.sum()) + float(unseen.sum())

@@ -8,19 +8,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.grid import NO_GROUP, CoarseFrame, box_slices
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.posterior import Posterior, Surroundings
-from evonav.agents.proactive.rooms import NO_ROOM, box_slices, grown
-from evonav.agents.proactive.searched import CoarseFrame
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.memory import Frontier
 from evonav.memory.occupancy import BLOCKED, UNKNOWN, OccupancyMap
 from evonav.sensors.observation import MapFrame
 
 FULL_KNOWN_SHARE = 0.5
 """Share of a coarse cell's map cells that must be unknown for it to count as unknown."""
-FRONTIER_REACH_M = 4.0
-"""Number of steps over unknown cells, times their edge, up to which they count as behind a frontier."""
 SAME_PLACE_M = 0.75
 """Two rounds' options of one kind are the same if their places are this near: frontiers change with what is seen."""
 NUM_SIGHT_SAMPLES = 8
@@ -49,40 +45,24 @@ class Option:
 
 
 def unknown_cells(
-    coarse: CoarseFrame, cells: NDArray[np.uint8], remembered: Sequence[ObjectCandidate]
+    coarse: CoarseFrame, blocks: NDArray[np.generic], remembered: Sequence[ObjectCandidate]
 ) -> NDArray[np.bool_]:
-    """Return the `(R, C)` coarse cells that are unknown in most of their area and under nothing remembered."""
-    unknown: NDArray[np.bool_] = (coarse.taken(cells, UNKNOWN) == UNKNOWN).mean(axis=2) > FULL_KNOWN_SHARE
+    """Return the `(R, C)` coarse cells that are unknown in most of their area and under nothing remembered.
+
+    Args:
+        coarse: The grid.
+        blocks: The map's cells, as `CoarseFrame.taken` returns them.
+        remembered: Everything remembered.
+    """
+    unknown: NDArray[np.bool_] = (blocks == UNKNOWN).mean(axis=0) > FULL_KNOWN_SHARE
     for one in remembered:
         unknown[box_slices(one, coarse.frame, 0.0)] = False
     return unknown
 
 
-def owners_of(
-    coarse: CoarseFrame, cells: NDArray[np.uint8], unknown: NDArray[np.bool_], frontiers: Sequence[Frontier]
-) -> NDArray[np.int32]:
-    """Return the frontier behind which each coarse cell lies.
-
-    Args:
-        coarse: The grid.
-        cells: `(R, C)` of the agent's map.
-        unknown: `(R, C)` coarse cells that are unknown.
-        frontiers: The frontiers.
-
-    Returns:
-        `(R, C)` index of the frontier to whose region a cell belongs, or from which it is reached first over unknown
-        cells without crossing a blocked one; `NO_ROOM` elsewhere.
-    """
-    owners = np.full((coarse.frame.rows, coarse.frame.cols), NO_ROOM, np.int32)
-    for index, frontier in enumerate(frontiers):
-        owners[frontier.cells[:, 0] // coarse.step, frontier.cells[:, 1] // coarse.step] = index
-    is_open = unknown & (coarse.taken(cells, UNKNOWN) != BLOCKED).all(axis=2)
-    return grown(owners, is_open, round(FRONTIER_REACH_M / coarse.frame.cell_m))
-
-
 def frontier_gains(posterior: Posterior, around: Surroundings) -> dict[int, float]:
     """Return the weight of what was never seen behind each frontier, by id."""
-    is_owned = around.owners != NO_ROOM
+    is_owned = around.owners != NO_GROUP
     counts = np.bincount(around.owners[is_owned], posterior.unseen[is_owned], minlength=len(around.frontiers))
     return {frontier.id: gain for frontier, gain in zip(around.frontiers, counts.tolist(), strict=True)}
 
@@ -144,16 +124,11 @@ def shown_from(
     frame = coarse.frame
     reach = math.ceil(radius_m / frame.cell_m)
     at_row, at_col = ((place_m[axis] - frame.corner_m[axis]) / frame.cell_m - 0.5 for axis in (1, 0))
-    rows, cols = (
-        grid.ravel()
-        for grid in np.meshgrid(
-            np.arange(max(0, round(at_row) - reach), min(frame.rows, round(at_row) + reach + 1)),
-            np.arange(max(0, round(at_col) - reach), min(frame.cols, round(at_col) + reach + 1)),
-            indexing="ij",
-        )
-    )
-    near = (rows - at_row) ** 2 + (cols - at_col) ** 2 <= (radius_m / frame.cell_m) ** 2
-    rows, cols = rows[near], cols[near]
+    low_row, low_col = max(0, round(at_row) - reach), max(0, round(at_col) - reach)
+    dy = np.arange(low_row, min(frame.rows, round(at_row) + reach + 1)) - at_row
+    dx = np.arange(low_col, min(frame.cols, round(at_col) + reach + 1)) - at_col
+    rows, cols = np.nonzero(dy[:, None] ** 2 + dx**2 <= (radius_m / frame.cell_m) ** 2)
+    rows, cols = rows + low_row, cols + low_col
     along = np.linspace(0.15, 0.85, NUM_SIGHT_SAMPLES)[:, None]
     fine_rows = ((at_row + along * (rows - at_row) + 0.5) * coarse.step).astype(np.int64)
     fine_cols = ((at_col + along * (cols - at_col) + 0.5) * coarse.step).astype(np.int64)

@@ -1,51 +1,20 @@
 """Cells of the floor, and what the views of a stage, and of all stages, would have shown if it were there."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.grid import CoarseFrame
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.presence import NUM_SECTORS
 from evonav.sensors.observation import MapFrame, View
 from evonav.world.camera import thinned, unproject
 
-CELL_M = 0.25
-"""Wanted edge of a cell, which is a whole number of the map's cells."""
 RANGES_M = (0.9, 1.3, 1.8, 2.5, 3.5)
 """Distances on the ground plane up to which things of different sizes are detected."""
 STRIDES = (5, 3)
 """Every fifth pixel of every fifth row is looked at, if the size of the image allows it; else every third, or all."""
-
-
-@dataclass(frozen=True, slots=True)
-class CoarseFrame:
-    """A grid of coarser cells over a map."""
-
-    frame: MapFrame
-    step: int
-    """Number of the map's cells along the edge of a coarse one."""
-
-    @classmethod
-    def over(cls, frame: MapFrame) -> "CoarseFrame":
-        """Return the grid over a map."""
-        step = max(1, round(CELL_M / frame.cell_m))
-        return cls(
-            MapFrame(math.ceil(frame.rows / step), math.ceil(frame.cols / step), frame.cell_m * step, frame.corner_m),
-            step,
-        )
-
-    def taken(self, cells: NDArray[np.generic], rest: int) -> NDArray[np.generic]:
-        """Return `(R, C, step * step)` blocks of a map's cells; `rest` stands beyond its edges."""
-        rows, cols, step = self.frame.rows, self.frame.cols, self.step
-        missing = (rows * step - cells.shape[0], cols * step - cells.shape[1])
-        padded = np.pad(cells, ((0, missing[0]), (0, missing[1])), constant_values=rest)
-        return padded.reshape(rows, step, cols, step).transpose(0, 2, 1, 3).reshape(rows, cols, step * step)
-
-    def value_at(self, values: NDArray[np.float64], place_m: tuple[float, float]) -> float:
-        """Return the value of the `(R, C)` cells at a place, or at the nearest cell."""
-        return float(values[self.frame.cell_at(place_m)])
 
 
 class SearchedCells:
@@ -116,9 +85,9 @@ def _class_of(range_m: float) -> int:
 def seen_cells(view: View, frame: MapFrame, range_m: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows and columns of the cells with a surface that a view shows within a distance on the ground plane."""
     depth_m, intrinsics, _ = thinned(view.depth_m, view.intrinsics, *STRIDES)
-    points_m = unproject(depth_m, view.pose, intrinsics)[np.isfinite(depth_m)]
+    points_m = unproject(depth_m, view.pose, intrinsics).reshape(-1, 3)
     dx_m, dz_m = points_m[:, 0] - view.pose.x_m, points_m[:, 2] - view.pose.z_m
-    points_m = points_m[dx_m**2 + dz_m**2 <= range_m**2]
+    points_m = points_m[dx_m**2 + dz_m**2 <= range_m**2]  # none without a depth: these are not finite
     cols = np.floor((points_m[:, 0] - frame.corner_m[0]) / frame.cell_m).astype(np.int64)
     rows = np.floor((points_m[:, 2] - frame.corner_m[1]) / frame.cell_m).astype(np.int64)
     is_inside = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)

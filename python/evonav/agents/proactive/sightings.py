@@ -4,14 +4,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evonav.agents.proactive.rooms import box_distance_m
+from evonav.agents.grid import box_distance_m
 from evonav.decision.candidates import ObjectCandidate, Point2, Point3
 from evonav.decision.text.language import canonical, is_structure
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.sensors.observation import View
-from evonav.world.camera import project
+from evonav.world.camera import project, unproject_pixels
 
 MIN_PX, STRIDE = 4, 2
 """Smallest number of pixels with a depth, of every second pixel of every second row."""
@@ -80,7 +79,7 @@ class Sightings:
         is_known = np.isfinite(view.depth_m[rows, cols])
         rows, cols = rows[is_known], cols[is_known]
         owners = masks[rows, cols]
-        points_m = world_points(rows, cols, view.depth_m[rows, cols], view)
+        points_m = unproject_pixels(rows, cols, view.depth_m, view.pose, view.intrinsics)
         for index in missing:
             mine = points_m[owners == index]
             if len(mine) >= MIN_PX:
@@ -125,23 +124,3 @@ def _is_covered(one: Sighting, boxes: list[ObjectCandidate]) -> bool:
     """Return whether something is an entry by now."""
     reach_m = max(SAME_M, SAME_SHARE * one.range_m)
     return any(box.label == canonical(one.label) and box_distance_m(box, one.ground_m) <= reach_m for box in boxes)
-
-
-def world_points(
-    rows: NDArray[np.int64], cols: NDArray[np.int64], depth_m: NDArray[np.float32], view: View
-) -> NDArray[np.float64]:
-    """Return the `(N, 3)` world points behind some pixels of a view."""
-    height_px, width_px = view.depth_m.shape
-    focal_px = 0.5 * height_px / math.tan(0.5 * view.intrinsics.vertical_fov_rad)
-    right_m = (cols + 0.5 - 0.5 * width_px) / focal_px * depth_m
-    up_m = (0.5 * height_px - rows - 0.5) / focal_px * depth_m
-    yaw, horizon = view.pose.yaw_rad, view.pose.horizon_rad
-    ahead_m = depth_m * math.cos(horizon) + up_m * math.sin(horizon)
-    return np.stack(
-        [
-            view.pose.x_m + right_m * math.cos(yaw) + ahead_m * math.sin(yaw),
-            view.pose.y_m + up_m * math.cos(horizon) - depth_m * math.sin(horizon),
-            view.pose.z_m - right_m * math.sin(yaw) + ahead_m * math.cos(yaw),
-        ],
-        axis=1,
-    )

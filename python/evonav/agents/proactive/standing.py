@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from evonav.agents.grid import CoarseFrame
 from evonav.agents.proactive.posterior import Posterior, Surroundings
 from evonav.agents.proactive.search import Option, shown_from, window_sums
-from evonav.agents.proactive.searched import CoarseFrame
 from evonav.decision.candidates import Point2
 from evonav.memory.occupancy import OccupancyMap
 

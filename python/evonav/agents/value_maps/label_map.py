@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.proactive.rooms import numbered
+from evonav.agents.grid import numbered
 from evonav.agents.relatedness import Feature, Relatedness
 from evonav.sensors.observation import MapFrame, View
 from evonav.world.camera import thinned, unproject
