@@ -83,46 +83,16 @@ class HouseTexts:
             HouseError: The file does not exist.
             InvalidArgumentError: The path names a known dataset, but no split of it.
         """
-        self.split: tuple[str, str] | None = None
-        """Data set and split of the houses; `None` if their path names none."""
+        source = _source_of(path)
         self.completion = completion
-        self._path = Path(path)
-        self.endless: EndlessHouses | None = None
+        self.name = source.name
+        self.split = source.split
+        """Data set and split of the houses; `None` if their path names none."""
+        self.endless = source.endless
         """Houses that are made as they are read."""
-        self._sha256: str | None = None
-        """Checksum of the houses' text, whatever the file is packed by; `None` if that of the file is taken."""
-        self._number: int | None = None
-        """Number of the one house that is read; `None` for all."""
-        if str(path).partition(":")[0] == BUNDLED and not self._path.exists():
-            self._number = _bundled_number(str(path))
-            self._path = Path(str(resources.files("evonav") / "data" / "houses.jsonl.gz"))
-            self.name = BUNDLED
-        elif not self._path.exists() and (numbered := _NUMBERED.fullmatch(str(path))) and Path(numbered[1]).is_file():
-            self._path, self._number = Path(numbered[1]), int(numbered[2])
-            self.name = numbered[1]
-        elif str(path).startswith("procthor-10k") and not self._path.exists():
-            from evonav.house.procthor10k import NAME, house_set, split_path
-
-            published = house_set(path)
-            self.split = (NAME, published.split)
-            self._path = split_path(published)
-            self.name = str(path)
-        elif str(path).startswith("evonav-10k") and not self._path.exists():
-            from evonav.house.evonav10k import NAME, SPLITS, made_split, named_split
-
-            numbered = _NUMBERED.fullmatch(str(path))
-            self.name, self._number = (numbered[1], int(numbered[2])) if numbered else (str(path), None)
-            split = named_split(self.name)
-            self.split = (NAME, split)
-            self._sha256 = SPLITS[split].sha256
-            self._path = made_split(split)
-        elif str(path).partition(":")[0] == ENDLESS and not self._path.exists():
-            self.endless = EndlessHouses(str(path))
-            self.name = str(path)
-        else:
-            self.name = str(self._path)
-        self.files = [] if self.endless is not None else files_of(self._path)
+        self.files = [] if source.file is None else files_of(source.file)
         """The files to read, in order."""
+        self._file, self._number, self._sha256 = source.file, source.number, source.sha256
         self._num_bytes = sum(file.stat().st_size for file in self.files)
         self._num_bytes_before = 0
         self._raw: IO[bytes] | None = None
@@ -182,7 +152,7 @@ class HouseTexts:
             yield from (HouseText(*house) for house in self.endless)
         self._num_bytes_before = 0
         for file in self.files:
-            name = self.name if file == self._path else str(file)
+            name = self.name if file == self._file else str(file)
             try:
                 with file.open("rb") as self._raw, _text_of(file, self._raw) as text:
                     yield from _lines(name, text) if ".jsonl" in file.suffixes else _document(name, text.read())
@@ -192,12 +162,66 @@ class HouseTexts:
             self._raw = None
 
 
-def _bundled_number(path: str) -> int | None:
-    """Return the number N of `bundled:N`; `None` for `bundled`."""
-    _, colon, number = path.partition(":")
+class _Source(NamedTuple):
+    """The meaning of a path of houses."""
+
+    name: str
+    file: Path | None
+    """File or folder to read; `None` for houses that are made as they are read."""
+    number: int | None = None
+    """Number of the one house that is read; `None` for all."""
+    split: tuple[str, str] | None = None
+    sha256: str | None = None
+    """Checksum of the houses' text, whatever the file is packed by; `None` if that of the file is taken."""
+    endless: EndlessHouses | None = None
+
+
+def _source_of(path: str | Path) -> _Source:
+    """Return what a path stands for: what exists is read, then the named sets are tried."""
+    text, file = str(path), Path(path)
+    if not file.exists():
+        if (numbered := _NUMBERED.fullmatch(text)) and Path(numbered[1]).is_file():
+            return _Source(numbered[1], Path(numbered[1]), int(numbered[2]))
+        for pattern, source in _NAMED_SETS:
+            if pattern.match(text):
+                return source(text)
+    return _Source(str(file), file)
+
+
+def _bundled(text: str) -> _Source:
+    _, colon, number = text.partition(":")
     if colon and (not number.isdigit() or int(number) < 1):
-        raise HouseError(f"{path}: expected `bundled` or `bundled:N`, where N is a number from 1")
-    return int(number) if colon else None
+        raise HouseError(f"{text}: expected `bundled` or `bundled:N`, where N is a number from 1")
+    file = Path(str(resources.files("evonav") / "data" / "houses.jsonl.gz"))
+    return _Source(BUNDLED, file, int(number) if colon else None)
+
+
+def _endless(text: str) -> _Source:
+    return _Source(text, None, endless=EndlessHouses(text))
+
+
+def _procthor10k(text: str) -> _Source:
+    from evonav.house.procthor10k import NAME, house_set, split_path
+
+    published = house_set(text)
+    return _Source(text, split_path(published), split=(NAME, published.split))
+
+
+def _evonav10k(text: str) -> _Source:
+    from evonav.house.evonav10k import NAME, SPLITS, made_split, named_split
+
+    numbered = _NUMBERED.fullmatch(text)
+    name, number = (numbered[1], int(numbered[2])) if numbered else (text, None)
+    split = named_split(name)
+    return _Source(name, made_split(split), number, (NAME, split), SPLITS[split].sha256)
+
+
+_NAMED_SETS = (
+    (re.compile(rf"{BUNDLED}(:|$)"), _bundled),
+    (re.compile(rf"{ENDLESS}(:|$)"), _endless),
+    (re.compile("procthor-10k"), _procthor10k),
+    (re.compile("evonav-10k"), _evonav10k),
+)
 
 
 def files_of(path: Path) -> list[Path]:
