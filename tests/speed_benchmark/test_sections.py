@@ -3,12 +3,14 @@
 import json
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.speed_benchmark import agents, mapping, navigation, rendering
 from evonav.speed_benchmark.timing import Sampling
+from evonav.world.camera import unproject
 
 COMMANDS = {
     "render": ["--limit", "1", "--peer", "none"],
@@ -99,6 +101,23 @@ def test_octomap_s_volume_is_a_peer_of_the_occupancy():
     assert octree._tree.getNumLeafNodes() > 100
     (row,) = mapping.measure(Sampling(limit=1, peers=["octomap"]))
     assert row.peer == octree.TITLE
+    assert row.ratio > 0
+
+
+@pytest.mark.skipif(find_spec("open3d") is None, reason="needs the extra `bench`")
+def test_open3d_s_volume_has_surfaces_where_the_depth_images_have_them():
+    views = mapping._views(1)[:3]
+    volume = mapping.Tsdf(views)
+    for number in range(3):
+        volume.prepare(number)
+        volume(number)
+    surface_m = volume._grid.extract_point_cloud(weight_threshold=0.5).point.positions.numpy()
+    for view in views:
+        points_m = unproject(view.depth_m, view.pose, view.intrinsics)[view.depth_m < mapping.RANGE_M - 0.1][::50]
+        apart_m = np.linalg.norm(points_m[:, None] - surface_m[None], axis=2).min(axis=1)
+        assert np.mean(apart_m < 1.5 * view.grid.cell_m) > 0.95
+    (row,) = mapping.measure(Sampling(limit=1, peers=["open3d"]))
+    assert row.peer == volume.TITLE
     assert row.ratio > 0
 
 

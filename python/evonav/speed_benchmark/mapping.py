@@ -1,7 +1,8 @@
-"""Updates of a map, frame by frame on a walk: agents' occupancy beside volumes of OctoMap."""
+"""Updates of a map, frame by frame on a walk: agents' occupancy beside volumes of OctoMap and Open3D."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from evonav.sensors.observation import MapFrame
 from evonav.sensors.visibility import visible_occupancy
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import INSTALL, Sampling, compare
-from evonav.world.camera import unproject
+from evonav.world.camera import camera_axes, unproject
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
@@ -21,14 +22,14 @@ from evonav.world.simulator import Intrinsics, OccupancyGrid
 NAME, TITLE = "mapping", "Mapping"
 NOTES = """Bundled houses, 36 views in each: at three reachable places, a turn in steps of 30 degrees; 300x300, range
 3 m. Every map begins empty in each house. Maps differ in what they are: evonav's agents know cells on the ground,
-cast on the oracle occupancy as in the paper; OctoMap makes a volume of the depth image, with voxels as
-wide as evonav's cells. So the ratio says what one sort of map costs beside the other, not which code is faster. Points
-are prepared beforehand and not timed.
+cast on the oracle occupancy as in the paper; OctoMap's octree and Open3D's TSDF (a `VoxelBlockGrid` of blocks of 8
+voxels) are volumes made of the depth image, with voxels as wide as evonav's cells. So the ratio says what one sort of
+map costs beside the other, not which code is faster. Points, images and matrices are prepared beforehand and not timed.
 """
 NUM_HOUSES = 4
 PLACES_PER_HOUSE, VIEWS_PER_PLACE = 3, 12
 RANGE_M = 3.0
-PEERS = ("octomap",)
+PEERS = ("octomap", "open3d")
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def measure(sampling: Sampling) -> Iterator[Row]:
         seen = visible_occupancy(view.grid, view.pose, view.intrinsics, RANGE_M)
         return maps[view.house].integrate(seen, (view.pose.x_m, view.pose.z_m))
 
-    peers = {Octree.TITLE: Octree(views)} if chosen else {}
+    peers = {_VOLUMES[name].TITLE: _VOLUMES[name](views) for name in chosen}
 
     def prepare(number: int) -> None:
         view = views[number]
@@ -72,6 +73,20 @@ def measure(sampling: Sampling) -> Iterator[Row]:
 
     operation = f"occupancy of one view, cells of {views[0].grid.cell_m:g} m"
     yield from compare(operation, ours, peers, [view.house for view in views], sampling=sampling, prepare=prepare)
+
+
+class Volume(Protocol):
+    """A peer: a volume to which depth images are added."""
+
+    TITLE: str
+
+    def __init__(self, views: list[MapView]) -> None: ...
+
+    def prepare(self, number: int) -> None:
+        """Prepare what is not timed of a view, and begin anew in a new house."""
+
+    def __call__(self, number: int) -> object:
+        """Add the view."""
 
 
 class Octree:
@@ -100,6 +115,48 @@ class Octree:
     def __call__(self, _number: int) -> object:
         """Insert the points."""
         return self._tree.insertPointCloud(self._points_m, self._origin_m, RANGE_M)
+
+
+class Tsdf:
+    """Open3D's truncated signed distances and weights, in blocks near surfaces."""
+
+    TITLE = "Open3D, TSDF"
+
+    def __init__(self, views: list[MapView]) -> None:
+        """Begin without a volume.
+
+        Raises:
+            StoreError: Open3D is not installed.
+        """
+        self._library = optional_module("open3d", "the peer open3d needs its library", INSTALL)
+        self._views = views
+
+    def prepare(self, number: int) -> None:
+        """Convert the depth image and the camera, and begin a volume in a new house."""
+        view, tensor = self._views[number], self._library.core.Tensor
+        if view.is_first:
+            float32 = self._library.core.float32
+            self._grid = self._library.t.geometry.VoxelBlockGrid(
+                ("tsdf", "weight"), (float32, float32), ((1), (1)), view.grid.cell_m, block_resolution=8
+            )
+        right, up, forward = camera_axes(view.pose)
+        camera_from_world = np.eye(4)
+        camera_from_world[:3, :3] = right, -up, forward
+        camera_from_world[:3, 3] = -camera_from_world[:3, :3] @ np.array(view.pose.position_m)
+        # Open3D has pixel centres at whole numbers.
+        focal_px, (height_px, width_px) = view.intrinsics.focal_px, view.depth_m.shape
+        pinhole = [[focal_px, 0.0, (width_px - 1) / 2], [0.0, focal_px, (height_px - 1) / 2], [0.0, 0.0, 1.0]]
+        self._depth = self._library.t.geometry.Image(tensor(np.where(np.isfinite(view.depth_m), view.depth_m, 0.0)))
+        self._camera = tensor(np.array(pinhole)), tensor(camera_from_world)
+
+    def __call__(self, _number: int) -> object:
+        """Find the blocks near the surfaces, and integrate the image into them."""
+        scale_and_range = 1.0, RANGE_M
+        blocks = self._grid.compute_unique_block_coordinates(self._depth, *self._camera, *scale_and_range)
+        return self._grid.integrate(blocks, self._depth, *self._camera, *scale_and_range)
+
+
+_VOLUMES: dict[str, type[Volume]] = {"octomap": Octree, "open3d": Tsdf}
 
 
 def _views(num_houses: int) -> list[MapView]:

@@ -19,6 +19,7 @@ INSTALL = "'evonav[bench]'"
 MODULES = {"embreex": "embreex", "moderngl": "moderngl", "pyastar2d": "pyastar2d", "scikit-image": "skimage"}
 """Module of each peer that only some installations have, by the peer's name; other peers are always there."""
 MODULES["octomap"] = "octomap"
+MODULES["open3d"] = "open3d"
 MODULES["scipy"] = "scipy.sparse.csgraph"
 
 OnProgress = Callable[[int, int, str], None]

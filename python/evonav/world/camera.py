@@ -111,6 +111,19 @@ def unproject_pixels(
     )
 
 
+def camera_axes(pose: Pose) -> NDArray[np.float64]:
+    """Return the unit vectors of a camera's right, up and forward, as `(3, 3)` rows in the world frame."""
+    sin_yaw, cos_yaw = math.sin(pose.yaw_rad), math.cos(pose.yaw_rad)
+    sin_down, cos_down = math.sin(pose.horizon_rad), math.cos(pose.horizon_rad)
+    return np.array(
+        [
+            [cos_yaw, 0.0, -sin_yaw],
+            [sin_yaw * sin_down, cos_down, cos_yaw * sin_down],
+            [sin_yaw * cos_down, -sin_down, cos_yaw * cos_down],
+        ]
+    )
+
+
 def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
     """Return the image positions of world points.
 

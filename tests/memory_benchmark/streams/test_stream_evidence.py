@@ -11,7 +11,6 @@ import evonav
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.memory_benchmark.streams.evidence import (
     TOUCH_M,
-    camera_axes,
     changes_between,
     detected_ids,
     empty_px,
@@ -21,7 +20,7 @@ from evonav.memory_benchmark.streams.evidence import (
 )
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections
-from evonav.world.camera import project, unproject
+from evonav.world.camera import camera_axes, project, unproject
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
@@ -77,7 +76,7 @@ def test_pixels_through_a_box_lie_between_those_of_a_smaller_and_a_larger_one(
 def test_the_cameras_axes_are_those_of_the_projection():
     for yaw_rad, horizon_rad in ((0.3, 0.5), (2.0, -0.7), (4.0, 0.0)):
         pose = Pose(1.0, 1.5, -2.0, yaw_rad, horizon_rad)
-        axes = [np.array(axis) for axis in camera_axes(pose)]
+        axes = camera_axes(pose)
         point = np.array(pose.position_m) + 2.0 * axes[2] + 0.4 * axes[0] + 0.2 * axes[1]
         ((col, row, depth_m),) = project(point[None, :], pose, CAMERA).tolist()
         assert depth_m == pytest.approx(2.0)

@@ -118,7 +118,7 @@ def mapping(
 ) -> None:
     """Measure the time of a map's update.
 
-    Peers: octomap.
+    Peers: octomap, open3d.
     """
     from evonav.speed_benchmark import mapping as section
 

@@ -18,6 +18,7 @@ from evonav.memory import ObjectMapConfig
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.protocol import MemoryEntry, Place, Point3
 from evonav.sensors.observation import View
+from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
 
 INSTALL = "'evonav[bench]'"
@@ -212,7 +213,7 @@ class Open3DFaissMemory:
 def detect(view: View, config: ObjectMapConfig) -> list[Cloud | None]:
     """Turn the detections of a view into clouds; `None` where one has too few points or is too far away."""
     open3d, found = _open3d(), view.detections
-    axes, camera_m, focal_px = axes_of(view.pose), view.pose.position_m, view.intrinsics.focal_px
+    axes, camera_m, focal_px = camera_axes(view.pose), view.pose.position_m, view.intrinsics.focal_px
     height_px, width_px = view.depth_m.shape
     clouds: list[Cloud | None] = []
     for number, label in enumerate(found.labels):
@@ -224,8 +225,8 @@ def detect(view: View, config: ObjectMapConfig) -> list[Cloud | None]:
             continue
         depth_m = view.depth_m[rows, cols].astype(np.float64)
         right = (cols + 0.5 - width_px / 2) / focal_px * depth_m
-        down = (rows + 0.5 - height_px / 2) / focal_px * depth_m
-        points_m = np.stack([right, down, depth_m], axis=1) @ axes + camera_m
+        up = -(rows + 0.5 - height_px / 2) / focal_px * depth_m
+        points_m = np.stack([right, up, depth_m], axis=1) @ axes + camera_m
         points = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_m))
         points = largest_cluster(points.voxel_down_sample(config.voxel_m), config)
         centre_m = np.asarray(points.points).mean(axis=0)
@@ -254,17 +255,6 @@ def largest_cluster(points: Any, config: ObjectMapConfig) -> Any:  # noqa: ANN40
     if not (labels >= 0).any():
         return points
     return points.select_by_index(np.flatnonzero(labels == np.bincount(labels[labels >= 0]).argmax()))
-
-
-def axes_of(pose: Pose) -> NDArray[np.float64]:
-    """Return `(3, 3)` rows: right, down, forward."""
-    sin, cos, tilt, level = (
-        math.sin(pose.yaw_rad),
-        math.cos(pose.yaw_rad),
-        math.sin(pose.horizon_rad),
-        math.cos(pose.horizon_rad),
-    )
-    return np.array([[cos, 0, -sin], [-sin * tilt, -level, -cos * tilt], [sin * level, -tilt, cos * level]])
 
 
 def _box(points: Any) -> Any:  # noqa: ANN401 - of Open3D

@@ -15,7 +15,7 @@ from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M
 from evonav.memory_benchmark.truth import Change, ChangeKind
 from evonav.perception.ground_truth import DETECTED_KINDS
 from evonav.sensors.observation import Detections
-from evonav.world.camera import project
+from evonav.world.camera import camera_axes, project
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
 
@@ -148,19 +148,6 @@ def num_looks_through(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intr
             np.fmin(leave, np.maximum(a, b), out=leave)
     seen = depth_m[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
     return int(np.count_nonzero((enter < leave) & (seen >= leave - TOUCH_M)))
-
-
-def camera_axes(
-    pose: Pose,
-) -> tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]:
-    """Return the unit vectors of a camera's right, up and forward in the world frame."""
-    sin_yaw, cos_yaw = math.sin(pose.yaw_rad), math.cos(pose.yaw_rad)
-    sin_down, cos_down = math.sin(pose.horizon_rad), math.cos(pose.horizon_rad)
-    return (
-        (cos_yaw, 0.0, -sin_yaw),
-        (sin_yaw * sin_down, cos_down, cos_yaw * sin_down),
-        (sin_yaw * cos_down, -sin_down, cos_yaw * cos_down),
-    )
 
 
 def _rectangle(corners: F64, intrinsics: Intrinsics) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

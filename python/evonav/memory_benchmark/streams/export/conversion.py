@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.memory_benchmark.streams.evidence import camera_axes
+from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -32,7 +32,7 @@ def world_from_camera(pose: Pose) -> F64:
     Args:
         pose: Pose of the camera itself, as `Frame.pose`.
     """
-    right, up, forward = (np.array(axis) for axis in camera_axes(pose))
+    right, up, forward = camera_axes(pose)
     matrix = np.eye(4)
     matrix[:3, :3] = EVONAV_FROM_WORLD["z"] @ np.column_stack([right, -up, forward])
     matrix[:3, 3] = EVONAV_FROM_WORLD["z"] @ np.array(pose.position_m)
