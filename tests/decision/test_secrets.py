@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import short_stages
 from evonav.cli.doctor.checks import Where, all_checks
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.vlm.client import VlmClient, VlmConfig
@@ -221,7 +222,7 @@ def test_a_run_against_a_leaking_server_leaves_no_trace_of_its_key(tmp_path: Pat
         if reply.get("status") != 401 and "cut" not in reply
     ]
     told: list[tuple[object, int, bytes]] = []
-    environment = {**os.environ, "OPENAI_API_KEY": KEY}
+    environment = {**os.environ, "OPENAI_API_KEY": KEY, "PYTHONPATH": str(Path(short_stages.__file__).parent)}
     rate = 0.0
 
     def reply(request: dict[str, Any]) -> MockReply:
@@ -229,7 +230,7 @@ def test_a_run_against_a_leaking_server_leaves_no_trace_of_its_key(tmp_path: Pat
         return draws.choice(replies) if draws.random() < rate else {"text": f"{mock_answer(request)}\n{form(KEY)}"}
 
     def evonav(*words: object) -> None:
-        command = [sys.executable, "-m", "evonav", *map(str, words)]
+        command = [sys.executable, "-m", "short_stages", *map(str, words)]
         done = subprocess.run(command, capture_output=True, cwd=tmp_path, env=environment, check=False)
         assert_traceless(done.stdout + done.stderr, words)
         told.append((words[0], done.returncode, done.stderr[-500:]))

@@ -20,8 +20,10 @@ from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
 import evonav
+import short_stages
 from evonav.agents.agent import NavigateTo, Stop
 from evonav.cli import app
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import check_agent_name
 from evonav.evaluation.run.run import evaluate
 from evonav.house import bundled_houses
@@ -57,6 +59,15 @@ LIMITED = ("evaluate", "tasks generate", "perception")
 """Commands that get one task, one or two agents and this process: the words are tested, not the machine."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_rounds() -> Iterator[None]:
+    """Stages end after a few rounds here."""
+    paper = ProtocolConfig.__init__.__defaults__
+    ProtocolConfig.__init__.__defaults__ = short_stages.defaults_of_the_protocol()
+    yield
+    ProtocolConfig.__init__.__defaults__ = paper
+
+
 def blocks(page: Path) -> Iterator[tuple[str, str]]:
     yield from BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
 
@@ -80,8 +91,8 @@ def python_texts(page: Path) -> list[str]:
     return [text for language, text in blocks(page) if language == "python"]
 
 
-@pytest.fixture(scope="session")
-def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory, few_rounds: None) -> Path:
     """A folder with what commands of the documentation take: houses, tasks, a run."""
     folder = tmp_path_factory.mktemp("docs")
     houses = [house.to_json() for house in sorted(bundled_houses(), key=lambda house: len(house.rooms))[:2]]
