@@ -30,20 +30,18 @@ def observation_point(
         `(x, z)` of a cell's middle, or `None` if no cell within `distance_m` is known to be free.
     """
     window, offset = _window(is_free, frame, object_m, distance_m + 2 * frame.cell_m)
-    rows, cols = np.nonzero(window)
-    if len(rows) == 0:
+    cells = np.argwhere(window)
+    if len(cells) == 0:
         return None
-    x_m = (cols + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0]
-    z_m = (rows + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1]
+    x_m, z_m = frame.centres_m(cells + offset).T
     is_near = np.hypot(x_m - object_m[0], z_m - object_m[1]) <= distance_m
     near = np.zeros_like(window)
-    near[rows[is_near], cols[is_near]] = True
+    near[tuple(cells[is_near].T)] = True
     group = _largest_group(near)
     if group is None:
         return None
-    mean_row, mean_col = group.mean(axis=0)
-    dx_m = (mean_col + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0] - object_m[0]
-    dz_m = (mean_row + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1] - object_m[1]
+    mean_m = frame.centre_m(*(group.mean(axis=0) + offset).tolist())
+    dx_m, dz_m = mean_m[0] - object_m[0], mean_m[1] - object_m[1]
     length_m = math.hypot(dx_m, dz_m)
     if length_m > 1e-9:
         wanted = (object_m[0] + dx_m / length_m * distance_m, object_m[1] + dz_m / length_m * distance_m)
@@ -81,9 +79,7 @@ def places_around(
     """
     max_distance_m = distance_m + 2 * frame.cell_m
     window, offset = _window(is_free, frame, object_m, max_distance_m)
-    rows, cols = np.nonzero(window)
-    x_m = (cols + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0] - object_m[0]
-    z_m = (rows + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1] - object_m[1]
+    x_m, z_m = (frame.centres_m(np.argwhere(window) + offset) - object_m).T
     min_turn_rad -= 1e-9  # the least angle itself counts, however it is rounded
     first_rad = math.atan2(first_m[0] - object_m[0], first_m[1] - object_m[1])
     turns_rad = _angles_between(np.arctan2(x_m, z_m), first_rad)
@@ -161,8 +157,7 @@ def widest_direction_rad(
     steps_m = np.arange(1, math.ceil(reach_m / frame.cell_m) + 1) * frame.cell_m
     x_m = here_m[0] + np.sin(bearings_rad)[:, None] * np.minimum(steps_m, reach_m)
     z_m = here_m[1] + np.cos(bearings_rad)[:, None] * np.minimum(steps_m, reach_m)
-    rows = np.floor((z_m - frame.corner_m[1]) / frame.cell_m).astype(int)
-    cols = np.floor((x_m - frame.corner_m[0]) / frame.cell_m).astype(int)
+    rows, cols = np.moveaxis(frame.cells_at(np.stack([x_m, z_m], axis=-1)), -1, 0)
     is_on_map = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
     is_open = (is_on_map & is_free[np.where(is_on_map, rows, 0), np.where(is_on_map, cols, 0)]).all(axis=1).tolist()
     if all(is_open):

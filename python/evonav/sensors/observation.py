@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,15 @@ class MapFrame:
     def centre_m(self, row: float, col: float) -> tuple[float, float]:
         """Return the middle of a cell, `(x, z)`."""
         return (self.corner_m[0] + (col + 0.5) * self.cell_m, self.corner_m[1] + (row + 0.5) * self.cell_m)
+
+    def centres_m(self, cells: NDArray[np.integer[Any]]) -> NDArray[np.float64]:
+        """Return the middles `(..., 2)`, `(x, z)`, of cells `(..., 2)`, row and column."""
+        return np.ascontiguousarray((cells[..., ::-1] + 0.5) * self.cell_m + np.array(self.corner_m))
+
+    def cells_at(self, places_m: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+        """Return row and column `(..., 2)` of the cells at places `(..., 2)`, `(x, z)`; they may be off the map."""
+        xz = np.floor((places_m - np.array(self.corner_m)) / self.cell_m).astype(np.int64)
+        return np.ascontiguousarray(xz[..., ::-1])
 
     def cell_at(self, place_m: tuple[float, float]) -> tuple[int, int]:
         """Return row and column of the cell at `(x, z)`, or of the nearest one."""

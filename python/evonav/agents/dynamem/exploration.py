@@ -77,7 +77,7 @@ class LastSeen:
         """
         is_free = occupancy.cells == FREE
         rows, cols = np.nonzero(is_free)
-        middles_m = self._middles_m(rows, cols)
+        middles_m = self._frame.centres_m(np.argwhere(is_free))
         reached = np.zeros_like(is_free)
         if len(rows):
             is_reached = np.isfinite(occupancy.distances_m(here_m, middles_m))
@@ -90,7 +90,7 @@ class LastSeen:
         if len(rows) == 0:
             return None
         values = self.values()[rows, cols]
-        places_m = self._middles_m(rows, cols)
+        places_m = self._frame.centres_m(np.argwhere(is_edge))
         ways_m = np.hypot(places_m[:, 0] - here_m[0], places_m[:, 1] - here_m[1])
         best = int(np.lexsort((ways_m, -values))[0])
         row, col = int(rows[best]), int(cols[best])
@@ -99,11 +99,6 @@ class LastSeen:
         row, col = min(beside, key=lambda one: math.dist(one, (row, col)))
         face_m = places_m[best].tolist()
         return self._frame.centre_m(row, col), (face_m[0], face_m[1]), float(values[best])
-
-    def _middles_m(self, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> NDArray[np.float64]:
-        frame = self._frame
-        x_m = frame.corner_m[0] + (cols + 0.5) * frame.cell_m
-        return np.stack([x_m, frame.corner_m[1] + (rows + 0.5) * frame.cell_m], axis=1)
 
 
 def _grown(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

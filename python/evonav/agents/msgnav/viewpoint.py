@@ -91,8 +91,7 @@ def _best(
 
 
 def _are_free(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: MapFrame) -> NDArray[np.bool_]:
-    cells = np.floor((places_m - np.array(frame.corner_m)) / frame.cell_m).astype(np.int64)
-    cols, rows = cells[:, 0], cells[:, 1]
+    rows, cols = frame.cells_at(places_m).T
     is_inside = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
     found: NDArray[np.bool_] = is_inside & is_free[rows.clip(0, frame.rows - 1), cols.clip(0, frame.cols - 1)]
     return found
@@ -103,7 +102,7 @@ def _snapped(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: M
     cells = np.argwhere(is_free)
     if len(cells) == 0:
         return np.empty((0, 2))
-    middles_m = (cells[:, ::-1] + 0.5) * frame.cell_m + np.array(frame.corner_m)
+    middles_m = frame.centres_m(cells)
     nearest = [int(((middles_m - place_m) ** 2).sum(axis=1).argmin()) for place_m in places_m]
     snapped: NDArray[np.float64] = np.ascontiguousarray(middles_m[nearest])
     return snapped

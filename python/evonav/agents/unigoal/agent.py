@@ -178,9 +178,7 @@ class UniGoal:
         """Return the cells under a node's points."""
         points_m = self._graphs.scene.objects.points_m(node.id)
         at_m = np.array([node.ground_m]) if points_m is None else points_m[:, [0, 2]].astype(np.float64)
-        frame = bev.map_frame
-        cells = np.floor((at_m - frame.corner_m) / frame.cell_m).astype(np.int32)[:, ::-1]
-        return np.ascontiguousarray(np.unique(cells, axis=0))
+        return np.unique(bev.map_frame.cells_at(at_m).astype(np.int32), axis=0)
 
     def _is_given_up(self, node: SceneNode) -> bool:
         """Return whether all of a node lies where the goal was searched in vain."""

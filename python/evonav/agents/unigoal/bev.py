@@ -80,15 +80,12 @@ class BevMap:
 
     def cell_of(self, point_m: Point2) -> tuple[int, int] | None:
         """Return the `(row, col)` of the cell that contains `(x, z)`; `None` off the map."""
-        frame = self.map_frame
-        col = int(np.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m))
-        row = int(np.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m))
-        return (row, col) if 0 <= row < frame.rows and 0 <= col < frame.cols else None
+        row, col = self.map_frame.cells_at(np.array(point_m)).tolist()
+        return (row, col) if 0 <= row < self.map_frame.rows and 0 <= col < self.map_frame.cols else None
 
     def centre_of(self, cell: tuple[int, int]) -> Point2:
         """Return the `(x, z)` of the middle of a cell `(row, col)`."""
-        (x_m, z_m), cell_m = self.map_frame.corner_m, self.map_frame.cell_m
-        return (x_m + (cell[1] + 0.5) * cell_m, z_m + (cell[0] + 0.5) * cell_m)
+        return self.map_frame.centre_m(*cell)
 
     @property
     def cells(self) -> NDArray[np.uint8]:

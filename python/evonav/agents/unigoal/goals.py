@@ -96,9 +96,7 @@ class GoalWatch:
         if not len(allowed):
             return None
         row, col = allowed.mean(axis=0).tolist()
-        (x_m, z_m), cell_m = self._bev.map_frame.corner_m, self._bev.map_frame.cell_m
-        centre_m = (x_m + (col + 0.5) * cell_m, z_m + (row + 0.5) * cell_m)
-        return Glimpse(allowed, centre_m, source, node_id)
+        return Glimpse(allowed, self._bev.map_frame.centre_m(row, col), source, node_id)
 
     def judge(self, pose: Pose) -> None:
         """Confirm the temporary goal at its place; abandon it if it should be in view and is not.
@@ -122,8 +120,7 @@ class GoalWatch:
             self.confirmed, self.temporary = goal, None
 
     def _straight_m(self, pose: Pose, goal: Glimpse) -> float:
-        (x_m, z_m), cell_m = self._bev.map_frame.corner_m, self._bev.map_frame.cell_m
-        middles_m = (goal.cells[:, ::-1] + 0.5) * cell_m + (x_m, z_m)
+        middles_m = self._bev.map_frame.centres_m(goal.cells)
         return float(np.hypot(*(middles_m - (pose.x_m, pose.z_m)).T).min())
 
 

@@ -36,13 +36,12 @@ class ConeMap:
             view: The view.
             value: Its value.
         """
-        config, frame = self.config, self._frame
+        config = self.config
         cells = np.concatenate([view.occupancy.free, view.occupancy.blocked])
         if len(cells) == 0:
             return
-        rows, cols = cells[:, 0], cells[:, 1]
-        dx_m = frame.corner_m[0] + (cols + 0.5) * frame.cell_m - view.pose.x_m
-        dz_m = frame.corner_m[1] + (rows + 0.5) * frame.cell_m - view.pose.z_m
+        rows, cols = cells.T
+        dx_m, dz_m = (self._frame.centres_m(cells) - (view.pose.x_m, view.pose.z_m)).T
         off_rad = np.abs((np.arctan2(dx_m, dz_m) - view.pose.yaw_rad + math.pi) % math.tau - math.pi)
         half_rad = math.atan(0.5 * view.intrinsics.width_px / view.intrinsics.focal_px)
         is_inside = off_rad <= half_rad
