@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 import short_stages
+
 from evonav.cli.doctor.checks import Where, all_checks
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.vlm.client import VlmClient, VlmConfig

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import short_stages
 import typer
 from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
 import evonav
-import short_stages
 from evonav.agents.agent import NavigateTo, Stop
 from evonav.cli import app
 from evonav.evaluation.protocol import ProtocolConfig

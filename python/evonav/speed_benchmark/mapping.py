@@ -85,7 +85,7 @@ class Volume(Protocol):
     def prepare(self, number: int) -> None:
         """Prepare what is not timed of a view, and begin anew in a new house."""
 
-    def __call__(self, number: int) -> object:
+    def __call__(self, number: int, /) -> object:
         """Add the view."""
 
 
