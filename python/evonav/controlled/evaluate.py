@@ -6,6 +6,7 @@ from pathlib import Path
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all
+from evonav.evaluation.run.settings_model import NUM_RETRIES
 from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import task_files
 
@@ -15,7 +16,8 @@ def evaluate_controlled(
     agents: Sequence[str],
     *,
     config: RunConfig | None = None,
-    num_workers: int = 1,
+    workforce: Workforce | None = None,
+    num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[str, Progress], None] = lambda _arm, _progress: None,
 ) -> dict[str, list[AgentSummary]]:
@@ -28,7 +30,8 @@ def evaluate_controlled(
         directory: Holds `controlled.json`.
         agents: Names, see `evonav agents`.
         config: Configuration of the runs.
-        num_workers: Processes; 0 runs everything in this one.
+        workforce: The workers that all arms share. Default: one process, with one episode at a time.
+        num_retries: Number of retries of a stage, see `evaluate_all`.
         retry_errored: Run errored stages again.
         on_progress: Called with an arm's name after each of its recorded stages.
 
@@ -52,7 +55,8 @@ def evaluate_controlled(
     ]
     summaries = evaluate_all(
         requests,
-        Workforce(num_workers),
+        workforce or Workforce(1),
+        num_retries=num_retries,
         retry_errored=retry_errored,
         on_progress=lambda index, progress: on_progress(arms[index], progress),
     )

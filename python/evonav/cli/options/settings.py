@@ -136,7 +136,6 @@ def settings_options(name: str) -> Options:
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
     pool = ("workers", "engine", "ray_address")
     evaluators = (*pool, "episodes_at_once", "worker_gpus")
-    agents = ("isolation", "agent_timeout_s")
     return {
         "decisions": Options(
             settings.DecisionSettings,
@@ -168,12 +167,18 @@ def settings_options(name: str) -> Options:
         "models": Options(settings.PerceptionSettings, "Perception", fields=("models", "device")),
         "workers": Options(RunSettings, fields=("workers",)),
         "pool": Options(RunSettings, WORKER_PANEL, fields=pool),
-        "local_run": Options(RunSettings, WORKER_PANEL, names=run_names, fields=("workers", *agents)),
         "run": Options(
             RunSettings,
             WORKER_PANEL,
             names=run_names,
-            fields=(*evaluators, "num_retries", *agents, "agent_memory_mb", "shift_coordinates"),
+            fields=(
+                *evaluators,
+                "num_retries",
+                "isolation",
+                "agent_timeout_s",
+                "agent_memory_mb",
+                "shift_coordinates",
+            ),
         ),
         "changes": Options(RunSettings, WORKER_PANEL, fields=evaluators, overrides=True),
     }[name]

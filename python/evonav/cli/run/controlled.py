@@ -114,10 +114,10 @@ def generate(
 
 
 @controlled_app.command(cls=Command)
-@with_settings("local_run", "perception", "decisions", "spending")
+@with_settings("run", "perception", "decisions", "spending")
 def evaluate(
     directory: Directory,
-    local_run: "RunSettings",
+    run: "RunSettings",
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
@@ -136,13 +136,14 @@ def evaluate(
     from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
-    num_workers = local_run.num_workers
     simulation = SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets)
+    run = run.with_episodes([decisions], [simulation])
+    workforce = run.workforce()
     recorded = recorded_backend(run_of(directory, record.arms[0].name))
     backend = Backend(
         simulator=simulation.component(recorded),
         perception=perception.component(),
-        decision=decision_component(decisions, spending, directory, seed, num_workers, recorded=recorded),
+        decision=decision_component(decisions, spending, directory, seed, run.num_episodes, recorded=recorded),
     )
     names = names_of(agent)
 
@@ -154,8 +155,9 @@ def evaluate(
         summaries = evaluate_controlled(
             directory,
             names,
-            config=local_run.config(seed, backend, decisions),
-            num_workers=num_workers,
+            config=run.config(seed, backend, decisions),
+            workforce=workforce,
+            num_retries=run.num_retries,
             retry_errored=retry_errored,
             on_progress=tell,
         )

@@ -34,17 +34,27 @@ def demo(
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import evaluate
+    from evonav.evaluation.run.settings import SimulatorSettings
     from evonav.report import write_report
 
+    workers = workers.with_episodes([decisions], [SimulatorSettings()])
     num_workers, names = workers.num_workers, names_of(agent)
-    decision = decision_component(decisions, spending, out, seed, num_workers, dry_run=dry_run)
+    decision = decision_component(decisions, spending, out, seed, workers.num_episodes, dry_run=dry_run)
     config = workers.config(seed, Backend(decision=decision), decisions)
     with run_tasks(out, limit=limit) as task_files:
         if dry_run:
             print_estimate(spending, names, task_files, config, num_workers)
             return
         with running(out, config) as show:
-            summaries = evaluate(names, task_files, out, config=config, num_workers=num_workers, on_progress=show)
+            summaries = evaluate(
+                names,
+                task_files,
+                out,
+                config=config,
+                num_workers=num_workers,
+                episodes_at_once=workers.episodes_at_once or 1,
+                on_progress=show,
+            )
     print_results(out, summaries)
     _, index = make_pages(out)
     typer.echo(f"report: {write_report(out)}")
