@@ -58,6 +58,15 @@ def test_the_file_is_the_same_for_any_number_of_workers_and_after_interrupts(tmp
     assert text.read_text().splitlines() == lines_of(plain)[5:]
 
 
+@pytest.mark.slow
+def test_ray_makes_the_same_file(tmp_path: Path) -> None:
+    pytest.importorskip("ray")
+    plain, parallel = tmp_path / "plain.jsonl.gz", tmp_path / "ray.jsonl.gz"
+    make_houses(plain, 9, seed=3)
+    make_houses(parallel, 9, seed=3, workforce=Workforce(2, "ray"))
+    assert parallel.read_bytes() == plain.read_bytes()
+
+
 def test_endless_houses_are_those_of_the_file(tmp_path: Path) -> None:
     make_houses(tmp_path / "houses.jsonl.gz", 3, seed=12)
     endless = list(islice(stream_houses("endless:12"), 3))
