@@ -488,6 +488,12 @@ class EmbeddedSimulator:
         style: str,
     ) -> EmbeddedSimulator: ...
     def apply(self, delta_json: str) -> EmbeddedSimulator: ...
+    def change_around(self, delta_json: str, *, agent_m: _Vec2, target_id: str) -> tuple[str, list[str]]:
+        """Return the house (JSON) after a change around an agent at `(x, z)`, and the ids of what has to stay.
+
+        What would touch the agent stays, with all that this forces to stay. If the agent would be shut in, or the
+        target cut off, everything stays.
+        """
     def with_look(self, changes_json: str, *, are_checked: bool) -> EmbeddedSimulator:
         """Return the same house in a random look (`evonav.world.appearance`); unless checked, unknown names are errors.
 

@@ -1,5 +1,6 @@
 """Records made up by hand for tests of measures. Never results."""
 
+from evonav.evaluation.records.changes import TransitionRecord
 from evonav.evaluation.records.schema import (
     ActionRecord,
     EndState,
@@ -11,7 +12,6 @@ from evonav.evaluation.records.schema import (
     StageError,
     StageRecord,
     TargetRecord,
-    TransitionRecord,
 )
 
 TARGET_M = (5.0, 0.8, 1.0)

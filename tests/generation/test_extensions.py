@@ -35,7 +35,7 @@ def test_extended_tasks_are_valid_and_say_what_happened(house: House, extensions
     assert set(task.header.parameters.extensions.model_dump(exclude_none=True)) == set(extensions)
     report = validate_task(task)
     assert not report.problems, report.problems[:3]
-    kinds = [transition_record(oracle).kind for oracle in task.oracle_stages]
+    kinds = [transition_record(oracle.evolution).kind for oracle in task.oracle_stages]
     assert kinds[0] == "static"
     expected = "activities" if extensions is PEOPLE else "extensions"
     assert expected in kinds[1:]

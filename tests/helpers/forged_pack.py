@@ -77,9 +77,10 @@ def rescored(row: dict[str, Any]) -> None:
     score = score_stage(
         (start.x_m, start.z_m),
         (end.x_m, end.z_m),
-        (record.target.position_m[0], record.target.position_m[2]),
+        record.target_m_at_end[::2],
         path_length_m=length_m,
         reference_length_m=record.reference_length_m,
+        target_at_start_m=record.target.position_m[::2],
     )
     row |= {
         "state": (EndState.SUCCESS if score.is_success else EndState.FAILURE).value,

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from evonav.evaluation.records.changes import Relocation, TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import (
     ActionRecord,
@@ -14,13 +15,11 @@ from evonav.evaluation.records.schema import (
     ObjectFootprint,
     Opening,
     PoseRecord,
-    Relocation,
     RoomFootprint,
     RoundRecord,
     StageError,
     StageRecord,
     TargetRecord,
-    TransitionRecord,
 )
 from evonav.evaluation.records.store import RunStore
 

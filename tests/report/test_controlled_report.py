@@ -17,8 +17,9 @@ from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.records.changes import TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
-from evonav.evaluation.records.schema import EndState, TransitionRecord
+from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import read_compared_agents

@@ -53,6 +53,9 @@ class ControlledOptions(Record):
         are_probabilities = all(0.0 <= rate <= 1.0 for rate in self.rates)
         if len(set(self.rates)) < 2 or sorted(set(self.rates)) != list(self.rates) or not are_probabilities:
             raise InvalidArgumentError(f"rates = {self.rates}: must be at least two of [0, 1], ascending")
+        if self.parameters.extensions.during_stage is not None:
+            message = "is on, but arms differ in the transitions between stages alone"
+            raise InvalidArgumentError(f"parameters.extensions.during_stage {message}")
 
     @property
     def arms(self) -> tuple[Arm, ...]:

@@ -50,6 +50,10 @@ class ProtocolConfig:
         """Return the number of rounds per stage: decisions, or single actions."""
         return self.max_actions if sensors.motion == "actions" else self.max_rounds
 
+    def step_of_round(self, number: int, sensors: SensorConfig) -> int:
+        """Return the round of an agent that stands for a decision round, from 0: single actions are ten a round."""
+        return number * self.budget(sensors) // self.max_rounds
+
     def check(self, sensors: SensorConfig) -> None:
         """Reject sensors that the protocol does not grant.
 

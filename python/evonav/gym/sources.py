@@ -183,6 +183,9 @@ class HouseTasks:
 
 
 def _checked(task: Task, name: str) -> Task:
+    if any(stage.during is not None for stage in task.oracle_stages):
+        message = "its house changes during stages (extension `during_stage`), which Gymnasium does not play"
+        raise InvalidArgumentError(f"{name}: {message}")
     if task.num_stages > MAX_STAGES:
         raise InvalidArgumentError(f"{name}: has {task.num_stages} stages, expected at most {MAX_STAGES}")
     return task

@@ -42,6 +42,9 @@ class DetectorPerception:
     def begin_stage(self, scene: StageScene) -> None:
         """Do nothing: the scene is not used."""
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Do nothing: the scene is not used."""
+
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Perceive the views of a round, as one batch.
 

@@ -41,6 +41,10 @@ class GroundTruthPerception:
         """Store the stage's objects."""
         self._objects = scene.objects
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Store the objects of the changed house."""
+        self._objects = scene.objects
+
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return each frame as it is."""
         return [Percept(self.detect(frame, self._objects), frame.depth_m, frame.pose) for frame in frames]

@@ -52,6 +52,13 @@ class Perception(Protocol):
         """Begin a stage of the episode; stages come in order, each once."""
         ...
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Take in that the house changes during the stage: `scene` has other objects, and rounds go on.
+
+        Only tasks with changes during stages need it (docs/extensions.md).
+        """
+        ...
+
     def perceive(self, frames: Sequence[Frame]) -> Sequence[Percept]:
         """Perceive the views of one round, as one batch.
 

@@ -309,6 +309,9 @@ class StackPerception:
         """Load the models of the agent's stack; of the scene, only the agent's name is used."""
         self._perception = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Do nothing: of a scene, only the agent's name is used."""
+
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Perceive the views of a round, as one batch."""
         return self._begun().perceive(frames)

@@ -93,6 +93,10 @@ class NoisyPerception:
         self._round = 0
         self._lasting = {}
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Store the objects of the changed house; the draws of rounds and objects go on."""
+        self._scene = scene
+
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return each frame with its errors."""
         scene = self._stage()

@@ -92,8 +92,8 @@ class Recorder:
         self._sizes = (SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY) if is_small else (HEADING_PX, SIDE_PX, QUALITY)
         if heading_px is not None:
             self._sizes = (heading_px, SIDE_PX, 90)
-        self._places: list[dict[str, list[SceneObject]]] = []
-        """Objects by category, of each stage so far."""
+        self._places: list[tuple[int, dict[str, list[SceneObject]]]] = []
+        """Objects by category, of each arrangement of the house so far, with the stage."""
         self._now: dict[str, SceneObject] = {}
         self._truths: dict[tuple[str, tuple[float, float, float]], Truth | None] = {}
         self._prompt_jpegs: dict[bytes, bytes] = {}
@@ -105,15 +105,19 @@ class Recorder:
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
         """Record where everything stands."""
         self._stage = stage
+        self._rounds, self._pending = [], None
+        self.house_changes(simulator)
+        self._lose(0)
+
+    def house_changes(self, simulator: Simulator) -> None:
+        """Record where everything stands now."""
         self._simulator = simulator
         by_category: dict[str, list[SceneObject]] = {}
         for body in simulator.objects:
             by_category.setdefault(body.category, []).append(body)
-        self._places.append(by_category)
+        self._places.append((self._stage, by_category))
         self._now = {body.id: body for body in simulator.objects}
         self._truths.clear()
-        self._rounds, self._pending = [], None
-        self._lose(0)
 
     def round_begins(self, observation: Observation) -> None:
         """Draw the views in colours; the agent's own stay as they are."""
@@ -159,7 +163,7 @@ class Recorder:
             return seen
         try:
             belief = agent.belief() if self._shift is None else self._shift.unshifted_belief(agent.belief())
-            bodies = self._places[-1]
+            _, bodies = self._places[-1]
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(
                 seen,
@@ -201,11 +205,11 @@ class Recorder:
         return self._truths[key]
 
     def _found(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
-        for index in reversed(range(len(self._places))):
-            body = matched_object(label, centre_m, self._places[index])
+        for stage, bodies in reversed(self._places):
+            body = matched_object(label, centre_m, bodies)
             if body is not None:
                 now = self._now.get(body.id)
-                return Truth(body.id, index + 1, None if now is None else now.centre_m)
+                return Truth(body.id, stage, None if now is None else now.centre_m)
         return None
 
 

@@ -11,7 +11,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import polyline_length_m
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.base import Point2
+from evonav.evaluation.records.base import Point2, Point3
 from evonav.evaluation.records.convert import sensor_config
 from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
 
@@ -94,10 +94,11 @@ def _score_findings(record: StageRecord, start_m: Point2, end_m: Point2, protoco
     score = score_stage(
         start_m,
         end_m,
-        (record.target.position_m[0], record.target.position_m[2]),
+        _on_ground(record.target_m_at_end),
         path_length_m=length_m,
         reference_length_m=reference_m,
         success_radius_m=protocol.success_radius_m,
+        target_at_start_m=_on_ground(record.target.position_m),
     )
     last = trace[-1].action
     made: dict[str, object] = {
@@ -136,6 +137,10 @@ def _length_m(entry: RoundRecord) -> float:
 
 def _gap_m(pose: PoseRecord, other: PoseRecord) -> float:
     return math.dist(_place(pose), _place(other))
+
+
+def _on_ground(point_m: Point3) -> Point2:
+    return (point_m[0], point_m[2])
 
 
 def _place(pose: PoseRecord) -> Point2:

@@ -97,6 +97,9 @@ class _Blind:
     def begin_stage(self, scene: StageScene) -> None:
         """Do nothing."""
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Do nothing."""
+
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return frames without detections."""
         return [Percept(_nothing(frame), frame.depth_m, frame.pose) for frame in frames]

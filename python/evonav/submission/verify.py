@@ -29,6 +29,7 @@ from evonav.submission.archive import SubmissionError
 from evonav.submission.file import PackedRecords, Submission, SubmissionFile, first_problem
 from evonav.submission.pack import packed_summary
 from evonav.submission.packed_setup import camera_of
+from evonav.submission.recorded_change import change_findings
 from evonav.submission.recorded_path import TOLERANCE, path_findings
 from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
@@ -136,6 +137,7 @@ class _Records:
                 task_id, before, spec = record.task_id, None, self._spec(record.task_id)
             if spec is not None:
                 self.targets.add(_target_findings(record, spec), where)
+                self.targets.add(change_findings(record, spec.stages[record.stage - 1], self._protocol), where)
             self.paths.add(path_findings(record, before, self._protocol), where)
             before = brief(record)
             mine.append(before)

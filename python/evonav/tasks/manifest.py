@@ -1,5 +1,6 @@
 """Define a task: header, public stages, oracle stages, stage houses. `evonav.tasks.files` reads and writes it."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,7 +17,8 @@ from pydantic import (
     model_serializer,
 )
 
-from evonav.tasks.oracle import OracleStage
+from evonav.house import House
+from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.parameters import RecordedParameters
 from evonav.tasks.public import Goal
 from evonav.tasks.records import Id, PoseRecord, Record, Sha256, record_bytes, sha256_of
@@ -187,6 +189,27 @@ class Task:
             IndexError: The stage does not exist.
         """
         return self.houses_json[self._index(stage)]
+
+    def house_json_at_end(self, stage: int) -> str:
+        """Return the house as a stage leaves it, as ProcTHOR JSON: after the change during the stage, if there is one.
+
+        Raises:
+            HouseError: The change names an object that the house does not contain.
+            IndexError: The stage does not exist.
+        """
+        during = self.oracle(stage).during
+        if during is None:
+            return self.house_json(stage)
+        return House(self.house_json(stage)).apply(json.dumps(during.evolution.delta())).to_json()
+
+    def evolutions_before(self, stage: int) -> tuple[Evolution, ...]:
+        """Return all changes up to a stage's start, in order: of the transitions, and during earlier stages."""
+        found: list[Evolution] = []
+        for oracle in self.oracle_stages[:stage]:
+            found.append(oracle.evolution)
+            if oracle.during is not None and oracle.stage < stage:
+                found.append(oracle.during.evolution)
+        return tuple(found)
 
     def _index(self, stage: int) -> int:
         if not 1 <= stage <= self.num_stages:

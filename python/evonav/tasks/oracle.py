@@ -1,8 +1,15 @@
 """The evaluator's part of a task: targets and changes. Agents must not import this module."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveInt,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256
 
@@ -120,6 +127,37 @@ class Evolution(Record):
         """Ids of the objects relocated by this change."""
         return tuple(change.id for change in self.changes if change.is_relocated)
 
+    def delta(self) -> dict[str, Any]:
+        """Return the change as `House.apply` takes it, written as JSON."""
+        return {
+            "moves": [
+                {
+                    "id": change.id,
+                    "position_m": change.to_position_m,
+                    "rotation_deg": change.to_rotation_deg,
+                    "parent": change.to_support_id,
+                }
+                for change in self.changes
+            ],
+            "removed": [one.id for one in self.removals],
+            "added": [
+                {
+                    "id": one.id,
+                    "asset_id": one.asset_id,
+                    "position_m": one.position_m,
+                    "rotation_deg": one.rotation_deg,
+                    "parent": one.support_id,
+                }
+                for one in self.additions
+            ],
+            "states": [
+                {"id": state.id, "openness": state.after}
+                if state.field == "openness"
+                else {"id": state.id, "is_on": state.after > 0.5}
+                for state in self.states
+            ],
+        }
+
 
 class GenerationState(Record):
     """The generator's state S when the stage was made, oldest entries first."""
@@ -159,6 +197,23 @@ class Target(Record):
     """Whether any change since stage 1 relocated it."""
 
 
+class DuringRecord(Record):
+    """A change of the house during a stage, while the agent is under way (docs/extensions.md)."""
+
+    round: PositiveInt
+    """The decision round, from 0, before whose views the house changes."""
+    evolution: Evolution
+    """The change; `evolution.delta()` leads from the stage's house to the house at its end."""
+    target_position_m: Point3
+    """Centre of the target's box after it."""
+    target_support_id: Id | None
+    is_target_relocated: bool
+    """Whether the change relocated the target."""
+    reference_pose: PoseRecord
+    """Pose 1.0-1.5 m from the target from which it is visible after the change: the stage is still feasible."""
+    reference_visible_px: Annotated[int, Field(ge=1)]
+
+
 class OracleFields(Record):
     """The fields of an oracle stage that Algorithm 1 determines."""
 
@@ -176,7 +231,14 @@ class OracleFields(Record):
     """Corners of the shortest path from `start_pose` to `reference_pose`."""
     reference_path_length_m: NonNegativeFloat
     ever_relocated_ids: tuple[Id, ...]
-    """Ids of the objects relocated by any change up to this stage, sorted."""
+    """Ids of the objects relocated by any change up to the stage's start, sorted."""
+    during: DuringRecord | None = None
+    """The change during the stage; absent from the file if there is none."""
+
+    @model_serializer(mode="wrap")
+    def _without_during(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields: dict[str, Any] = serialize(self)
+        return {key: value for key, value in fields.items() if key != "during" or value is not None}
 
 
 class _OracleFileFields(Record):

@@ -39,6 +39,15 @@ class Schedule(Record):
     """Probability that a used object is brought back when its activity ends."""
 
 
+class DuringStage(Record):
+    """Frequency of changes during a stage, and their rounds."""
+
+    probability: Probability
+    """Probability that the house changes during a stage."""
+    rounds: tuple[Annotated[int, Field(ge=1, le=49)], Annotated[int, Field(ge=1, le=49)]]
+    """First and last decision round, from 0, in which it may change; the round is drawn uniformly."""
+
+
 class Extensions(Record):
     """The extensions beyond the paper (docs/extensions.md); each is off if `None`, which is the default."""
 
@@ -54,6 +63,13 @@ class Extensions(Record):
     """Lamps and screens that are switched on or off."""
     schedule: Schedule | None = None
     """People who use objects, instead of the paper's independent draws of rooms."""
+    during_stage: DuringStage | None = None
+    """Changes during a stage; absent from files of tasks without them."""
+
+    @model_serializer(mode="wrap")
+    def _as_in_older_files(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields: dict[str, Any] = serialize(self)
+        return {key: value for key, value in fields.items() if key != "during_stage" or value is not None}
 
 
 class GenerationParameters(Record):

@@ -33,6 +33,7 @@ fn bench_generation(c: &mut Criterion) {
         openables: often,
         switches: often,
         schedule: None,
+        during_stage: None,
     };
     let people = Schedule { num_persons: 3, minutes_between_stages: 180, tidiness: 0.8 };
     let people = Extensions { schedule: Some(people), ..Extensions::default() };

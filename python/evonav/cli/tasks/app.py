@@ -38,7 +38,9 @@ def list_tasks(folder: TaskFolder = None, limit: Limit = None) -> None:
     for task in tasks:
         changed = [str(stage.stage) for stage in task.oracle_stages if stage.evolution.outcome == "evolved"]
         counts = f"{task.header.house.num_rooms:5}  {task.num_stages:6}"
-        typer.echo(f"{task.task_id:{width}}  {counts}  {', '.join(changed) or '-'}")
+        during = [f"{k.stage} (round {k.during.round})" for k in task.oracle_stages if k.during is not None]
+        also = f"; during {', '.join(during)}" if during else ""
+        typer.echo(f"{task.task_id:{width}}  {counts}  {', '.join(changed) or '-'}{also}")
 
 
 @tasks_app.command(cls=Command)

@@ -22,7 +22,8 @@ from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, StageSpec
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.schema import StageRecord, TargetRecord, TransitionRecord
+from evonav.evaluation.records.changes import TransitionRecord
+from evonav.evaluation.records.schema import StageRecord, TargetRecord
 from evonav.evaluation.run.components import Backend
 from evonav.house import House
 from evonav.perception import Percept, Perception
@@ -269,6 +270,7 @@ class _Blind:
     def __init__(self, perception: Perception) -> None:
         self._perception = perception
         self.begin_stage = perception.begin_stage
+        self.change_scene = perception.change_scene
         self.text_feature = perception.text_feature
 
     @property

@@ -23,6 +23,10 @@ class EpisodeObserver(Protocol):
         """Note that a stage's house is loaded; the agent has not received the goal yet."""
         ...
 
+    def house_changes(self, simulator: Simulator) -> None:
+        """Note that the house has changed during the stage, before the views of the next round."""
+        ...
+
     def round_begins(self, observation: Observation) -> None:
         """Receive the observation that the agent receives next."""
         ...

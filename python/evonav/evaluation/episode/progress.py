@@ -13,7 +13,7 @@ class StageProgress:
     """A stage that is running. It holds oracle data: no observation contains any of it."""
 
     target_m: Point2
-    """`(x, z)` of the target's centre."""
+    """`(x, z)` of the target's centre as the stage began."""
     start_m: Point2
     """`(x, z)` where the agent began."""
     reference_length_m: float | None
@@ -25,6 +25,8 @@ class StageProgress:
     path_length_m: float = 0.0
     has_stopped: bool = False
     """The agent ended the stage itself."""
+    moved_target_m: Point2 | None = None
+    """`(x, z)` of the target's centre after the house changed during the stage."""
 
     def advance(self, length_m: float, *, is_stop: bool) -> None:
         """Count a step on which the agent went `length_m`, and with which it may have stopped."""
@@ -42,8 +44,9 @@ class StageProgress:
         return score_stage(
             self.start_m,
             end_m,
-            self.target_m,
+            self.target_m if self.moved_target_m is None else self.moved_target_m,
             path_length_m=self.path_length_m,
             reference_length_m=self.reference_length_m,
             success_radius_m=self.success_radius_m,
+            target_at_start_m=self.target_m,
         )

@@ -62,6 +62,12 @@ class Sensors:
             perception.begin_stage(scene)
             self._goal_feature = perception.text_feature(scene.goal.unified_instruction)
 
+    def change_scene(self, scene: StageScene) -> None:
+        """Take in that the house has changed during the stage."""
+        self._grid = self._simulator.occupancy()
+        with self._stopwatch.timing("perception"):
+            self._perception.change_scene(scene)
+
     def observe(
         self,
         *,

@@ -2,20 +2,21 @@
 
 import hashlib
 import hmac
+import json
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from evonav.evaluation.records.base import Point2
+from evonav.evaluation.records.base import Point2, Point3
+from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
 from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
-from evonav.evaluation.records.oracle import target_record, transition_record
+from evonav.evaluation.records.oracle import during_record, target_record, transition_record
 from evonav.evaluation.records.schema import (
     EndState,
     FloorPlan,
     GoalRecord,
     StageRecord,
     TargetRecord,
-    TransitionRecord,
 )
 from evonav.house import House
 from evonav.tasks import Task
@@ -42,6 +43,18 @@ class GuidedWalk:
 
 
 @dataclass(frozen=True, slots=True)
+class HouseChange:
+    """A change of the house during a stage, as the evaluator knows it."""
+
+    record: DuringRecord
+    """The change as a record has it before it takes place."""
+    delta_json: str
+    """The change as `House.apply` takes it."""
+    target_position_m: Point3
+    """Position of the target after it."""
+
+
+@dataclass(frozen=True, slots=True)
 class StageSpec:
     """A stage as the evaluator knows it; only `public` ever reaches an agent."""
 
@@ -51,6 +64,8 @@ class StageSpec:
     transition: TransitionRecord
     guided: GuidedWalk | None = None
     """The walk of a guided stage, which the agent does not control and which is not scored; `None` otherwise."""
+    change: HouseChange | None = None
+    """The change during the stage, if there is one."""
 
     @property
     def goal(self) -> GoalRecord:
@@ -111,6 +126,7 @@ class EpisodeSpec:
             goal=spec.goal,
             target=spec.target,
             transition=spec.transition,
+            during=None if spec.change is None else spec.change.record,
         )
 
 
@@ -130,8 +146,9 @@ def episode_spec(task: Task) -> EpisodeSpec:
                 public=task.public(k),
                 house_json=task.house_json(k),
                 target=target_record(task, k),
-                transition=transition_record(task.oracle(k)),
+                transition=transition_record(task.oracle(k).evolution),
                 guided=_guided_walk(task.oracle(k)) if k in task.guided_stages else None,
+                change=_house_change(task.oracle(k)),
             )
             for k in numbers
         ),
@@ -162,6 +179,13 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
 
 def _guided_walk(oracle: OracleStage) -> GuidedWalk:
     return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
+
+
+def _house_change(oracle: OracleStage) -> HouseChange | None:
+    record, during = during_record(oracle), oracle.during
+    if record is None or during is None:
+        return None
+    return HouseChange(record, json.dumps(during.evolution.delta()), during.target_position_m)
 
 
 def opaque_task_id(secret: str, task_id: str) -> str:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, SensorConfig, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConfig, Stop
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.observer import EpisodeObserver, StageFailedError, attribute_errors, traceback_of
@@ -13,6 +13,7 @@ from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
+from evonav.evaluation.episode.stage_house import StageHouse
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
@@ -88,7 +89,7 @@ class Stage:
         self._record = record
         self._requested = requested
         self._sensor_config = SensorConfig()
-        self._planner = motion.Planner(self._simulator)
+        self._house = StageHouse(self._spec, record.stage, self._simulator, self._protocol)
         self._stopwatch = stopwatch
         self._staleness = StalenessTracker((), "", (), state.tracked, 1)
         self._memory_at_start: MemoryRecord | None = None
@@ -107,12 +108,12 @@ class Stage:
                 self._start()
                 # The agent is told the goal after this, or the time until its first round would tell of the distance.
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-                    reference_m = [] if self._stage.guided is not None else self._path_to_target_m()
+                    reference_m = [] if self._stage.guided is not None else self._house.path_to_target_m()
                 self._instruct()
                 if self._stage.guided is not None:
                     return self._guided(self._stage.guided)
                 progress = self._begin(self._protocol.budget(self._sensor_config), reference_m)
-                stop_reason = self._rounds(progress, self._carry_out)
+                stop_reason = self._rounds(progress, lambda action: self._house.carry_out(action, self._sensor_config))
                 return self._measured(progress, reference_m, stop_reason)
         except StageFailedError as failure:
             self.failure = failure.kind
@@ -124,7 +125,7 @@ class Stage:
         """Load the stage's house and place the agent."""
         stage = self._record.stage
         with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-            start = self._simulator.reset(self._stage.house_json, self._requested)
+            start = self._house.load(self._requested)
             is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
         self._staleness = StalenessTracker(
             self._simulator.objects,
@@ -133,14 +134,14 @@ class Stage:
             self._state.tracked,
             self._protocol.min_visible_px,
         )
+        self._state.tracked.pending = () if self._house.during is None else self._house.during.left
+        is_in_room = self._house.is_in_room(self._requested, self._record.transition.room_id)
         self._record = self._record.model_copy(
             update={
                 "requested_start": pose_record(self._requested),
                 "effective_start": pose_record(start),
                 "is_snapped": is_snapped,
-                "transition": self._record.transition.model_copy(
-                    update={"is_agent_in_room": self._is_agent_in_evolved_room()}
-                ),
+                "transition": self._record.transition.model_copy(update={"is_agent_in_room": is_in_room}),
             }
         )
         if self._observer is not None:
@@ -158,13 +159,6 @@ class Stage:
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
         self._belief_at_start = self._staleness.presence(beliefs or ())
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensor_config)})
-
-    def _is_agent_in_evolved_room(self) -> bool:
-        room_id = self._record.transition.room_id
-        if room_id is None:
-            return False
-        house = self._spec.parsed_house(self._record.stage)
-        return house.room_of(self._requested.x_m, self._requested.z_m) == room_id
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensors are held for the stage."""
@@ -191,12 +185,6 @@ class Stage:
         self._protocol.check(sensors)
         return sensors
 
-    def _path_to_target_m(self) -> list[motion.Point2]:
-        """Return the planner's path from the agent to the target; empty if there is none."""
-        (x_m, _, z_m), planner = self._stage.target.position_m, self._planner
-        house = self._spec.parsed_house(self._record.stage) if self._protocol.reference_in_room else None
-        return planner.into_room_m(planner.path_m((x_m, z_m)), (x_m, z_m), house, self._stage.target.room_id)
-
     def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
         """Count steps from here; without a reference path, the stage has no score."""
         pose = self._simulator.pose
@@ -217,6 +205,8 @@ class Stage:
         last = motion.Motion((), is_success=True)
         while not progress.is_over:
             number = progress.num_steps
+            if not is_guided and self._house.is_change_due(number, self._sensor_config):
+                self._change_house(number, progress, sensors)
             self._staleness.begin_round(number)
             with attribute_errors(ErrorKind.SIMULATION):
                 observation = sensors.observe(
@@ -260,12 +250,36 @@ class Stage:
             update={"state": EndState.GUIDED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
         )
 
+    def _change_house(self, number: int, progress: StageProgress, sensors: Sensors) -> None:
+        """Change the house during the stage, before a round's views; the agent is not told."""
+        with attribute_errors(ErrorKind.SIMULATION):
+            with self._stopwatch.timing("simulation"):
+                during = self._house.change(number, progress.path_length_m)
+            sensors.change_scene(self._scene())
+        x_m, _, z_m = self._house.target_m
+        progress.moved_target_m = (x_m, z_m)
+        self._staleness.change_house(self._simulator.objects, during.done)
+        self._state.tracked.pending = during.left
+        self._record = self._record.model_copy(update={"during": during})
+        if self._baseline is not None:
+            self._baseline.reveal_target(self._house.target_m)
+        if self._observer is not None:
+            self._observer.house_changes(self._simulator)
+
+    def _scene(self) -> StageScene:
+        """Return the stage as the perception may know it."""
+        return StageScene(
+            self._spec.task_id,
+            self._stage.public,
+            self._record.agent,
+            self._perception_seed,
+            self._simulator.objects,
+        )
+
     def _sensors(self) -> Sensors:
-        spec, objects = self._spec, self._simulator.objects
-        scene = StageScene(spec.task_id, self._stage.public, self._record.agent, self._perception_seed, objects)
         with attribute_errors(ErrorKind.SIMULATION):
             return Sensors(
-                self._simulator, self._perception, self._sensor_config, scene, self._staleness, self._stopwatch
+                self._simulator, self._perception, self._sensor_config, self._scene(), self._staleness, self._stopwatch
             )
 
     def _answer(self, observation: Observation) -> AgentAction:
@@ -292,19 +306,6 @@ class Stage:
             self._staleness.take_entries(self._beliefs or ())
         if self._observer is not None:
             self._observer.round_ends(self._trace[-1])
-
-    def _carry_out(self, action: AgentAction) -> motion.Motion:
-        if isinstance(action, NavigateTo):
-            return motion.navigate(
-                self._simulator,
-                self._planner,
-                action,
-                spacing_m=self._protocol.waypoint_m,
-                max_travel_m=self._sensor_config.max_travel_m,
-            )
-        if isinstance(action, Move):
-            return motion.move(self._simulator, action)
-        return motion.stay(self._simulator)
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):
@@ -333,7 +334,7 @@ class Stage:
         end, radius_m = self._simulator.pose, progress.success_radius_m
         score = progress.score((end.x_m, end.z_m))
         with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-            left_m = self._path_to_target_m()
+            left_m = self._house.path_to_target_m()
         geodesic_m = motion.polyline_length_m(left_m) if left_m else None
         record = self._with_memory(self._with_trace(self._record)).model_copy(
             update={

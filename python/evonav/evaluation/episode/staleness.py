@@ -17,7 +17,8 @@ import numpy as np
 from evonav import _core
 from evonav.agents.agent import EntryBelief
 from evonav.evaluation.records.base import BeliefRecord, Point3
-from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, Relocation, StaleEntryRecord
+from evonav.evaluation.records.changes import Relocation
+from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
 from evonav.world.simulator import Frame, SceneObject
@@ -127,6 +128,8 @@ class TrackedState:
     """Objects seen so far."""
     beliefs: Sequence[EntryBelief] = ()
     """The agent's entries of objects at the end of the last stage."""
+    pending: tuple[Relocation, ...] = ()
+    """Moves of the change during the last stage that took place after its end."""
 
 
 class StalenessTracker:
@@ -149,29 +152,52 @@ class StalenessTracker:
             so_far: The state of the episode; objects that are seen are added.
             min_visible_px: Number of pixels from which an object counts as in view.
         """
-        self._objects = objects
+        self._target_id = target_id
         self._so_far = so_far
         self._min_visible_px = min_visible_px
-        self.bodies: dict[str, list[SceneObject]] = {}
-        """The bodies by category."""
-        for body in objects:
-            self.bodies.setdefault(body.category, []).append(body)
-        index_of = {body.id: index for index, body in enumerate(objects)}
-        self._target = index_of.get(target_id)
-        self._is_object = np.array([body.kind == "object" for body in objects], dtype=np.bool_)
-        self._ground_m = np.array([(body.centre_m[0], body.centre_m[2]) for body in objects]).reshape(-1, 2)
-        self._is_seen = np.array([body.id in so_far.seen_ids for body in objects], dtype=np.bool_)
-        self._moved = [
-            _MovedObject(objects[index], index)
-            for moved in relocations
-            if (index := index_of.get(moved.object_id)) is not None
-            and distance_to_box_m(moved.from_m, objects[index]) > STALE_MARGIN_M
-        ]
+        self._moved: list[_MovedObject] = []
+        self._enter(objects, (*so_far.pending, *relocations))
         self._stale: list[_StaleEntry] = []
         self._matched_before: set[str] = set()
         self._round = 0
         self.is_target_visible = False
         """True if the target is in a view of this round, at any distance."""
+
+    def _enter(self, objects: Sequence[SceneObject], relocations: Sequence[Relocation]) -> None:
+        """Take in a house and the moves that led to it; an object that moves again is to be found anew."""
+        self._objects = objects
+        self.bodies: dict[str, list[SceneObject]] = {}
+        """The bodies by category."""
+        for body in objects:
+            self.bodies.setdefault(body.category, []).append(body)
+        index_of = {body.id: index for index, body in enumerate(objects)}
+        self._target = index_of.get(self._target_id)
+        self._is_object = np.array([body.kind == "object" for body in objects], dtype=np.bool_)
+        self._ground_m = np.array([(body.centre_m[0], body.centre_m[2]) for body in objects]).reshape(-1, 2)
+        self._is_seen = np.array([body.id in self._so_far.seen_ids for body in objects], dtype=np.bool_)
+        origins_m: dict[str, Point3] = {}
+        for one in relocations:
+            origins_m.setdefault(one.object_id, one.from_m)
+        stays = [moved for moved in self._moved if moved.body.id not in origins_m and moved.body.id in index_of]
+        for moved in stays:
+            moved.index = index_of[moved.body.id]
+        self._moved = stays + [
+            _MovedObject(objects[index], index)
+            for object_id, from_m in origins_m.items()
+            if (index := index_of.get(object_id)) is not None
+            and distance_to_box_m(from_m, objects[index]) > STALE_MARGIN_M
+        ]
+
+    def change_house(self, objects: Sequence[SceneObject], relocations: Sequence[Relocation]) -> None:
+        """Take in that the house has changed during the stage: from here on, entries are judged by it.
+
+        Args:
+            objects: The simulator's bodies, in instance order.
+            relocations: The objects that it moved.
+        """
+        self._store_seen()
+        self._enter(objects, relocations)
+        self._matched_before -= {one.object_id for one in relocations}
 
     @property
     def is_target_seen(self) -> bool:
@@ -263,10 +289,13 @@ class StalenessTracker:
 
     def close(self, beliefs: Sequence[EntryBelief]) -> None:
         """Write the state that the next stage needs to `so_far`."""
+        self._store_seen()
+        self._so_far.beliefs = movable(beliefs)
+
+    def _store_seen(self) -> None:
         self._so_far.seen_ids.update(
             body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen
         )
-        self._so_far.beliefs = movable(beliefs)
 
     def stale_entries(self) -> tuple[StaleEntryRecord, ...]:
         """Return the entries that were stale at the start."""

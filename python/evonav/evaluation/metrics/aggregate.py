@@ -75,6 +75,7 @@ SUCCESS = (
     Measure("spl", "SPL", "%", _mean("spl")),
     Measure("ring_spl", "SPL to the radius", "%", _mean("ring_spl")),
     Measure("soft_spl", "SoftSPL", "%", _mean("soft_spl")),
+    Measure("spl_after_change", "SPL from a change during the stage on", "%", _mean("spl_after_change")),
     *(Measure(f"sr_{radius_m:g}m", f"success at {radius_m:g} m", "%", _radius(radius_m)) for radius_m in RADII_M),
 )
 STALENESS = (

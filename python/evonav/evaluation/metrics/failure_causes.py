@@ -93,6 +93,6 @@ def _cause_of_stop(record: StageRecord) -> FailureCause:
 
 
 def _is_target(record: StageRecord, entry: EntryRecord) -> bool:
-    x_m, _, z_m = record.target.position_m
+    x_m, _, z_m = record.target_m_at_end
     distance_m = math.dist((entry.centre_m[0], entry.centre_m[2]), (x_m, z_m))
     return not entry.is_stale and entry.label == record.target.category and distance_m <= NEAR_TARGET_M

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import stratum_of
+from evonav.evaluation.metrics.stage_metrics import during_stratum, stratum_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
@@ -204,7 +204,10 @@ def _effect_json(name: str, effect: PairedEffect) -> dict[str, Any]:
 
 def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
     splits: dict[str, list[StageRecord]] = defaultdict(list)
+    has_changes = any(record.during is not None for record in scored)
     for record in scored:
+        if has_changes:
+            splits[during_stratum(record)].append(record)
         splits[stratum_of(record)].append(record)
         if record.stage > 1:
             splits[record.transition.kind].append(record)

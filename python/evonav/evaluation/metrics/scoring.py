@@ -36,18 +36,21 @@ def score_stage(
     path_length_m: float,
     reference_length_m: float | None,
     success_radius_m: float = SUCCESS_RADIUS_M,
+    target_at_start_m: Point2 | None = None,
 ) -> StageScore:
     """Score a stage.
 
     Args:
         start_m: `(x, z)` where the agent began.
         end_m: `(x, z)` where the agent ended.
-        target_m: `(x, z)` of the target's centre.
+        target_m: `(x, z)` of the target's centre as the stage ended.
         path_length_m: Length of the path that the agent took.
         reference_length_m: Length L* of the planner's path from the start to the target; `None` if there is none.
         success_radius_m: The stage is a success closer than this.
+        target_at_start_m: `(x, z)` of the target's centre as the stage began, if it moved during the stage.
     """
-    start_distance_m, terminal_distance_m = math.dist(start_m, target_m), math.dist(end_m, target_m)
+    start_distance_m = math.dist(start_m, target_m if target_at_start_m is None else target_at_start_m)
+    terminal_distance_m = math.dist(end_m, target_m)
     is_success = terminal_distance_m < success_radius_m
     spl = soft_spl = None
     if reference_length_m is not None:

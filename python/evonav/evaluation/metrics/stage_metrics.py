@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.failure_causes import cause_of
+from evonav.evaluation.metrics.scoring import stage_spl
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
 from evonav.tasks.language import STRUCTURE_TYPES
@@ -138,8 +139,14 @@ class RecordMetrics:
     """The precision at the start, when the agent knows the goal: from stage 2 on it shows the cost of the change."""
     recall_at_start: float | None
 
+    during: str | None = None
+    """Effect of the change during the stage, a name of `DURING_STRATA`; `None` without a change in the task."""
+    spl_after_change: float | None = None
+    """SPL from the change during the stage on: the paths are those from the agent's place at the change."""
 
-_COPIED = tuple(field.name for field in fields(RecordMetrics) if field.name in {*StageRecord.model_fields} - {"state"})
+
+_OWN = {"state", "during"}
+_COPIED = tuple(field.name for field in fields(RecordMetrics) if field.name in {*StageRecord.model_fields} - _OWN)
 """The metrics that are fields of the record."""
 
 
@@ -184,8 +191,11 @@ def encode_metrics(record: StageRecord) -> str:
         record: The whole record, with its trace.
     """
     last = record.trace[-1].counters if record.trace else {}
+    measures = asdict(metrics_of(record))
+    if record.during is None:
+        del measures["during"], measures["spl_after_change"]  # as runs without changes during stages have them
     values = {
-        "measures": asdict(metrics_of(record)),
+        "measures": measures,
         "counters": {name: last[name] for name in COUNTERS if name in last}
         # Agents count failures from the first one on.
         | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
@@ -292,7 +302,21 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         num_entries_at_start=None if start is None else start.num_entries,
         precision_at_start=start.num_right / start.num_entries if start is not None and start.num_entries else None,
         recall_at_start=_recall(start),
+        during=None if record.during is None else during_stratum(record),
+        spl_after_change=_spl_after_change(record),
     )
+
+
+DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
+"""Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
+
+
+def during_stratum(record: StageRecord) -> str:
+    """Return the name in `DURING_STRATA` of what happened during a stage."""
+    during = record.during
+    if during is None or during.at_round is None:
+        return "unchanged_during"
+    return "target_moved_during" if during.is_target_relocated else "changed_during"
 
 
 def stratum_of(record: StageRecord) -> str:
@@ -300,6 +324,15 @@ def stratum_of(record: StageRecord) -> str:
     if record.stage == 1:
         return "stage_1"
     return "relocated" if record.target.is_relocated else "not_relocated"
+
+
+def _spl_after_change(record: StageRecord) -> float | None:
+    """Return the SPL of what followed the change during a stage, from the agent's place at the change."""
+    during = record.during
+    if during is None or during.reference_after_m is None or record.path_length_m is None or not record.is_scored:
+        return None
+    path_m = max(0.0, record.path_length_m - (during.path_before_m or 0.0))
+    return stage_spl(record.state is EndState.SUCCESS, path_m, during.reference_after_m)
 
 
 def _stored_metrics(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_StoredMetrics]:

@@ -1,8 +1,9 @@
 """Convert a task's oracle data to the parts of records that describe target and hidden change."""
 
-from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
+from evonav.evaluation.records.changes import DuringRecord, Relocation, TransitionRecord
+from evonav.evaluation.records.schema import TargetRecord
 from evonav.tasks import Task
-from evonav.tasks.oracle import OracleStage
+from evonav.tasks.oracle import Evolution, OracleStage
 
 
 def target_record(task: Task, stage: int) -> TargetRecord:
@@ -16,8 +17,8 @@ def target_record(task: Task, stage: int) -> TargetRecord:
     first_m = next(
         (
             change.from_position_m
-            for k in range(2, stage + 1)
-            for change in task.oracle(k).evolution.changes
+            for evolution in task.evolutions_before(stage)
+            for change in evolution.changes
             if change.id == target.id and change.is_relocated
         ),
         None,
@@ -33,9 +34,15 @@ def target_record(task: Task, stage: int) -> TargetRecord:
     )
 
 
-def transition_record(oracle: OracleStage) -> TransitionRecord:
-    """Return the hidden change before a stage."""
-    evolution = oracle.evolution
+def during_record(oracle: OracleStage) -> DuringRecord | None:
+    """Return the change during a stage as its record has it before the stage; `None` without one."""
+    if oracle.during is None:
+        return None
+    return DuringRecord(round=oracle.during.round, change=transition_record(oracle.during.evolution))
+
+
+def transition_record(evolution: Evolution) -> TransitionRecord:
+    """Return a hidden change."""
     is_evolved = evolution.outcome == "evolved"
     return TransitionRecord(
         mode=evolution.mode if is_evolved else None,

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from evonav.evaluation.records.base import BeliefRecord, Point2, Point3, Real, Record, Whole
+from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
@@ -126,40 +127,6 @@ class TargetRecord(Record):
     """Moved in the transition just before this stage."""
     first_position_m: Point3 | None = None
     """Its place in stage 1, if `is_relocated`."""
-
-
-class Relocation(Record):
-    """One object moved in a transition. Oracle."""
-
-    object_id: str
-    category: str
-    from_m: Point3
-    to_m: Point3
-
-
-class TransitionRecord(Record):
-    """The change between the previous stage and this one. Oracle."""
-
-    mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
-    """`None` when the paper's process changed nothing."""
-    room_id: str | None = None
-    is_agent_in_room: bool = False
-    """True if the agent stands in the evolved room at the start of the stage."""
-    relocations: tuple[Relocation, ...] = ()
-    num_added: Whole = 0
-    """Objects that an extension added. The two fields below are of extensions, too."""
-    num_removed: Whole = 0
-    num_states: Whole = 0
-    """Doors and objects that opened, closed, or went on or off."""
-
-    @property
-    def kind(self) -> str:
-        """The mode in lower case, `activities` where people moved things, `extensions` where others did, `static`."""
-        if self.mode is not None:
-            return self.mode.lower()
-        if self.relocations:
-            return "activities"
-        return "extensions" if self.num_added or self.num_removed or self.num_states else "static"
 
 
 class EntryRecord(Record):
@@ -281,6 +248,8 @@ class StageRecord(Record):
     goal: GoalRecord
     target: TargetRecord
     transition: TransitionRecord
+    during: DuringRecord | None = None
+    """`None`, and left out of the JSON, for a task without a change during the stage."""
 
     requested_start: PoseRecord | None = None
     """The pose carried over (stage 1: the manifest's)."""
@@ -333,12 +302,19 @@ class StageRecord(Record):
         """True if the stage counts in rates."""
         return self.state.is_scored
 
+    @property
+    def target_m_at_end(self) -> Point3:
+        """The target's position as the stage ends, by which success is judged."""
+        during = self.during
+        return self.target.position_m if during is None or not during.target_position_m else during.target_position_m
+
     @model_serializer(mode="wrap")
     def _without_untold(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is newer than the records of agents that do not tell it."""
+        """Leave out what is newer than the records of agents and tasks that do not have it."""
         values: dict[str, Any] = handler(self)
-        if self.belief_at_start is None:
-            del values["belief_at_start"]
+        for name in ("belief_at_start", "during"):
+            if values[name] is None:
+                del values[name]
         return values
 
 

@@ -235,6 +235,9 @@ class _Heartbeat:
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
         self._on_round()
 
+    def house_changes(self, simulator: Simulator) -> None:
+        pass
+
     def round_begins(self, observation: Observation) -> None:
         pass
 

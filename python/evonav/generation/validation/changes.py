@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, get_args
 from evonav.generation.validation.problems import ProblemKind
 from evonav.house import House
 from evonav.tasks.manifest import Task
-from evonav.tasks.oracle import Change, Mode, ObjectRecord, OracleStage
+from evonav.tasks.oracle import Change, Evolution, Mode, ObjectRecord
 
 MODES = frozenset(get_args(Mode))
 SAME_M = 1e-6
@@ -41,16 +41,15 @@ def entries_of(document: dict[str, Any]) -> dict[str, Entry]:
     return found
 
 
-def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleStage, rooms: House) -> Iterator[Found]:
-    """Yield the differences between a stage's change record and the change between its house and the one before.
+def check_changes(before: dict[str, Any], after: dict[str, Any], evolution: Evolution, rooms: House) -> Iterator[Found]:
+    """Yield the differences between the record of a change and the houses before and after it.
 
     Args:
-        before: House of the stage before, JSON.
-        after: House of the stage, JSON.
-        oracle: The stage's record.
+        before: House before the change, JSON.
+        after: House after it, JSON.
+        evolution: The record.
         rooms: House of the stage, for its rooms.
     """
-    evolution = oracle.evolution
     old, new = entries_of(before), entries_of(after)
     moved = {i for i in old.keys() & new.keys() if old[i][:3] != new[i][:3]}
     yield from _same_ids("changes", [change.id for change in evolution.changes], moved)
@@ -60,10 +59,10 @@ def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleS
         if change.id in moved:
             yield from _check_poses(change, old[change.id], new[change.id])
         if change.cause in MODES:
-            yield from _check_room(change, oracle, rooms)
+            yield from _check_room(change, evolution, rooms)
     yield from _check_objects("additions", evolution.additions, new)
     yield from _check_objects("removals", evolution.removals, old)
-    yield from _check_states(before, after, old, new, oracle)
+    yield from _check_states(before, after, old, new, evolution)
     causes = {change.cause for change in evolution.changes}
     if (evolution.outcome == "evolved") != bool(causes):
         yield "change_record", f"outcome is {evolution.outcome!r}, causes of the changes are {sorted(map(str, causes))}"
@@ -74,15 +73,10 @@ def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleS
 def check_relocation(task: Task, stage: int) -> Iterator[Found]:
     """Check displacements and the objects relocated so far."""
     oracle = task.oracle(stage)
-    for change in oracle.evolution.changes:
-        distance_m = math.dist(change.from_position_m, change.to_position_m)
-        if abs(distance_m - change.displacement_m) > SAME_M:
-            yield "relocation", f"{change.id}: displacement_m is {change.displacement_m}, moved {distance_m}"
-        is_far = distance_m > task.header.parameters.relocated_min_m
-        if change.is_relocated != (is_far or change.from_support_id != change.to_support_id):
-            yield "relocation", f"{change.id}: is_relocated is {change.is_relocated}, moved {distance_m:.4f} m"
-    ever = {i for earlier in task.oracle_stages[:stage] for i in earlier.evolution.relocated_ids}
-    removed = {one.id for earlier in task.oracle_stages[:stage] for one in earlier.evolution.removals}
+    yield from check_displacements(oracle.evolution, task.header.parameters.relocated_min_m)
+    evolutions = task.evolutions_before(stage)
+    ever = {i for earlier in evolutions for i in earlier.relocated_ids}
+    removed = {one.id for earlier in evolutions for one in earlier.removals}
     recorded = oracle.ever_relocated_ids
     if set(recorded) - removed != ever - removed or list(recorded) != sorted(set(recorded)):
         differing = sorted((set(recorded) ^ ever) - removed)
@@ -90,6 +84,17 @@ def check_relocation(task: Task, stage: int) -> Iterator[Found]:
     for name, expected in (("now", oracle.evolution.relocated_ids), ("ever", ever)):
         if getattr(oracle.target, f"is_relocated_{name}") != (oracle.target.id in expected):
             yield "relocation", f"target.is_relocated_{name} does not agree with the changes"
+
+
+def check_displacements(evolution: Evolution, relocated_min_m: float) -> Iterator[Found]:
+    """Check the lengths of moves, and which of them count as relocations."""
+    for change in evolution.changes:
+        distance_m = math.dist(change.from_position_m, change.to_position_m)
+        if abs(distance_m - change.displacement_m) > SAME_M:
+            yield "relocation", f"{change.id}: displacement_m is {change.displacement_m}, moved {distance_m}"
+        is_far = distance_m > relocated_min_m
+        if change.is_relocated != (is_far or change.from_support_id != change.to_support_id):
+            yield "relocation", f"{change.id}: is_relocated is {change.is_relocated}, moved {distance_m:.4f} m"
 
 
 def _same_ids(name: str, recorded: list[str], found: set[str]) -> Iterator[Found]:
@@ -109,11 +114,11 @@ def _check_poses(change: Change, old: Entry, new: Entry) -> Iterator[Found]:
                 yield "change_record", f"{change.id}: {side}_{field} is {recorded}, in the house {found}"
 
 
-def _check_room(change: Change, oracle: OracleStage, rooms: House) -> Iterator[Found]:
+def _check_room(change: Change, evolution: Evolution, rooms: House) -> Iterator[Found]:
     for name, (x_m, _, z_m) in (("from", change.from_position_m), ("to", change.to_position_m)):
         room = rooms.room_of(x_m, z_m)
-        if room != oracle.evolution.room_id:
-            yield "change_record", f"{change.id}: moved {name} {room}, while {oracle.evolution.room_id} evolves"
+        if room != evolution.room_id:
+            yield "change_record", f"{change.id}: moved {name} {room}, while {evolution.room_id} evolves"
 
 
 def _check_objects(name: str, recorded: tuple[ObjectRecord, ...], house: dict[str, Entry]) -> Iterator[Found]:
@@ -130,10 +135,10 @@ def _check_states(
     after: dict[str, Any],
     old: dict[str, Entry],
     new: dict[str, Entry],
-    oracle: OracleStage,
+    evolution: Evolution,
 ) -> Iterator[Found]:
     """Check that exactly the fields of the state record have changed, apart from poses."""
-    recorded = {(state.id, state.field): state for state in oracle.evolution.states}
+    recorded = {(state.id, state.field): state for state in evolution.states}
     pairs = [(i, old[i].rest, new[i].rest) for i in old.keys() & new.keys()]
     doors_before, doors_after = (
         {str(door["id"]): door for door in house.get("doors", [])} for house in (before, after)

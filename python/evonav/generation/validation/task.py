@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import EvonavError
-from evonav.generation.validation.changes import Found, check_changes, check_relocation
+from evonav.generation.validation.changes import Found, check_changes, check_displacements, check_relocation
 from evonav.generation.validation.integrity import leaks, read_all
 from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.world import (
+    check_moved_target,
     check_path,
     check_physics,
     check_reference,
@@ -21,6 +22,7 @@ from evonav.generation.validation.world import (
 )
 from evonav.house import House
 from evonav.tasks.manifest import Task
+from evonav.tasks.oracle import DuringRecord
 
 
 def validate_files(root: Path | str, *, allow_unknown_assets: bool = False) -> Report:
@@ -80,12 +82,12 @@ class _TaskCheck:
         document = self._document(stage)
         self.add(stage, (("leak", detail) for detail in leaks(task, stage, document)))
         house = self._house(stage)
-        is_changed = stage > 1 and task.house_json(stage) != task.house_json(stage - 1)
-        before = self._document(stage - 1) if stage > 1 else document
-        self.add(stage, check_changes(before, document, oracle, house))
+        before_json = task.house_json_at_end(stage - 1) if stage > 1 else task.house_json(stage)
+        is_changed = task.house_json(stage) != before_json
+        self.add(stage, check_changes(_document_of(before_json), document, oracle.evolution, house))
         self.add(stage, check_relocation(task, stage))
         self.add(stage, check_state(task, stage, house))
-        rooms_before = rooms_reached(house, simulator, oracle) if is_changed else set()
+        rooms_before = rooms_reached(house, simulator, oracle.start_pose) if is_changed else set()
         if is_changed or stage == 1:
             simulator.reset(task.house_json(stage), name=f"stage {stage}")
             found = check_physics(self._house(1), house, self.source_counts, allow_unknown_assets=self._allow)
@@ -94,8 +96,28 @@ class _TaskCheck:
         self.add(stage, check_reference(task, stage, house, simulator))
         self.add(stage, check_path(oracle, simulator))
         if is_changed:
-            cut_off = sorted(rooms_before - rooms_reached(house, simulator, oracle))
+            cut_off = sorted(rooms_before - rooms_reached(house, simulator, oracle.start_pose))
             self.add(stage, (("room_cut_off", f"{room} can no longer be reached") for room in cut_off))
+        if oracle.during is not None:
+            self._check_during(stage, oracle.during)
+
+    def _check_during(self, stage: int, during: DuringRecord) -> None:
+        """Check the change during a stage; the simulator holds the stage's house, and the changed one afterwards."""
+        task, oracle, simulator = self.task, self.task.oracle(stage), self._simulator
+        parameters = task.header.parameters
+        house_json = task.house_json_at_end(stage)
+        house = House(house_json, name=f"end of stage {stage}")
+        self.add(stage, check_changes(self._document(stage), _document_of(house_json), during.evolution, house))
+        self.add(stage, check_displacements(during.evolution, parameters.relocated_min_m))
+        if stage in task.guided_stages:
+            self.add(stage, [("contradiction", "the house changes during a guided stage")])
+        rooms_before = rooms_reached(house, simulator, oracle.reference_pose)
+        simulator.reset(house_json, name=f"end of stage {stage}")
+        found = check_physics(self._house(1), house, self.source_counts, allow_unknown_assets=self._allow)
+        self.add(stage, found)
+        self.add(stage, check_moved_target(oracle, during, parameters, house, simulator))
+        cut_off = sorted(rooms_before - rooms_reached(house, simulator, oracle.reference_pose))
+        self.add(stage, (("room_cut_off", f"{room} can no longer be reached") for room in cut_off))
 
     def _house(self, stage: int) -> House:
         if stage not in self._houses:
@@ -104,8 +126,12 @@ class _TaskCheck:
 
     def _document(self, stage: int) -> dict[str, Any]:
         if stage not in self._documents:
-            document = json.loads(self.task.house_json(stage))
-            if not isinstance(document, dict):
-                raise TypeError(f"expected an object, found {type(document).__name__}")
-            self._documents[stage] = document
+            self._documents[stage] = _document_of(self.task.house_json(stage))
         return self._documents[stage]
+
+
+def _document_of(house_json: str) -> dict[str, Any]:
+    document = json.loads(house_json)
+    if not isinstance(document, dict):
+        raise TypeError(f"expected an object, found {type(document).__name__}")
+    return document

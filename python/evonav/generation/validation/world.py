@@ -13,10 +13,11 @@ from evonav.generation.validation.changes import Found
 from evonav.generation.validation.problems import ProblemKind
 from evonav.house import House, HouseObject
 from evonav.tasks.manifest import Task
-from evonav.tasks.oracle import OracleStage
-from evonav.tasks.records import Point2
+from evonav.tasks.oracle import DuringRecord, OracleStage
+from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.records import Point2, Point3, PoseRecord
 from evonav.world.embedded import EmbeddedSimulator
-from evonav.world.simulator import SceneObject, SimulatorConfig
+from evonav.world.simulator import Frame, SceneObject, SimulatorConfig
 
 TOUCH_M = 0.0025
 """Largest depth of touching bodies; generation allows 2 mm and rounds positions to 0.1 mm."""
@@ -99,35 +100,86 @@ def _hangs(entry: HouseObject, body: SceneObject) -> bool:
 
 def check_reference(task: Task, stage: int, house: House, simulator: EmbeddedSimulator) -> Iterator[Found]:
     """Check the reference pose and the view from it; the simulator holds the stage's house."""
-    oracle, parameters = task.oracle(stage), task.header.parameters
-    pose = oracle.reference_pose
-    x_m, _, z_m = pose.position_m
-    dx_m, dz_m = oracle.target.position_m[0] - x_m, oracle.target.position_m[2] - z_m
-    distance_m = math.hypot(dx_m, dz_m)
-    if not parameters.reference_min_m - SAME_M <= distance_m <= parameters.reference_max_m + SAME_M:
-        yield "reference_pose", f"{distance_m:.4f} m from the target"
-    off_deg = (math.degrees(math.atan2(dx_m, dz_m)) - pose.yaw_deg + 180.0) % 360.0 - 180.0
-    if abs(off_deg) > 0.5 + SAME_M or pose.horizon_deg != HORIZON_DEG:
-        yield "reference_pose", f"looks {off_deg:.2f} degrees past the target, horizon {pose.horizon_deg} degrees"
-    if house.room_of(x_m, z_m) != oracle.target.room_id:
-        yield "reference_pose", f"in room {house.room_of(x_m, z_m)}, the target in {oracle.target.room_id}"
-    if not simulator.can_move((x_m, z_m), (x_m, z_m)):
-        yield "reference_pose", "the agent does not fit there"
+    oracle, pose = task.oracle(stage), task.oracle(stage).reference_pose
+    parameters, room_id = task.header.parameters, oracle.target.room_id
+    yield from _check_pose(pose, oracle.target.position_m, room_id, parameters, house, simulator)
     if not simulator.is_free(oracle.start_pose.position_m):
         yield "start_cut_off", "no path between the stage's start and the house's own, where simulators begin"
     frame = simulator.render(pose.pose())
-    ids = [one.id if one.kind == "object" else None for one in simulator.objects]
-    if frame.instances is None or frame.rgb is None or oracle.target.id not in ids:
+    if frame.rgb is None or oracle.target.id not in (one.id for one in simulator.objects):
         return
-    visible_px = int(np.count_nonzero(frame.instances == ids.index(oracle.target.id) + 1))
-    if visible_px != oracle.reference_visible_px or visible_px < parameters.reference_min_visible_px:
-        yield "visibility", f"{visible_px} pixels of the target, recorded {oracle.reference_visible_px}"
+    yield from _check_visible(frame, oracle.target.id, oracle.reference_visible_px, parameters, simulator)
     control = task.header.control
     if control is not None and stage <= len(control.shown_goals) and control.shown_goals[stage - 1] != stage:
         return  # the agent is shown the image of an earlier stage, which is compared with the files
     differing = int(np.count_nonzero((frame.rgb != task.reference_images[stage - 1]).any(axis=2)))
     if differing:
         yield "reference_image", f"{differing} pixels differ from the view there"
+
+
+def check_moved_target(
+    oracle: OracleStage,
+    during: DuringRecord,
+    parameters: GenerationParameters,
+    house: House,
+    simulator: EmbeddedSimulator,
+) -> Iterator[Found]:
+    """Check the target after a change during a stage, in the simulator of the changed house: it can still be found."""
+    entry = next((one for one in house.objects if one.id == oracle.target.id), None)
+    if entry is None:
+        yield "target", f"{oracle.target.id} is no longer in the house after the change during the stage"
+        return
+    fields = {
+        "target_position_m": (during.target_position_m, entry.position_m),
+        "target_support_id": (during.target_support_id, entry.parent_id),
+        "is_target_relocated": (during.is_target_relocated, oracle.target.id in during.evolution.relocated_ids),
+    }
+    for field, (recorded, found) in fields.items():
+        if recorded != found:
+            yield "target", f"during.{field} is {recorded}, in the house {found}"
+    pose, (x_m, _, z_m) = during.reference_pose, entry.position_m
+    yield from _check_pose(pose, during.target_position_m, house.room_of(x_m, z_m), parameters, house, simulator)
+    frame = simulator.render(pose.pose(), rgb=False)
+    yield from _check_visible(frame, oracle.target.id, during.reference_visible_px, parameters, simulator)
+    if not simulator.is_free(oracle.reference_pose.position_m):
+        yield "start_cut_off", "the change during the stage cuts off the reference pose, where the next stage starts"
+    if not simulator.is_free(pose.position_m):
+        yield "reference_pose", "the target can no longer be reached after the change during the stage"
+
+
+def _check_pose(
+    pose: PoseRecord,
+    target_m: Point3,
+    room_id: str | None,
+    parameters: GenerationParameters,
+    house: House,
+    simulator: EmbeddedSimulator,
+) -> Iterator[Found]:
+    """Check that a pose is one from which a reference view of a target may be taken."""
+    x_m, _, z_m = pose.position_m
+    dx_m, dz_m = target_m[0] - x_m, target_m[2] - z_m
+    distance_m = math.hypot(dx_m, dz_m)
+    if not parameters.reference_min_m - SAME_M <= distance_m <= parameters.reference_max_m + SAME_M:
+        yield "reference_pose", f"{distance_m:.4f} m from the target"
+    off_deg = (math.degrees(math.atan2(dx_m, dz_m)) - pose.yaw_deg + 180.0) % 360.0 - 180.0
+    if abs(off_deg) > 0.5 + SAME_M or pose.horizon_deg != HORIZON_DEG:
+        yield "reference_pose", f"looks {off_deg:.2f} degrees past the target, horizon {pose.horizon_deg} degrees"
+    if house.room_of(x_m, z_m) != room_id:
+        yield "reference_pose", f"in room {house.room_of(x_m, z_m)}, the target in {room_id}"
+    if not simulator.can_move((x_m, z_m), (x_m, z_m)):
+        yield "reference_pose", "the agent does not fit there"
+
+
+def _check_visible(
+    frame: Frame, target_id: str, recorded_px: int, parameters: GenerationParameters, simulator: EmbeddedSimulator
+) -> Iterator[Found]:
+    """Check the number of the target's pixels in a view."""
+    ids = [one.id if one.kind == "object" else None for one in simulator.objects]
+    if frame.instances is None or target_id not in ids:
+        return
+    visible_px = int(np.count_nonzero(frame.instances == ids.index(target_id) + 1))
+    if visible_px != recorded_px or visible_px < parameters.reference_min_visible_px:
+        yield "visibility", f"{visible_px} pixels of the target, recorded {recorded_px}"
 
 
 def check_path(oracle: OracleStage, simulator: EmbeddedSimulator) -> Iterator[Found]:
@@ -148,9 +200,9 @@ def check_path(oracle: OracleStage, simulator: EmbeddedSimulator) -> Iterator[Fo
         yield "path", f"the shortest path is {found_m} m long, recorded {recorded_m}"
 
 
-def rooms_reached(house: House, simulator: EmbeddedSimulator, oracle: OracleStage) -> set[str]:
-    """Return the rooms with a position that the agent can reach from a stage's start."""
-    if not simulator.teleport(oracle.start_pose.pose()):
+def rooms_reached(house: House, simulator: EmbeddedSimulator, start: PoseRecord) -> set[str]:
+    """Return the rooms with a position that the agent can reach from a pose."""
+    if not simulator.teleport(start.pose()):
         return set()
     positions = simulator.reachable_positions()
     return {room for x_m, _, z_m in positions.tolist() if (room := house.room_of(x_m, z_m)) is not None}
@@ -166,7 +218,7 @@ def check_state(task: Task, stage: int, house: House) -> Iterator[Found]:
     visited = {house.room_of(first[0], first[2])}
     for before in earlier:
         visited |= {house.room_of(*point) for point in _points_along(before.reference_path_m)}
-    transitions = [one.evolution for one in task.oracle_stages[1:stage]]
+    transitions = task.evolutions_before(stage)[1:]
     changed = [one.room_id if one.outcome == "evolved" else None for one in transitions]
     start = oracle.start_pose.position_m
     state = oracle.state

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 from evonav.drawing.floor_plan import Frame, distance_m, furniture
 from evonav.drawing.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
+from evonav.evaluation.records.changes import Relocation
 from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     FloorPlan,
     ObjectFootprint,
-    Relocation,
     RoundRecord,
     StageRecord,
     TargetRecord,

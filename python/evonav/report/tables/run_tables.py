@@ -7,6 +7,7 @@ from typing import Literal
 from evonav.counted import counted
 from evonav.evaluation.metrics.belief import belief_summary
 from evonav.evaluation.metrics.navigation import AgentSummary
+from evonav.evaluation.metrics.stage_metrics import DURING_STRATA
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
@@ -25,12 +26,19 @@ def run_tables(run: RecordedRun) -> list[tables.Table]:
         tables.stage_table(records),
         tables.relocation_table(run.summaries),
         tables.mode_table(run.summaries),
+        *_during_tables(run),
         tables.cause_table(run.cause_counts()),
         effort_table(run),
         belief_table(run),
         failure_table(run),
         *(breakdown_table(one) for one in run_breakdowns(run)),
     ]
+
+
+def _during_tables(run: RecordedRun) -> list[tables.Table]:
+    """Return the table of SR by what changed during the stage, if the run's tasks have such changes."""
+    has_changes = any(name in summary.splits for summary in run.summaries for name in DURING_STRATA)
+    return [tables.during_table(run.summaries)] if has_changes else []
 
 
 def effort_table(run: RecordedRun) -> tables.Table:

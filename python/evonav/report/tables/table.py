@@ -19,6 +19,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
+from evonav.evaluation.metrics.stage_metrics import DURING_STRATA
 from evonav.evaluation.records.schema import StageRecord
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
@@ -182,6 +183,9 @@ SPLIT_TITLES = {
     "stage_1": "stage 1",
     "relocated": "moved",
     "not_relocated": "not moved",
+    "target_moved_during": "target moved during the stage",
+    "changed_during": "other things did",
+    "unchanged_during": "nothing did",
     **MODES,
 }
 """The splits of `AgentSummary`, in reading order."""
@@ -192,6 +196,12 @@ def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
     names = ("stage_1", "relocated", "not_relocated")
     note = "Moved: the target had moved since stage 1, at any time. Both columns are of stages 2 and later."
     return _split_table("By whether the target moved", summaries, names, (note,))
+
+
+def during_table(summaries: Sequence[AgentSummary]) -> Table:
+    """Build the table of SR by what changed during the stage; without columns if no task has such changes."""
+    note = "A change during the stage that had not come when the agent stopped is no change during it."
+    return _split_table("By change during the stage", summaries, DURING_STRATA, (note,))
 
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:

@@ -104,7 +104,7 @@ def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     ghosts = furniture(old, frame, "items ghost")
     plan = _plan(drawing, stage, evolution, frame, {"moved": moved - added, "new": added}, ghosts)
     arrows = relocation_arrows(
-        transition_record(oracle).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
+        transition_record(oracle.evolution).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
     )
     return f'{plan}<g class="change">{arrows}</g>{target_mark(target_record(drawing.task, stage), frame)}'
 
@@ -144,7 +144,10 @@ def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
     moved = {change.id for change in oracle.evolution.changes}
     large = [item for item in stage_map.objects if max(item.size_m[0], item.size_m[2]) >= THUMBNAIL_MIN_M]
     arrows = relocation_arrows(
-        transition_record(oracle).relocations, frame, stage_map=stage_map, previous_map=drawing.maps.get(stage - 1)
+        transition_record(oracle.evolution).relocations,
+        frame,
+        stage_map=stage_map,
+        previous_map=drawing.maps.get(stage - 1),
     )
     return join(
         [

@@ -42,6 +42,10 @@ def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, st
     if oracle.rejections:
         refused = [f"{nouns.get(item.id, item.id)} ({item.reason.replace('_', ' ')})" for item in oracle.rejections]
         facts.append(("goals refused", ", ".join(refused)))
+    if oracle.during is not None:
+        where = "the target moves" if oracle.during.is_target_relocated else "the target stays"
+        sentence = change_sentence(stage_map, oracle.during.evolution)
+        facts.append((f"during the stage, round {oracle.during.round}", f"{sentence} {where.capitalize()}."))
     for name, ids in _lists(evolution):
         if ids:
             facts.append((name, ", ".join(f"{nouns.get(i, '')} {i}".strip() for i in ids)))

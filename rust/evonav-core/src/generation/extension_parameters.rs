@@ -1,5 +1,6 @@
 //! Parameters of the extensions beyond the paper: objects that appear and vanish, doors and
-//! furniture that open and close, lights, and people with daily schedules. All are off by default.
+//! furniture that open and close, lights, people with daily schedules, and changes during a stage.
+//! All are off by default.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,9 @@ pub struct Extensions {
     pub switches: Option<Occurrence>,
     /// People who use objects; they replace the paper's independent draws of rooms.
     pub schedule: Option<Schedule>,
+    /// Changes during a stage. The key is absent from files of tasks without them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub during_stage: Option<DuringStage>,
 }
 
 /// The frequency and extent of a process at transitions.
@@ -45,6 +49,19 @@ pub struct Schedule {
     pub tidiness: f64,
 }
 
+/// Frequency of changes during a stage, and their rounds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DuringStage {
+    /// Probability that the house changes during a stage.
+    pub probability: f64,
+    /// First and last decision round, from 0, in which it may change; the round is uniform.
+    pub rounds: [usize; 2],
+}
+
+/// Number of decision rounds of a stage (paper, Sec. C.1).
+const MAX_ROUNDS: usize = 50;
+
 impl Extensions {
     /// Check every value.
     ///
@@ -53,7 +70,7 @@ impl Extensions {
     pub fn check(&self) -> Result<(), Error> {
         let is_probability = |value: f64| (0.0..=1.0).contains(&value);
         let is_count = |value: usize| (1..=64).contains(&value);
-        let Self { insertion, removal, doors, openables, switches, schedule } = self;
+        let Self { insertion, removal, doors, openables, switches, schedule, during_stage } = self;
         for (names, occurrence) in [
             (["extensions.insertion.probability", "extensions.insertion.max_count"], insertion),
             (["extensions.removal.probability", "extensions.removal.max_count"], removal),
@@ -73,6 +90,19 @@ impl Extensions {
             let is_time = |v| (1..=10_080).contains(&v);
             Error::require(name, minutes_between_stages, "in 1..=10080", is_time)?;
             Error::require("extensions.schedule.tidiness", tidiness, "in 0..=1", is_probability)?;
+        }
+        if let Some(DuringStage { probability, rounds: [first, last] }) = *during_stage {
+            let name = "extensions.during_stage.probability";
+            Error::require(name, probability, "in 0..=1", is_probability)?;
+            let name = "extensions.during_stage.rounds[0]";
+            Error::require(name, first, "in 1..=49", |v| (1..MAX_ROUNDS).contains(&v))?;
+            let name = "extensions.during_stage.rounds[1]";
+            let is_later = |v| (first..MAX_ROUNDS).contains(&v);
+            Error::require(name, last, "in rounds[0]..=49", is_later)?;
+            if schedule.is_some() {
+                let expected = "no schedule beside it: a schedule has no times within a stage";
+                return Err(Error::invalid("extensions.during_stage", "on", expected));
+            }
         }
         Ok(())
     }

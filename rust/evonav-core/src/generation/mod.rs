@@ -16,7 +16,7 @@ pub use algorithm::{
     evolved_room::{evolved_room_weight, sample_evolved_room},
     goal::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores},
 };
-pub use extension_parameters::{Extensions, Occurrence, Schedule};
+pub use extension_parameters::{DuringStage, Extensions, Occurrence, Schedule};
 pub use mode::Mode;
 pub use overrides::{Overrides, StageOverrides};
 pub use parameters::Parameters;

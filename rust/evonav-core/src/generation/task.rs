@@ -9,7 +9,10 @@ use crate::{
     assets::{Catalogue, UnknownAssets},
     generation::{
         Extensions, Overrides, Parameters,
-        algorithm::{scene_evolution::sample_scene_evolution, stage_task::sample_stage_task},
+        algorithm::{
+            during_stage::change_during_stage, scene_evolution::sample_scene_evolution,
+            stage_task::sample_stage_task,
+        },
         extensions::{schedule::Household, transition::Transition},
         record::{
             EvolutionOutcome, EvolutionRecord, GeneratedStage, GeneratedTask, RejectReason,
@@ -77,7 +80,8 @@ pub fn generate_task(
         return Ok(reject(RejectReason::TooFewRooms, 0, detail));
     }
     let frame = RefCell::default();
-    let generator = Generator { catalogue, seed, label, parameters, overrides, frame };
+    let generator =
+        Generator { catalogue, seed, label, parameters, overrides, frame, during: None };
     let choices = &parameters.num_stages;
     let drawn = generator.stream(0, "num_stages").below(choices.len());
     let num_stages = match overrides.stages.len() {
@@ -110,7 +114,7 @@ pub fn generate_task(
         if stage > 1 {
             world = transition.extend(world, &mut evolution)?;
         }
-        state.note_evolution(&evolution, &world.house, stage);
+        state.note_evolution(&evolution, &world.house);
         let made = match sample_stage_task(&generator, &world, &state, &evolution, stage)? {
             Ok(made) => made,
             Err(rejected) => return Ok(Generation::Rejected(rejected)),
@@ -134,8 +138,16 @@ pub fn generate_task(
             reference_path_length_m: length_m(&reference.path_m),
             reference_path_m: reference.path_m.clone(),
             ever_relocated_ids: state.relocated.iter().cloned().collect(),
+            during: None,
         });
         state.note_stage(&world, &reference, target.room);
+        let changed =
+            change_during_stage(&generator, unknown, &world, &state, stage, target.index)?;
+        if let (Some((record, next)), Some(stage)) = (changed, task.stages.last_mut()) {
+            state.note_evolution(&record.evolution, &next.house);
+            stage.during = Some(record);
+            world = next;
+        }
     }
     Ok(Generation::Task(task))
 }

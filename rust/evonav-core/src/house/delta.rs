@@ -1,6 +1,6 @@
 //! Changes between two stages of a house.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -94,6 +94,25 @@ impl HouseDelta {
     pub fn is_empty(&self) -> bool {
         let Self { moves, removed, added, states } = self;
         moves.is_empty() && removed.is_empty() && added.is_empty() && states.is_empty()
+    }
+
+    /// Iterate over the ids of all that changes, in the order in which it is applied.
+    pub fn ids(&self) -> impl Iterator<Item = &String> {
+        let Self { moves, removed, added, states } = self;
+        let moved = moves.iter().map(|change| &change.id);
+        let added = added.iter().map(|object| &object.id);
+        moved.chain(removed).chain(added).chain(states.iter().map(|change| &change.id))
+    }
+
+    /// Return the delta without the changes of some objects and doors.
+    #[must_use]
+    pub fn without(&self, ids: &BTreeSet<String>) -> Self {
+        let mut rest = self.clone();
+        rest.moves.retain(|change| !ids.contains(&change.id));
+        rest.removed.retain(|id| !ids.contains(id));
+        rest.added.retain(|object| !ids.contains(&object.id));
+        rest.states.retain(|change| !ids.contains(&change.id));
+        rest
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod actions;
 pub mod batch;
 pub mod batch_slot;
+mod change_around;
 mod embedded;
 pub mod geodesic_field;
 

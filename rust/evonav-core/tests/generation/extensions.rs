@@ -39,6 +39,7 @@ fn all_on() -> Extensions {
         openables: OFTEN,
         switches: OFTEN,
         schedule: None,
+        during_stage: None,
     }
 }
 
@@ -194,6 +195,7 @@ fn extensions_that_never_happen_change_nothing() {
         openables: never,
         switches: never,
         schedule: None,
+        during_stage: None,
     };
     for house in houses() {
         for seed in 0..4 {

@@ -121,6 +121,23 @@ impl PyEmbeddedSimulator {
         py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
     }
 
+    /// Return the house after a change around an agent, as JSON, and the ids of what stays.
+    #[pyo3(signature = (delta_json, *, agent_m, target_id))]
+    fn change_around(
+        &self,
+        py: Python<'_>,
+        delta_json: &str,
+        agent_m: Vec2,
+        target_id: &str,
+    ) -> PyResult<(String, Vec<String>)> {
+        py.detach(|| {
+            let delta = HouseDelta::from_json(delta_json)?;
+            let (after, skipped) = self.core.change_around(&delta, agent_m, target_id)?;
+            Ok((after.house().to_json(), skipped))
+        })
+        .map_err(error::to_py)
+    }
+
     /// Return the same house in a random look (a list of changes, JSON).
     #[pyo3(signature = (changes_json, *, are_checked))]
     fn with_look(&self, py: Python<'_>, changes_json: &str, are_checked: bool) -> PyResult<Self> {

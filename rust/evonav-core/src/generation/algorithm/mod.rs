@@ -1,5 +1,6 @@
 //! The steps of Algorithm 1 (paper, Sec. 3.2 and A.1).
 
+pub mod during_stage;
 pub mod evolved_room;
 pub mod goal;
 pub mod room_modification;

@@ -6,9 +6,9 @@ use crate::{
     generation::{
         Mode, RoomHistory,
         algorithm::room_modification::{Modification, Modifier, UnmovedReason},
+        evolved_room_weight,
         placement::reach::Reach,
         record::{EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord},
-        sample_evolved_room,
         stage::{
             changes::changes_of, generation_state::State, generator::Generator,
             stage_world::StageWorld,
@@ -18,15 +18,20 @@ use crate::{
 };
 
 /// Sample the evolution before a stage (`SampleSceneEvolution`): the room, the mode and the moves.
+///
+/// During a stage, any room may change, and the target's has `changed_room_multiplier` times its
+/// weight.
 pub(crate) fn sample_scene_evolution(
     generator: &Generator<'_>,
     world: &StageWorld,
     state: &State,
     stage: usize,
 ) -> Result<(EvolutionRecord, HouseDelta), Error> {
-    let parameters = generator.parameters;
+    let (parameters, during) = (generator.parameters, generator.during);
     let is_drawn = || generator.stream(stage, "trigger").uniform() < parameters.evolve_probability;
-    if !generator.overrides.is_evolved(stage).unwrap_or_else(is_drawn) {
+    let is_given =
+        if during.is_some() { Some(true) } else { generator.overrides.is_evolved(stage) };
+    if !is_given.unwrap_or_else(is_drawn) {
         return Ok((
             EvolutionRecord::unchanged(EvolutionOutcome::NotTriggered),
             HouseDelta::default(),
@@ -38,12 +43,17 @@ pub(crate) fn sample_scene_evolution(
         .map(|room| RoomHistory {
             num_assets: house.objects.iter().filter(|o| o.room == Some(room)).count(),
             is_visited: state.visited[room],
-            is_transition_room: state.transition_room(house) == Some(room),
+            // During a stage, the generator does not know in which room the agent is.
+            is_transition_room: during.is_none() && state.transition_room(house) == Some(room),
             was_changed_recently: state.changed[window..].contains(&Some(room)),
         })
         .collect();
-    let (room, weights) =
-        sample_evolved_room(&rooms, parameters, &mut generator.stream(stage, "room"));
+    let mut weights: Vec<f64> =
+        rooms.iter().map(|&room| evolved_room_weight(room, parameters)).collect();
+    if let Some(weight) = during.and_then(|during| weights.get_mut(during.target_room)) {
+        *weight *= parameters.changed_room_multiplier;
+    }
+    let room = generator.stream(stage, "room").choose_weighted(&weights);
     let weighed = |((room, &history), &weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
         room_id: house.rooms[room].id.clone(),
         history,

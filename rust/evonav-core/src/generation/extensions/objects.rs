@@ -36,6 +36,7 @@ impl Transition<'_> {
             self.may_change(house, object.room)
                 && item.asset.is_pickupable
                 && object.children.is_empty()
+                && self.generator.during.is_none_or(|during| object.id != during.target_id)
                 && record.changes.iter().all(|change| change.id != object.id)
                 && !FITTINGS.contains(&item.asset.category.as_str())
         };
@@ -60,7 +61,8 @@ impl Transition<'_> {
         record: &mut EvolutionRecord,
     ) -> Result<StageWorld, Error> {
         let mut stream = self.stream("INSERTION");
-        let ids = (0..).map(|number| format!("new|{}|{number}", self.stage));
+        let kind = if self.generator.during.is_some() { "during" } else { "new" };
+        let ids = (0..).map(|number| format!("{kind}|{}|{number}", self.stage));
         let is_new = |id: &String| world.house.object_index(id).is_none();
         let ids: Vec<String> = ids.filter(is_new).take(count).collect();
         for id in ids {

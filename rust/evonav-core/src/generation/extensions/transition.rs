@@ -25,10 +25,11 @@ impl Transition<'_> {
         self.generator.stream(self.stage, cause)
     }
 
-    /// Return whether objects may change in a room. They may not in the room in which the reference
-    /// trajectory ends, where the agent would see the change.
+    /// Return whether objects may change in a room. Between stages they may not in the room in which
+    /// the reference trajectory ends, where the agent would see the change.
     pub(crate) fn may_change(&self, house: &House, room: Option<usize>) -> bool {
-        room.is_some() && room != self.state.transition_room(house)
+        let is_during = self.generator.during.is_some();
+        room.is_some() && (is_during || room != self.state.transition_room(house))
     }
 
     pub(crate) fn rebuild(&self, house: House) -> Result<StageWorld, Error> {

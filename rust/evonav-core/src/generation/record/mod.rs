@@ -1,9 +1,11 @@
 //! The records of generation: the JSON that Python's `evonav.tasks.oracle` reads.
 
+mod during;
 mod evolution;
 mod target;
 mod task;
 
+pub use during::DuringRecord;
 pub use evolution::{
     ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure,
     ObjectRecord, RoomHistory, RoomWeightRecord, StateChangeRecord,

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::{
-    generation::record::{Appearance, EvolutionRecord, Relations, TargetRecord},
+    generation::record::{Appearance, DuringRecord, EvolutionRecord, Relations, TargetRecord},
     geometry::{Vec2, Vec3},
 };
 
@@ -76,6 +76,9 @@ pub struct GeneratedStage {
     pub ever_relocated_ids: Vec<String>,
     /// Surroundings of the target, for the instruction.
     pub relations: Relations,
+    /// Change during the stage; left out if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub during: Option<DuringRecord>,
 }
 
 /// A pose in AI2-THOR's convention.

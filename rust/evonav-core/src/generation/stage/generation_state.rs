@@ -73,9 +73,9 @@ impl State {
         house.room_of(self.position_m())
     }
 
-    /// Record a transition, before the stage after it is generated.
-    pub fn note_evolution(&mut self, evolution: &EvolutionRecord, house: &House, stage: usize) {
-        if stage > 1 {
+    /// Record a transition, before the stage after it is generated, or a change during a stage.
+    pub fn note_evolution(&mut self, evolution: &EvolutionRecord, house: &House) {
+        if evolution.outcome != EvolutionOutcome::FirstStage {
             let is_evolved = evolution.outcome == EvolutionOutcome::Evolved;
             let id = evolution.room_id.as_ref().filter(|_| is_evolved);
             self.changed.push(house.rooms.iter().position(|room| Some(&room.id) == id));

@@ -1,0 +1,120 @@
+"""Follow the house of a stage: its target, the way there, and its change during the stage (docs/extensions.md)."""
+
+import json
+from typing import Any
+
+from evonav.agents.agent import AgentAction, Move, NavigateTo, SensorConfig
+from evonav.errors import SimulationError
+from evonav.evaluation.episode import motion
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.base import Point3
+from evonav.evaluation.records.changes import DuringRecord
+from evonav.world.change_around import change_around
+from evonav.world.pose import Pose
+from evonav.world.simulator import Simulator
+
+
+class StageHouse:
+    """The house of a stage as it is now, in the simulator. It holds oracle data."""
+
+    def __init__(self, spec: EpisodeSpec, stage: int, simulator: Simulator, protocol: ProtocolConfig) -> None:
+        """Prepare a stage (1-based) of a task; `load` comes next."""
+        self._spec = spec
+        self._number = stage
+        self._stage = spec.stages[stage - 1]
+        self._simulator = simulator
+        self._protocol = protocol
+        self.planner = motion.Planner(simulator)
+        self.target_m: Point3 = self._stage.target.position_m
+        """The target's present position."""
+        self._target_room_id = self._stage.target.room_id
+        self.during: DuringRecord | None = None if self._stage.change is None else self._stage.change.record
+        """The record of the change during the stage, so far."""
+
+    def load(self, requested: Pose) -> Pose:
+        """Load the house as the stage begins; return the agent's effective pose."""
+        return self._simulator.reset(self._stage.house_json, requested)
+
+    def is_in_room(self, pose: Pose, room_id: str | None) -> bool:
+        """Return whether a pose is in a room; never in `None`."""
+        return room_id is not None and self._spec.parsed_house(self._number).room_of(pose.x_m, pose.z_m) == room_id
+
+    def path_to_target_m(self) -> list[motion.Point2]:
+        """Return the planner's path from the agent to the target; empty if there is none."""
+        x_m, _, z_m = self.target_m
+        # The rooms stay the same when the house changes.
+        house = self._spec.parsed_house(self._number) if self._protocol.reference_in_room else None
+        path_m = self.planner.path_m((x_m, z_m))
+        return self.planner.into_room_m(path_m, (x_m, z_m), house, self._target_room_id)
+
+    def carry_out(self, action: AgentAction, sensors: SensorConfig) -> motion.Motion:
+        """Carry out an agent's answer."""
+        if isinstance(action, NavigateTo):
+            return motion.navigate(
+                self._simulator,
+                self.planner,
+                action,
+                spacing_m=self._protocol.waypoint_m,
+                max_travel_m=sensors.max_travel_m,
+            )
+        if isinstance(action, Move):
+            return motion.move(self._simulator, action)
+        return motion.stay(self._simulator)
+
+    def is_change_due(self, number: int, sensors: SensorConfig) -> bool:
+        """Return whether the house changes before the views of a round of the agent, from 0."""
+        return self.during is not None and number == self._protocol.step_of_round(self.during.round, sensors)
+
+    def change(self, number: int, path_before_m: float) -> DuringRecord:
+        """Change the house around the agent, which keeps its pose.
+
+        Args:
+            number: The round, from 0, before whose views it changes.
+            path_before_m: Length of the agent's path so far.
+
+        Raises:
+            SimulationError: The agent cannot stand where it stood, even if nothing changes.
+        """
+        change, target_id = self._stage.change, self._stage.target.object_id
+        assert change is not None  # `is_change_due` was true
+        pose = self._simulator.pose
+        house_json, skipped = change_around(
+            self._stage.house_json, change.delta_json, self._simulator.config, pose, target_id
+        )
+        if not _is_same(self._simulator.reset(house_json, pose), pose):
+            # Another simulator's bodies may be a little wider.
+            skipped = changed_ids(change.delta_json)
+            if not _is_same(self._simulator.reset(self._stage.house_json, pose), pose):
+                raise SimulationError(f"the house changes in round {number}, and the agent no longer fits at {pose}")
+        self.planner = motion.Planner(self._simulator)
+        if target_id not in skipped:
+            self.target_m = x_m, _, z_m = change.target_position_m
+            room_id = self._spec.parsed_house(self._number).room_of(x_m, z_m)
+            self._target_room_id = room_id or self._target_room_id
+        left_m = self.path_to_target_m()
+        done = change.record.model_copy(update={"at_round": number, "skipped_ids": skipped})
+        self.during = done.model_copy(
+            update={
+                "change": done.change.model_copy(
+                    update={"is_agent_in_room": self.is_in_room(pose, done.change.room_id)}
+                ),
+                "target_position_m": self.target_m,
+                "is_target_relocated": any(one.object_id == target_id for one in done.done),
+                "path_before_m": path_before_m,
+                "reference_after_m": motion.polyline_length_m(left_m) if left_m else None,
+            }
+        )
+        return self.during
+
+
+def _is_same(one: Pose, other: Pose) -> bool:
+    """Return whether two poses are the same but for rounding."""
+    return max(abs(one.x_m - other.x_m), abs(one.z_m - other.z_m)) < 1e-6
+
+
+def changed_ids(delta_json: str) -> tuple[str, ...]:
+    """Return the ids of all that a change of a house changes."""
+    delta: dict[str, Any] = json.loads(delta_json)
+    ids = [*delta["removed"], *(one["id"] for name in ("moves", "added", "states") for one in delta[name])]
+    return tuple(dict.fromkeys(ids))
