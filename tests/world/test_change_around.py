@@ -16,7 +16,7 @@ from evonav.world.simulator import SimulatorConfig
 
 EXTENSIONS = {
     "during_stage": {"probability": 1.0, "rounds": [1, 9]},
-    **dict.fromkeys(("insertion", "removal", "doors", "openables"), {"probability": 0.5, "max_count": 4}),
+    **{name: {"probability": 0.5, "max_count": 4} for name in ("insertion", "removal", "doors", "openables")},
 }
 PARAMETERS = {"num_stages": [2], "full_shuffle_probability": 0.5, "extensions": EXTENSIONS}
 TOUCH_M = 0.0025

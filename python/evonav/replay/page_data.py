@@ -28,6 +28,7 @@ from evonav.replay.types import (
     ReplayedStage,
     Truth,
 )
+from evonav.report.maps.moments import during_facts, during_words, moments
 from evonav.report.maps.round_words import choice_words, entry_name, reason_words
 from evonav.report.maps.stage_map import change_words, outcome_words
 from evonav.report.tables.causes import sentence
@@ -108,6 +109,8 @@ class PageData:
             "end": _end(record),
             "rounds": [rounds.data(step) for step in stage.rounds],
         }
+        if (after := moments(record, maps)[1:]) != []:
+            entry["during"] = [after[0].first_round, during_words(after[0])]
         self.stages.append(entry)
 
 
@@ -376,7 +379,7 @@ def _facts(record: StageRecord) -> list[list[str]]:
         facts.append(("stopped", "no, the rounds ran out"))
     if record.is_snapped:
         facts.append(("start", "moved to the nearest free place"))
-    return [list(fact) for fact in facts]
+    return [list(fact) for fact in (*facts, *during_facts(record))]
 
 
 def _end(record: StageRecord) -> list[int] | None:

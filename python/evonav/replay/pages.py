@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
@@ -18,6 +19,7 @@ from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
 from evonav.report.maps.legend import entries_of, legend
+from evonav.report.maps.moments import Moment, moments
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
@@ -112,16 +114,31 @@ def _page(
         house=first.house,
         agent=first.agent,
         tabs=tabs,
-        drawings=[_drawing(stage, maps, frame, radius_m) for stage in stages],
+        drawings=[
+            part for index, stage in enumerate(stages) for part in _drawings(index, stage, maps, frame, radius_m)
+        ],
         view_box=frame.view_box,
         legend=_legend(),
         data=Markup(data.text()),  # noqa: S704 - JSON without `<`
     )
 
 
-def _drawing(stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> dict[str, Markup]:
-    """Return the layers of a stage's map that are the same in all rounds."""
-    record, stage_map = stage.record, stage.stage_map
+def _drawings(
+    index: int, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float
+) -> list[dict[str, Any]]:
+    """Return the layers of a stage's map in each of its moments, and the rounds in which they are shown."""
+    parts = moments(stage.record, maps)
+    untils = [*(part.first_round for part in parts[1:]), None]
+    return [
+        {"of": index, "first": part.first_round, "until": until, **_layers(part, frame, radius_m)}
+        for part, until in zip(parts, untils, strict=True)
+    ]
+
+
+def _layers(moment: Moment, frame: Frame, radius_m: float) -> dict[str, Markup]:
+    """Return the layers of a map that are the same in all rounds of a moment."""
+    record, maps = moment.record, moment.maps
+    stage_map = maps.get(record.stage)
     ends = ""
     if (start := record.effective_start) is not None:
         ends += start_mark(cm((start.x_m, start.z_m)), frame, "start")

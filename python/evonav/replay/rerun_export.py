@@ -15,12 +15,13 @@ from PIL import Image
 from evonav.component import optional_module
 from evonav.drawing.files import check_suffix
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.schema import FloorPlan
 from evonav.parallel.folders import replacing
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
+from evonav.report.maps.moments import Moment, moments
 from evonav.report.maps.round_words import choice_words
-from evonav.report.maps.stage_map import outcome_words
+from evonav.report.maps.stage_map import change_words, outcome_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
@@ -96,27 +97,34 @@ class _Recorder:
     def record(self, step: int) -> int:
         """Write the stage from this step on; return the step after it."""
         record = self._stage.record
+        parts = moments(record, self._maps)
         for index, replayed in enumerate(self._stage.rounds):
             self._stream.set_time("step", sequence=step)
             self._stream.set_time("stage", sequence=record.stage)
             self._stream.set_time("round", sequence=index + 1)
             if index == 0:
-                self._begin(record)
+                goal = f"stage {record.stage}: {record.goal.instruction}"
+                self._stream.log("words", self._rr.TextLog(goal, level="INFO"))
+            for moment in parts:
+                if moment.first_round == index:
+                    self._house(moment)
             self._round(replayed)
             step += 1
         text = f"stage {record.stage}: {outcome_words(record)}. {sentence(record)}"
         self._stream.log("words", self._rr.TextLog(text, level="INFO"))
         return step
 
-    def _begin(self, record: StageRecord) -> None:
-        rr, log = self._rr, self._stream.log
-        log("words", rr.TextLog(f"stage {record.stage}: {record.goal.instruction}", level="INFO"))
+    def _house(self, moment: Moment) -> None:
+        """Write where everything is: as the stage begins, and after a change during it."""
+        rr, log, record = self._rr, self._stream.log, moment.record
+        if moment.first_round > 0:
+            log("words", rr.TextLog(f"the house changes: {change_words(record, moment.maps)}", level="INFO"))
         x_m, y_m, z_m = record.target.position_m
         log("world/target", rr.Points3D([(x_m, z_m, y_m)], colors=[_GOLD], radii=[0.12], labels=["target"]))
         turns = np.linspace(0, math.tau, 61)
         ring = [(x_m + self._radius_m * math.cos(t), z_m + self._radius_m * math.sin(t), 0.02) for t in turns]
         log("world/target/success_radius", rr.LineStrips3D([ring], colors=[_GOLD]))
-        house = self._maps.get(record.stage)
+        house = moment.maps.get(record.stage)
         if house is None:
             return
         floors = [[(x, z, 0.0) for x, z in (*room.polygon_m, room.polygon_m[0])] for room in house.rooms]

@@ -14,6 +14,7 @@ from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import evaluator_words
 from evonav.replay.types import ReplayedRound, ReplayedStage
+from evonav.report.maps.moments import Moment, moments
 from evonav.report.maps.round_words import choice_words, reason_words
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.pages.template import text_of
@@ -63,9 +64,13 @@ class _StageFilm:
     ) -> None:
         self._style = f"<style>{light_css(text_of('film.css'))}</style>"
         self._stage, self._frame, self._budget = stage, frame, budget
-        house = self._panel(house_layer(stage.record, maps, frame, radius_m), "#ffffff")
-        self._background = self._drawn(_header(stage, maps), SIZE, "#ffffff").convert("RGB")
-        self._background.paste(house, (LEFTS[2], TOP))
+        self._backgrounds: list[tuple[int, Image.Image]] = []
+        """Backgrounds of all pictures, with the round from which each is used."""
+        for moment in moments(stage.record, maps):
+            house = self._panel(house_layer(moment.record, moment.maps, frame, radius_m), "#ffffff")
+            background = self._drawn(_header(moment), SIZE, "#ffffff").convert("RGB")
+            background.paste(house, (LEFTS[2], TOP))
+            self._backgrounds.append((moment.first_round, background))
 
     def round(self, index: int) -> Image.Image:
         """Return the picture of one round."""
@@ -83,7 +88,7 @@ class _StageFilm:
 
     def _picture(self, index: int, captions: str) -> Image.Image:
         """Return a round with captions below its maps; `index` is -1 where a stage has no round."""
-        picture = self._background.copy()
+        picture = next(one for first, one in reversed(self._backgrounds) if first <= max(0, index)).copy()
         if index >= 0:
             step = self._stage.rounds[index]
             _paste_views(picture, step)
@@ -110,13 +115,14 @@ class _StageFilm:
         return Image.open(BytesIO(png_of(svg, background=background, has_system_fonts=False)))
 
 
-def _header(stage: ReplayedStage, maps: Mapping[int, FloorPlan]) -> str:
+def _header(moment: Moment) -> str:
     """Return agent, task and goal, and the heads of the panels."""
-    record = stage.record
+    first_round, record, maps = moment
     agent = record.agent[-40:]
     task_left = MARGIN + _LETTER * 26 * len(agent) + 18
     changed = " changed" if record.transition.relocations else ""
-    truth = change_words(record, maps) if changed else f"what is true: {change_words(record, maps)}"
+    change = change_words(record, maps) if first_round == 0 else f"during the stage: {change_words(record, maps)}"
+    truth = change if changed else f"what is true: {change}"
     heads = ("what it sees", "what it knows: map and memory", truth)
     return (
         _text("agent-name", MARGIN, 36, agent)
@@ -204,6 +210,10 @@ def _timeline(stage: ReplayedStage, index: int) -> str:
         left, width = SIZE[0] * i / num, SIZE[0] / num - gap
         box = f'x="{left:.1f}" y="{SIZE[1] - FOOT_TOP - _TIMELINE_PX}" width="{width:.1f}" height="{_TIMELINE_PX}"'
         drawn.append(f'<rect class="round {css if i <= index else "later"}" {box}/>')
+    during = stage.record.during
+    if during is not None and during.at_round is not None and during.at_round <= index:
+        box = f'y="{SIZE[1] - FOOT_TOP - 2 * _TIMELINE_PX}" width="4" height="{2 * _TIMELINE_PX}"'
+        drawn.append(f'<rect class="changes" x="{SIZE[0] * during.at_round / num - 2:.1f}" {box}/>')
     return join(drawn)
 
 

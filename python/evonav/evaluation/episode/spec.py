@@ -106,7 +106,9 @@ class EpisodeSpec:
             HouseError: The house is malformed, or has an object of an unknown category.
         """
         image = image_uri(self.stages[stage - 1].public.reference_image, THUMBNAIL_PX)
-        return floor_plan_of(self.parsed_house(stage), task_id=self.task_id, stage=stage, reference_image=image)
+        house, change = self.parsed_house(stage), self.stages[stage - 1].change
+        at_end = None if change is None else house.apply(change.delta_json)
+        return floor_plan_of(house, task_id=self.task_id, stage=stage, reference_image=image, at_end=at_end)
 
     def blank_record(self, agent: str, stage: int) -> StageRecord:
         """Return the record of a stage that was not run; all other records of the stage start from it.

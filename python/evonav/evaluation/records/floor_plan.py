@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.drawing.plan import plan_of
+from evonav.drawing.plan import HousePlan, plan_of
 from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Opening, RoomFootprint
 from evonav.house import House
 
 
-def floor_plan_of(house: House, *, task_id: str, stage: int, reference_image: str | None) -> FloorPlan:
+def floor_plan_of(
+    house: House, *, task_id: str, stage: int, reference_image: str | None, at_end: House | None = None
+) -> FloorPlan:
     """Return the floor plan of a house.
 
     Args:
@@ -21,6 +23,7 @@ def floor_plan_of(house: House, *, task_id: str, stage: int, reference_image: st
         task_id: The task, for the record.
         stage: The stage, for the record.
         reference_image: The image that the agent was shown, as a `data:` URI.
+        at_end: The house after the change during the stage, if there is one.
 
     Raises:
         HouseError: An object has neither a known asset nor a known category.
@@ -33,9 +36,14 @@ def floor_plan_of(house: House, *, task_id: str, stage: int, reference_image: st
         rooms=tuple(RoomFootprint(**asdict(room)) for room in plan.rooms),
         walls=plan.walls,
         openings=tuple(Opening(**asdict(opening)) for opening in plan.openings),
-        objects=tuple(ObjectFootprint(**asdict(item)) for item in plan.objects),
+        objects=_footprints(plan),
         reference_image=reference_image,
+        objects_at_end=() if at_end is None else _footprints(plan_of(at_end)),
     )
+
+
+def _footprints(plan: HousePlan) -> tuple[ObjectFootprint, ...]:
+    return tuple(ObjectFootprint(**asdict(item)) for item in plan.objects)
 
 
 def image_uri(image: NDArray[np.uint8], side_px: int) -> str:

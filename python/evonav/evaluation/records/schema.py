@@ -365,3 +365,15 @@ class FloorPlan(Record):
     objects: tuple[ObjectFootprint, ...]
     reference_image: str | None = None
     """The image that the agent was shown, made small, as a `data:` URI."""
+    objects_at_end: tuple[ObjectFootprint, ...] = ()
+    """The objects after the change during the stage; empty, and left out of the JSON, without one."""
+
+    @property
+    def at_end(self) -> "FloorPlan":
+        """The floor plan after the change during the stage; itself without one."""
+        return self.model_copy(update={"objects": self.objects_at_end}) if self.objects_at_end else self
+
+    @model_serializer(mode="wrap")
+    def _without_change(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        return {name: value for name, value in values.items() if name != "objects_at_end" or value}

@@ -50,10 +50,8 @@ def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
 def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
     """Describe what happened before the stage in a few words."""
     transition = record.transition
-    if record.stage == 1:
-        return "first stage"
     if transition.kind == "static":
-        return "nothing changed"
+        return "first stage" if record.stage == 1 else "nothing changed"
     rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
     room = rooms.get(transition.room_id or "", transition.room_id or "a room")
     moved = f"{counted(len(transition.relocations), 'object')} moved"

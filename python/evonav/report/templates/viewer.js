@@ -331,6 +331,7 @@
       svg("rect", { class: `mark m-${round.kind}`, x, y: 4, width, height: 8 }, timeline, `round ${index + 1}: ${round.choice ?? "error"}`);
       if (round.seen) svg("rect", { class: "seen", x: x + 0.25 * width, y: 0, width: 0.5 * width, height: 3 }, timeline);
       if (round.q) svg("rect", { class: "asked", x, y: 13.4, width, height: 2 }, timeline);
+      if (stage.during?.[0] === index) svg("rect", { class: "changes", x: x - 2, y: 0, width: 4, height: 16 }, timeline, `the house changes: ${stage.during[1]}`);
     });
     // The thumb of a range moves within it: so wide that it stands under its mark.
     const inset = 50 / Math.max(1, rounds.length);
@@ -344,13 +345,11 @@
       tab.setAttribute("aria-selected", index === at);
       tab.tabIndex = index === at ? 0 : -1;
     });
-    for (const part of document.querySelectorAll("[data-of]")) part.style.display = Number(part.dataset.of) === at ? "" : "none";
     $("verdict").replaceChildren(html("b", stage.words), ` · ${stage.sentence}`);
     $("verdict").title = stage.sentence;
     $("sentence").textContent = stage.sentence;
     list("stage-facts", stage.facts);
     $("goal").textContent = stage.goal;
-    $("changed").textContent = stage.changed;
     $("lost").textContent = stage.lost;
     $("reference").hidden = !stage.reference;
     if (stage.reference) $("reference").src = stage.reference;
@@ -366,10 +365,21 @@
     slider.max = Math.max(0, stage.rounds.length - 1);
   };
 
+  // The house may change during a stage: what is drawn of it depends on the round.
+  const showHouse = (stage) => {
+    for (const part of document.querySelectorAll("[data-of]")) {
+      const { of, first = 0, until = Infinity } = part.dataset;
+      part.style.display = Number(of) === at && Number(first) <= now && now < Number(until) ? "" : "none";
+    }
+    const isChanged = stage.during && now >= stage.during[0];
+    $("changed").textContent = isChanged ? `${stage.changed}; since round ${stage.during[0] + 1}: ${stage.during[1]}` : stage.changed;
+  };
+
   const show = () => {
     const stage = stages[at], rounds = wholeStage(at);
     now = Math.max(0, Math.min(now, rounds.length - 1));
     slider.value = now;
+    showHouse(stage);
     slider.disabled = rounds.length < 2;
     if (!rounds.length) {
       $("where").textContent = "no rounds";

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::{
-    generation::record::{Appearance, DuringRecord, EvolutionRecord, Relations, TargetRecord},
+    generation::record::{Appearance, EvolutionRecord, Relations, TargetRecord},
     geometry::{Vec2, Vec3},
 };
 
@@ -79,6 +79,25 @@ pub struct GeneratedStage {
     /// Change during the stage; left out if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub during: Option<DuringRecord>,
+}
+
+/// A change of the house during a stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DuringRecord {
+    /// Decision round, from 0, before whose views the house changes.
+    pub round: usize,
+    /// The change.
+    pub evolution: EvolutionRecord,
+    /// Centre of the target's box after it.
+    pub target_position_m: Vec3,
+    /// Object that the target stands on after it.
+    pub target_support_id: Option<String>,
+    /// Whether it relocated the target.
+    pub is_target_relocated: bool,
+    /// Pose at the reference distance from which the target is visible after it.
+    pub reference_pose: PoseRecord,
+    /// Number of pixels of the target from there.
+    pub reference_visible_px: usize,
 }
 
 /// A pose in AI2-THOR's convention.

@@ -1,31 +1,9 @@
-//! Record of a change during a stage.
-
-use serde::Serialize;
+//! Changes of a house that follow from their records.
 
 use crate::{
-    generation::record::{EvolutionRecord, PoseRecord},
-    geometry::Vec3,
+    generation::record::EvolutionRecord,
     house::{AddedObject, HouseDelta, ObjectMove, StateChange},
 };
-
-/// A change of the house during a stage.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DuringRecord {
-    /// Decision round, from 0, before whose views the house changes.
-    pub round: usize,
-    /// The change.
-    pub evolution: EvolutionRecord,
-    /// Centre of the target's box after it.
-    pub target_position_m: Vec3,
-    /// Object that the target stands on after it.
-    pub target_support_id: Option<String>,
-    /// Whether it relocated the target.
-    pub is_target_relocated: bool,
-    /// Pose at the reference distance from which the target is visible after it.
-    pub reference_pose: PoseRecord,
-    /// Number of pixels of the target from there.
-    pub reference_visible_px: usize,
-}
 
 impl EvolutionRecord {
     /// Return the change that leads from the house before to the house after.
