@@ -128,10 +128,10 @@ def _drawings(
 ) -> list[dict[str, Any]]:
     """Return the layers of a stage's map in each of its moments, and the rounds in which they are shown."""
     parts = moments(stage.record, maps)
-    untils = [*(part.first_round for part in parts[1:]), None]
+    ends = [*(part.first_round for part in parts[1:]), None]
     return [
         {"of": index, "first": part.first_round, "until": until, **_layers(part, frame, radius_m)}
-        for part, until in zip(parts, untils, strict=True)
+        for part, until in zip(parts, ends, strict=True)
     ]
 
 
