@@ -199,11 +199,26 @@ class IdentityQuestion(YesNoQuestion):
         return appearance * context >= 1.0, reason
 
 
-def identity_question(goal: Goal, entry: ObjectEntry, navigator: Navigator, *, with_images: bool) -> IdentityQuestion:
-    """Ask about an entry of the object memory, among everything remembered."""
+def identity_question(
+    goal: Goal,
+    entry: ObjectEntry,
+    navigator: Navigator,
+    *,
+    with_images: bool,
+    remembered: Sequence[ObjectCandidate] | None = None,
+) -> IdentityQuestion:
+    """Ask about an entry of the object memory, among everything remembered.
+
+    Args:
+        goal: The goal.
+        entry: The entry.
+        navigator: The agent's memory.
+        with_images: Whether the question shows images.
+        remembered: Everything in this memory, if it was described already: with the looks of the goal's namesakes.
+    """
     candidate = navigator.candidate(entry)
     return IdentityQuestion(
         goal=goal,
         entry=navigator.with_images(candidate) if with_images else candidate,
-        surroundings=[navigator.candidate(one) for one in navigator.objects.entries],
+        surroundings=remembered or [navigator.candidate(one) for one in navigator.objects.entries],
     )

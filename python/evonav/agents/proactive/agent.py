@@ -144,10 +144,8 @@ class Proactive(NavigatorAgent):
                 continue
             others = math.fsum(w for _, w in posterior.sightings) - weight + math.fsum(posterior.entries.values())
             rest = others + float(posterior.moved.sum() + posterior.unseen.sum())
-            is_near = math.dist(one.ground_m, here) < self.config.stop_within_m and self._belief.sightings.is_current(
-                one
-            )
-            is_near &= similarity(self._parsed.noun, one.label) >= NAMED
+            is_near = math.dist(one.ground_m, here) < self.config.stop_within_m
+            is_near &= self._belief.sightings.is_current(one) and similarity(self._parsed.noun, one.label) >= NAMED
             if is_near and weight >= self.config.commit_share * (weight + rest):
                 self._note(posterior)
                 self._record_round("sighting", "seen, and too small to remember")
@@ -212,7 +210,7 @@ class Proactive(NavigatorAgent):
                 continue
             last = self._last
             is_chosen = self._is_final and last is not None and navigator.views.resolve(last.key) == entry_id
-            if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry)):
+            if is_chosen or (self._is_settled(entry_id, posterior) and self._may_be_goal(entry, around)):
                 self._note(posterior)
                 self._record_round(f"object {entry_id}", "identified" if is_detected else "at its place", entry_id)
                 return Stop("identified" if is_detected else "at its place")
@@ -236,12 +234,14 @@ class Proactive(NavigatorAgent):
         places = places_before(centre_m, self._belief.searched.coarse, around, self.config.stand_within_m)
         return place_by(places, placed, self._navigator.explorer.map, here)
 
-    def _may_be_goal(self, entry: ObjectEntry) -> bool:
+    def _may_be_goal(self, entry: ObjectEntry, around: Surroundings) -> bool:
         """Ask whether an entry contradicts the goal; if it does, it hardly counts for the rest of the stage."""
         if not self.config.checks_identity:
             return True
         self._counters["identity_checks"] += 1
-        question = identity_question(self._goal, entry, self._navigator, with_images=self._shows_images)
+        question = identity_question(
+            self._goal, entry, self._navigator, with_images=self._shows_images, remembered=around.remembered
+        )
         answer = self._queries.ask(question)
         if answer is False:
             self._counters["identities_denied"] += 1

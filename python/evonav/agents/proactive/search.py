@@ -134,7 +134,7 @@ def shown_from(
     fine_cols = ((at_col + along * (cols - at_col) + 0.5) * coarse.step).astype(np.int64)
     np.clip(fine_rows, 0, walls.shape[0] - 1, out=fine_rows)
     np.clip(fine_cols, 0, walls.shape[1] - 1, out=fine_cols)
-    is_clear = ~walls[fine_rows, fine_cols].any(axis=0)
+    is_clear = ~walls.ravel().take(fine_rows * walls.shape[1] + fine_cols).any(axis=0)
     return rows[is_clear], cols[is_clear]
 
 

@@ -47,15 +47,17 @@ class SearchedCells:
         sectors = (np.arctan2(dx_m, dz_m) % math.tau / math.tau * NUM_SECTORS).astype(int) % NUM_SECTORS
         missed = 1.0 - self._config.detection_rate
         gaps_m = np.hypot(dx_m, dz_m)
+        cells = rows * frame.cols + cols
+        at_sectors = sectors * (frame.rows * frame.cols) + cells
         for index, range_m in enumerate(RANGES_M):
-            near = gaps_m <= range_m
-            at = rows[near], cols[near]
+            counts = gaps_m <= range_m
             if self._config.gates_sectors:
-                is_new = ~self._sectors[index, sectors[near], at[0], at[1]]
-                at = at[0][is_new], at[1][is_new]
-                self._sectors[index, sectors[near][is_new], at[0], at[1]] = True
-            self._stage[index][at] *= missed
-            self._ever[index][at] *= missed
+                seen = self._sectors[index].reshape(-1)
+                counts &= ~seen[at_sectors]
+                seen[at_sectors[counts]] = True
+            at = cells[counts]
+            self._stage[index].reshape(-1)[at] *= missed
+            self._ever[index].reshape(-1)[at] *= missed
 
     def give_up(self, rows: NDArray[np.int64], cols: NDArray[np.int64], factor: float) -> None:
         """Lower the weight of cells that the agent went to see, whatever hides a part of them."""
