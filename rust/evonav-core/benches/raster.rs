@@ -18,9 +18,10 @@ use evonav_core::{
         ray_caster::RayCaster,
         visible_bodies::visible_bodies,
     },
-    textures::texture_of,
+    textures::{MOST_PLACES, Sums, Texture, texture_of},
     world::{mesh::SceneMesh, scene::Scene},
 };
+use evonav_simd::Kernel;
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
 
@@ -116,19 +117,14 @@ fn bench_raster(c: &mut Criterion) {
             visible_bodies(&scene, &mesh, &caster, &View::from(*camera), [x, z], 1.5)
         });
     });
-    // A block of pixels of a textured floor, close up and far away.
+    // A run of pixels of a textured floor, close up and far away.
     let floor = Material { kind: MaterialKind::Planks, variant: 0 };
     let texture = texture_of(floor).expect("planks have a texture");
     for (name, width2) in [("near", 1.0), ("far", 16.0)] {
-        c.bench_function(&format!("textures/sample_1000_{name}"), |b| {
-            b.iter(|| {
-                for first in 0..125_u16 {
-                    let place = |step: f32| {
-                        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| f32::from(8 * first + i) * step)
-                    };
-                    black_box(texture.sample(&place(0.013), &place(0.007), black_box(width2)));
-                }
-            });
+        let [u, v] = [0.013, 0.007].map(|step| std::array::from_fn(|i| i as f32 * step));
+        let lookup = Lookup { texture, u, v, level: texture.level(width2) };
+        c.bench_function(&format!("textures/sample_64_{name}"), |b| {
+            b.iter(|| evonav_simd::compute(black_box(&lookup)));
         });
     }
     c.bench_function("mesh/build", |b| b.iter(|| SceneMesh::build(black_box(&scene))));
@@ -143,6 +139,25 @@ fn bench_raster(c: &mut Criterion) {
         });
     });
     c.bench_function("raycast3d/build", |b| b.iter(|| RayCaster::build(black_box(&mesh))));
+}
+
+/// Looks a texture up at a run of pixels.
+struct Lookup {
+    texture: &'static Texture,
+    u: [f32; MOST_PLACES],
+    v: [f32; MOST_PLACES],
+    level: usize,
+}
+
+impl Kernel for &Lookup {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn compute(self) -> Sums {
+        let mut sums = [[0; MOST_PLACES]; 3];
+        self.texture.sample(self.level, &self.u, &self.v, &mut sums);
+        sums
+    }
 }
 
 criterion_group!(benches, bench_raster);

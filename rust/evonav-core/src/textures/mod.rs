@@ -11,7 +11,7 @@ mod texture;
 
 use std::sync::OnceLock;
 
-pub use texture::{Level, NEUTRAL, Texel, Texture};
+pub use texture::{Level, MOST_PLACES, NEUTRAL, Sums, Texel, Texture};
 
 use crate::assets::material::{Layout, Material, MaterialKind};
 

@@ -17,26 +17,24 @@ const CONTRAST: f32 = 0.72;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Texture {
     finest: Level,
-    copies: Vec<Copied>,
+    copies: Vec<Level>,
 }
 
-/// A square of `1 << log2_size` texels a side, row by row, each with four numbers of 16 bits, of
-/// which 8 are used.
+/// A square of `1 << log2_size` texels a side, row by row, each with four numbers of 8 bits. Rows
+/// have their first texel again at their end, and the last row is the first one again, so that all
+/// four neighbours of a place lie at fixed distances.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Level {
     log2_size: u32,
-    texels: Vec<u64>,
+    texels: Vec<u32>,
 }
 
-/// A blurred copy of a texture, four bytes a texel.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Copied {
-    log2_size: u32,
-    texels: Vec<[u8; 4]>,
-}
+/// Number of places that are looked up together, at most.
+pub const MOST_PLACES: usize = 64;
 
-/// Number of places that are looked up together.
-const LANES: usize = 8;
+/// The colours of places, by channel: 256 times a texture's values.
+pub type Sums = [[u16; MOST_PLACES]; 3];
+
 /// Binary logarithm of the square of the least width, in texels, that is looked up in a copy.
 const FIRST_COPY: i32 = 2;
 /// Weights, in sixteenths, of a blur whose square is one texel.
@@ -81,15 +79,13 @@ impl Texture {
     }
 
     fn of_texels(log2_size: u32, mut texels: Vec<Texel>) -> Self {
-        let finest = Level { log2_size, texels: texels.iter().map(pack).collect() };
+        let finest = Level::of(log2_size, &texels);
         let mut copies = Vec::new();
         for log2_size in (0..=log2_size).rev() {
             let size = 1_usize << log2_size;
             let once = blurred(&texels, size);
-            for blurred in [&once, &blurred(&once, size)] {
-                let texels = blurred.iter().map(|texel| texel.map(to_byte)).collect();
-                copies.push(Copied { log2_size, texels });
-            }
+            copies.push(Level::of(log2_size, &once));
+            copies.push(Level::of(log2_size, &blurred(&once, size)));
             let half = size / 2;
             texels = (0..half * half)
                 .map(|index| {
@@ -111,27 +107,30 @@ impl Texture {
         self.finest.size()
     }
 
-    /// Return the texture's mean around each `[u, v]`, in repeats of the texture: for each channel
-    /// of a colour, 256 times its values.
+    /// Return the number of the copy that is blurred by about a width, from 1 on; 0 for the texels
+    /// themselves.
     ///
     /// # Arguments
     /// * `width2` - square of the width of what is averaged, in texels.
     #[inline(always)]
-    pub fn sample(&self, u: &[f32; LANES], v: &[f32; LANES], width2: f32) -> [[u16; LANES]; 3] {
-        match self.copy_for(width2) {
-            None => self.finest.sample(u, v),
-            Some(copy) => copy.sample(u, v),
-        }
-    }
-
-    /// Return the copy that is blurred by about a width.
-    #[inline(always)]
-    fn copy_for(&self, width2: f32) -> Option<&Copied> {
+    pub fn level(&self, width2: f32) -> usize {
         // The bits of a number are close to its logarithm, with 23 bits after the point.
         let bits = width2.clamp(1.0, 1e9).to_bits() + (1 << 22);
         let halvings = (bits >> 23) as i32 - 127 - FIRST_COPY;
-        let last = self.copies.len() - 1;
-        usize::try_from(halvings).ok().map(|index| &self.copies[index.min(last)])
+        ((halvings + 1).max(0) as usize).min(self.copies.len())
+    }
+
+    /// Look the texture up at each `[u, v]`, in repeats of the texture.
+    ///
+    /// # Arguments
+    /// * `level` - a result of [`Self::level`].
+    /// * `u`, `v` - [`MOST_PLACES`] or fewer, of equal number.
+    #[inline(always)]
+    pub fn sample(&self, level: usize, u: &[f32], v: &[f32], sums: &mut Sums) {
+        match level.checked_sub(1) {
+            None => self.finest.mixed(u, v, sums),
+            Some(copy) => self.copies[copy].nearest(u, v, sums),
+        }
     }
 }
 
@@ -152,33 +151,17 @@ fn blurred(texels: &[Texel], size: usize) -> Vec<Texel> {
     along(&along(texels, 1), size)
 }
 
-impl Copied {
-    /// Return 256 times the colours of the nearest texels.
-    #[inline(always)]
-    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [[u16; LANES]; 3] {
-        let size = 1_u32 << self.log2_size;
-        let (scale, mask) = (size as f32, size - 1);
-        let mut index = [0; LANES];
-        for lane in 0..LANES {
-            let x = fixed(u[lane] * scale - 0.5) & mask;
-            let y = fixed(v[lane] * scale - 0.5) & mask;
-            index[lane] = y << self.log2_size | x;
-        }
-        let mut texels = [0; LANES];
-        for (texel, index) in texels.iter_mut().zip(index) {
-            *texel = u32::from_le_bytes(self.texels[index as usize]);
-        }
-        let mut sums = [[0; LANES]; 3];
-        for (channel, sums) in sums.iter_mut().enumerate() {
-            for lane in 0..LANES {
-                sums[lane] = ((texels[lane] >> (8 * channel) & 255) as u16) << 8;
-            }
-        }
-        sums
-    }
-}
-
 impl Level {
+    fn of(log2_size: u32, texels: &[Texel]) -> Self {
+        let size = 1_usize << log2_size;
+        let row = |y: usize| &texels[y % size * size..][..size];
+        let rows = (0..=size).flat_map(|y| row(y).iter().chain(&row(y)[..1]));
+        Self {
+            log2_size,
+            texels: rows.map(|texel| u32::from_le_bytes(texel.map(to_byte))).collect(),
+        }
+    }
+
     /// Return the number of texels a side.
     pub fn size(&self) -> usize {
         1 << self.log2_size
@@ -186,40 +169,78 @@ impl Level {
 
     /// Return a texel.
     pub fn texel(&self, x: usize, y: usize) -> Texel {
-        unpack(self.texels[y * self.size() + x])
+        self.texels[y * (self.size() + 1) + x].to_le_bytes().map(f32::from)
     }
 
-    /// Return 256 times the colours of the mixtures of the four texels around each place.
+    /// Return the index of the texel at a column and row, which may lie beyond the square.
     #[inline(always)]
-    fn sample(&self, u: &[f32; LANES], v: &[f32; LANES]) -> [[u16; LANES]; 3] {
-        let mask = (1_u32 << self.log2_size) - 1;
+    fn index(&self, x: u32, y: u32) -> u32 {
+        let mask = (1 << self.log2_size) - 1;
+        let (x, y) = (x & mask, y & mask);
+        (y << self.log2_size) + y + x
+    }
+
+    /// Return a texel and its right neighbour.
+    #[inline(always)]
+    fn pair(&self, at: usize) -> [u32; 2] {
+        let pair = &self.texels[at..at + 2];
+        [pair[0], pair[1]]
+    }
+
+    /// Look up the nearest texels.
+    ///
+    /// Texels are loaded one by one. What goes before and comes after is done in loops of its own,
+    /// which compilers turn into SIMD.
+    #[inline(always)]
+    fn nearest(&self, u: &[f32], v: &[f32], [red, green, blue]: &mut Sums) {
+        let scale = (1_u32 << self.log2_size) as f32;
+        let mut texels = [0; MOST_PLACES];
+        for ((index, u), v) in texels.iter_mut().zip(u).zip(v) {
+            *index = self.index(fixed(u * scale - 0.5), fixed(v * scale - 0.5));
+        }
+        let texels = &mut texels[..u.len()];
+        for texel in texels.iter_mut() {
+            *texel = self.texels[*texel as usize];
+        }
+        for (((texel, red), green), blue) in texels.iter().zip(red).zip(green).zip(blue) {
+            (*red, *green) = ((texel << 8) as u16, (texel & 0xff00) as u16);
+            *blue = (texel >> 8 & 0xff00) as u16;
+        }
+    }
+
+    /// Look up the mixtures of the four texels around each place; see [`Self::nearest`].
+    #[inline(always)]
+    fn mixed(&self, u: &[f32], v: &[f32], [red, green, blue]: &mut Sums) {
+        /// Red and blue, which are multiplied together.
+        const OUTER: u32 = 0x00ff_00ff;
         let scale = (256_u32 << self.log2_size) as f32;
-        let (mut x, mut y) = ([0; LANES], [0; LANES]);
-        for lane in 0..LANES {
-            x[lane] = fixed(u[lane] * scale).wrapping_sub(128);
-            y[lane] = fixed(v[lane] * scale).wrapping_sub(128);
+        let (mut index, mut shares) = ([0; MOST_PLACES], [0; MOST_PLACES]);
+        for (((index, share), u), v) in index.iter_mut().zip(&mut shares).zip(u).zip(v) {
+            // In units of 1/256 of a texel.
+            let x = fixed(u * scale).wrapping_sub(128);
+            let y = fixed(v * scale).wrapping_sub(128);
+            *index = self.index(x >> 8, y >> 8);
+            *share = x & 255 | (y & 255) << 16;
         }
-        let mut sums = [[0; LANES]; 3];
-        for lane in 0..LANES {
-            let sum = self.mixture(x[lane], y[lane], mask);
-            for (channel, sums) in sums.iter_mut().enumerate() {
-                sums[lane] = (sum >> (16 * channel)) as u16;
-            }
+        let (mut upper, mut lower) = ([[0; 2]; MOST_PLACES], [[0; 2]; MOST_PLACES]);
+        let (index, next) = (&index[..u.len()], self.size() + 1);
+        for ((upper, lower), index) in upper.iter_mut().zip(&mut lower).zip(index) {
+            *upper = self.pair(*index as usize);
+            *lower = self.pair(*index as usize + next);
         }
-        sums
-    }
-
-    /// Return the mixture around a place, in units of 1/256 of a texel, as packed sums.
-    #[inline(always)]
-    fn mixture(&self, x: u32, y: u32, mask: u32) -> u64 {
-        let (fx, fy) = (u64::from(x & 255), u64::from(y & 255));
-        let (x0, y0) = (x >> 8 & mask, y >> 8 & mask);
-        let (x1, y1) = ((x0 + 1) & mask, (y0 + 1) & mask);
-        let at = |x: u32, y: u32| self.texels[(y << self.log2_size | x) as usize];
-        let right = (fx * fy) >> 8;
-        let (left, top) = (fy - right, fx - right);
-        let rest = 256 - fx - left;
-        at(x0, y0) * rest + at(x1, y0) * top + at(x0, y1) * left + at(x1, y1) * right
+        let texels = upper[..u.len()].iter().zip(&lower).zip(&shares);
+        for (((([a, b], [c, d]), share), (red, green)), blue) in
+            texels.zip(red.iter_mut().zip(green)).zip(blue)
+        {
+            let (fx, fy) = (share & 255, share >> 16);
+            let wd = (fx * fy) >> 8;
+            let (wc, wb) = (fy - wd, fx - wd);
+            let wa = 256 - fx - wc;
+            let outer = (a & OUTER) * wa + (b & OUTER) * wb + (c & OUTER) * wc + (d & OUTER) * wd;
+            let [a, b, c, d] = [a >> 8 & 255, b >> 8 & 255, c >> 8 & 255, d >> 8 & 255];
+            let inner = a * wa + b * wb + c * wc + d * wd;
+            (*red, *green, *blue) = (outer as u16, inner as u16, (outer >> 16) as u16);
+        }
     }
 }
 
@@ -239,13 +260,4 @@ fn mean_of(texels: &[Texel]) -> Texel {
 
 fn to_byte(channel: f32) -> u8 {
     (channel + 0.5).clamp(0.0, 255.0) as u8
-}
-
-fn pack(texel: &Texel) -> u64 {
-    let byte = |i: usize| u64::from(to_byte(texel[i]));
-    byte(0) | byte(1) << 16 | byte(2) << 32 | byte(3) << 48
-}
-
-fn unpack(packed: u64) -> Texel {
-    std::array::from_fn(|i| (packed >> (16 * i) & 0xffff) as f32)
 }

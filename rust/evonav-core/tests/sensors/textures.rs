@@ -1,5 +1,7 @@
 //! Textures of materials, how they are looked up, and how they lie on parts.
 
+use std::array::from_fn;
+
 use evonav_core::{
     assets::{
         material::{Layout, Material, MaterialKind},
@@ -10,9 +12,10 @@ use evonav_core::{
         camera::{Camera, View},
         raster::{FrameBuffer, Style, Want, render},
     },
-    textures::{Level, NEUTRAL, Texel, Texture, texture_of},
+    textures::{Level, MOST_PLACES, NEUTRAL, Sums, Texel, Texture, texture_of},
     world::{mesh::SceneMesh, skin::Skin},
 };
+use evonav_simd::Kernel;
 use proptest::{prelude::*, test_runner::Config};
 
 use crate::{scenes::scene_of, tracer::look_through};
@@ -101,11 +104,30 @@ fn blurred_naive(level: &Level, u: f64, v: f64, halvings: u32, num_weights: i32)
     sum
 }
 
+/// Looks places up.
+struct Look<'a> {
+    texture: &'a Texture,
+    u: &'a [f32],
+    v: &'a [f32],
+    width2: f32,
+}
+
+impl Kernel for Look<'_> {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn compute(self) -> Sums {
+        let mut sums = [[0; MOST_PLACES]; 3];
+        self.texture.sample(self.texture.level(self.width2), self.u, self.v, &mut sums);
+        sums
+    }
+}
+
 /// Look one place up, as the third of a block of others.
 fn sample(texture: &Texture, u: f32, v: f32, width2: f32) -> [f32; 3] {
     let (mut all_u, mut all_v) = ([0.3; 8], [0.7; 8]);
     (all_u[2], all_v[2]) = (u, v);
-    let sums = texture.sample(&all_u, &all_v, width2);
+    let sums = evonav_simd::compute(Look { texture, u: &all_u, v: &all_v, width2 });
     sums.map(|channel| f32::from(channel[2]) / 256.0)
 }
 
@@ -140,6 +162,29 @@ proptest! {
             blurred_naive(texture.finest(), f64::from(u), f64::from(v), halvings, num_weights);
         for i in 0..3 {
             prop_assert!((f64::from(found[i]) - expected[i]).abs() < 1.1, "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn lookups_are_the_same_on_every_processor_and_in_any_number(
+        start in [-20.0..20.0_f32, -20.0..20.0_f32],
+        step in [-0.1..0.1_f32, -0.1..0.1_f32],
+        width2 in 0.0..100.0_f32,
+        num in 1..=MOST_PLACES,
+        kind in 0..40_usize,
+    ) {
+        let material = Material { kind: MaterialKind::ALL[kind], variant: 1 };
+        let Some(texture) = texture_of(material) else { return Ok(()) };
+        let [u, v]: [[f32; MOST_PLACES]; 2] =
+            from_fn(|axis| from_fn(|i| start[axis] + i as f32 * step[axis]));
+        let look = |of: std::ops::Range<usize>| {
+            Look { texture, u: &u[of.clone()], v: &v[of], width2 }
+        };
+        let fast = evonav_simd::compute(look(0..num));
+        prop_assert_eq!(fast, look(0..num).compute());
+        for place in 0..num {
+            let alone = look(place..place + 1).compute();
+            prop_assert_eq!(alone.map(|channel| channel[0]), fast.map(|channel| channel[place]));
         }
     }
 

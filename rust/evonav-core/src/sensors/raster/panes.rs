@@ -54,17 +54,25 @@ impl Panes {
     ) -> Option<(Range<usize>, Range<usize>)> {
         self.forget();
         let (mut rows, mut blocks) = (canvas.height_px..0, canvas.blocks_per_row()..0);
+        let mut last = (0, false);
         for row in 0..canvas.height_px {
             for (block, index) in canvas.row_blocks(row).enumerate() {
                 let (tags, nearness) = (&mut canvas.tags[index], &mut canvas.nearness[index]);
-                let mut last = (0, false);
+                // Most blocks lie within the face of the block before.
+                let mut different = u32::from(last.1);
+                for tag in tags.iter() {
+                    different |= tag ^ last.0;
+                }
+                if different == 0 {
+                    continue;
+                }
                 for lane in 0..LANES.min(canvas.width_px - block * LANES) {
                     if tags[lane] != last.0 {
                         let face = (tags[lane] as usize).checked_sub(1);
                         last = (tags[lane], face.is_some_and(|face| mesh.is_pane(face)));
                     }
                     if last.1 {
-                        (tags[lane], nearness[lane], last) = (0, empty, (0, false));
+                        (tags[lane], nearness[lane]) = (0, empty);
                         self.pixels.push((row * canvas.width_px + block * LANES + lane) as u32);
                         rows = rows.start.min(row)..row + 1;
                         blocks = blocks.start.min(block)..blocks.end.max(block + 1);

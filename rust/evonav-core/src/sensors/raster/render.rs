@@ -227,69 +227,61 @@ impl Kernel for Resolve<'_> {
         let num_pixels = canvas.width_px * canvas.height_px;
         depth_m.resize(num_pixels, 0.0);
         let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
-        match lens.optics {
-            Optics::Perspective { .. } => unpad(canvas, &canvas.nearness, depth_m, |block| {
-                depths_of(block, empty, |nearness| 1.0 / nearness)
-            }),
-            Optics::Orthographic { .. } => unpad(canvas, &canvas.nearness, depth_m, |block| {
-                depths_of(block, empty, |nearness| horizon_m - nearness)
-            }),
+        for (row, depth_m) in depth_m.chunks_exact_mut(canvas.width_px).enumerate() {
+            let pixels = depth_m.iter_mut().zip(canvas.row(row));
+            match lens.optics {
+                Optics::Perspective { .. } => {
+                    for (depth_m, &nearness) in pixels {
+                        *depth_m = if nearness > empty { 1.0 / nearness } else { f32::INFINITY };
+                    }
+                }
+                Optics::Orthographic { .. } => {
+                    for (depth_m, &nearness) in pixels {
+                        let below_m = horizon_m - nearness;
+                        *depth_m = if nearness > empty { below_m } else { f32::INFINITY };
+                    }
+                }
+            }
         }
         instances.resize(if want.instances { num_pixels } else { 0 }, 0);
-        match want {
-            Want { instances: true, rgb: Some(_) } => {
-                unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
+        for (row, bodies) in instances.chunks_exact_mut(canvas.width_px).enumerate() {
+            let tags = &canvas.tags[canvas.row_blocks(row)];
+            match want.rgb {
+                Some(_) => to_bodies(mesh, tags, bodies),
+                None => {
+                    for (body, &tag) in bodies.iter_mut().zip(tags.as_flattened()) {
+                        *body = tag as i32;
+                    }
+                }
             }
-            Want { instances: true, rgb: None } => {
-                unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
-            }
-            Want { instances: false, .. } => {}
         }
         rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
     }
 }
 
-/// Return the depths of pixels, infinite where they are empty.
+/// Set the instance ids of a row by its face tags. Most blocks lie within one face.
 #[inline(always)]
-fn depths_of(nearness: &[f32; LANES], empty: f32, depth_m: impl Fn(f32) -> f32) -> [f32; LANES] {
-    let mut depths_m = [0.0; LANES];
-    for lane in 0..LANES {
-        let depth_m = depth_m(nearness[lane]);
-        depths_m[lane] = if nearness[lane] > empty { depth_m } else { f32::INFINITY };
-    }
-    depths_m
-}
-
-/// Copy rows of padded blocks to rows of exactly the image's width.
-#[inline(always)]
-fn unpad<T: Copy, U: Copy>(
-    canvas: &Canvas,
-    blocks: &[[T; LANES]],
-    image: &mut [U],
-    of_block: impl Fn(&[T; LANES]) -> [U; LANES],
-) {
-    let rows = blocks.chunks_exact(canvas.blocks_per_row());
-    for (row, blocks) in image.chunks_exact_mut(canvas.width_px).zip(rows) {
-        let (whole, rest) = row.as_chunks_mut();
-        for (pixels, block) in whole.iter_mut().zip(blocks) {
-            *pixels = of_block(block);
-        }
-        if let Some(block) = blocks.last() {
-            rest.copy_from_slice(&of_block(block)[..rest.len()]);
-        }
-    }
-}
-
-/// Return the instance ids of face tags. Most blocks lie within one face.
-#[inline(always)]
-fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES]) -> [i32; LANES] {
+fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
     let body_of = |tag: u32| match tag.checked_sub(1) {
         Some(face) => mesh.faces[face as usize].body as i32 + 1,
         None => 0,
     };
-    // Compared without a branch a lane.
-    if tags.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0 {
-        return [body_of(tags[0]); LANES];
+    let mut last = (0, 0);
+    for (bodies, tags) in bodies.chunks_mut(LANES).zip(tags) {
+        // Compared without a branch a lane.
+        let mut different = 0;
+        for tag in tags {
+            different |= tag ^ last.0;
+        }
+        if different == 0 {
+            bodies.fill(last.1);
+            continue;
+        }
+        for (body, &tag) in bodies.iter_mut().zip(tags) {
+            if tag != last.0 {
+                last = (tag, body_of(tag));
+            }
+            *body = last.1;
+        }
     }
-    tags.map(body_of)
 }

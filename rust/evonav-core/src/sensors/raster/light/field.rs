@@ -93,18 +93,21 @@ impl Field {
         // The whole number below a place and the rest, by the mantissa of a sum with 1.5 times 2^23:
         // unlike a conversion it needs no treatment of numbers out of range.
         let split = |place: f32, size: u16| {
-            let place = place.clamp(0.0, f32::from(size - 1) - 1e-3);
+            let most = f32::from(size - 1) - 1e-3;
+            let place = if place > 0.0 { place } else { 0.0 };
+            let place = if place < most { place } else { most };
             let sum = place - 0.5 + 12_582_912.0;
             (sum.to_bits() & 0xffff, place - (sum - 12_582_912.0))
         };
         let ((column, right), (row, down)) = (split(column, columns), split(row, rows));
         let at = (light.first + row * u32::from(columns) + column) as usize;
-        let upper = &self.points[at..at + 2];
-        let lower = &self.points[at + usize::from(columns)..][..2];
+        let below = usize::from(columns);
+        let near = &self.points[at..at + below + 2];
+        let corners = [near[0], near[1], near[below], near[below + 1]];
         let mut light = [0.0; 4];
         for (i, light) in light.iter_mut().enumerate() {
-            let above = upper[0][i] + right * (upper[1][i] - upper[0][i]);
-            let below = lower[0][i] + right * (lower[1][i] - lower[0][i]);
+            let above = corners[0][i] + right * (corners[1][i] - corners[0][i]);
+            let below = corners[2][i] + right * (corners[3][i] - corners[2][i]);
             *light = above + down * (below - above);
         }
         light

@@ -1,5 +1,7 @@
 //! Darkness in concave corners and around silhouettes, from depth alone.
 
+use evonav_simd::Kernel;
+
 use crate::sensors::raster::{
     canvas::{Canvas, LANES},
     lens::Optics,
@@ -97,7 +99,8 @@ impl Bends {
         let neighbours = neighbours(&self.padded, canvas, row, [reach_px; 2]);
         let centre = &canvas.row(row)[..width];
         let unit = 0.5 * scale_px as f32 / reach_px as f32;
-        open_row(&mut open[..width], centre, neighbours, &depth_m[..width], [unit, corner]);
+        let (open, depth_m) = (&mut open[..width], &depth_m[..width]);
+        evonav_simd::compute(OpenRow { open, centre, neighbours, depth_m, unit, corner });
     }
 
     /// Copy a row and continue it on both sides linearly, as the planes there continue.
@@ -133,29 +136,39 @@ fn darken_row(
     }
 }
 
-/// Set `open` by the greater bend of each pixel's row and column.
-#[inline(always)]
-fn open_row(
-    open: &mut [u16],
-    centre: &[f32],
-    [left, right, above, below]: [&[f32]; 4],
-    depth_m: &[f32],
-    [unit, corner]: [f32; 2],
-) {
-    const WHOLE: f32 = 32767.0;
-    let lesser = |a: f32, b: f32| if a < b { a } else { b };
-    // The product of [`corner_shade`], one of whose factors is always 1.
-    let share = |bend: f32| lesser(lesser(bend * (1.0 / FULL_BEND), 1.0), 1.8 - bend);
-    for i in 0..open.len() {
-        // The bend is relative to depth, as a pixel's width grows with it.
-        let bend = |sum: f32| (0.5 * sum - centre[i]) * (unit * depth_m[i]);
-        let (level, upright) = (share(bend(left[i] + right[i])), share(bend(above[i] + below[i])));
-        let most = if level > upright { level } else { upright };
-        let most = if most > 0.0 { most } else { 0.0 };
-        // The whole number nearest to one of 15 bits, by the mantissa of a sum with 2^23. Unlike a
-        // conversion it needs no treatment of numbers out of range.
-        let whole = (WHOLE - corner * WHOLE * most + 8_388_608.0).to_bits() & 0x7fff;
-        open[i] = (whole as u16) << 1;
+/// Sets `open` by the greater bend of each pixel's row and column.
+struct OpenRow<'a> {
+    open: &'a mut [u16],
+    centre: &'a [f32],
+    neighbours: [&'a [f32]; 4],
+    depth_m: &'a [f32],
+    unit: f32,
+    corner: f32,
+}
+
+impl Kernel for OpenRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        const WHOLE: f32 = 32767.0;
+        let Self { open, centre, neighbours, depth_m, unit, corner } = self;
+        let [left, right, above, below] = neighbours;
+        let lesser = |a: f32, b: f32| if a < b { a } else { b };
+        // The product of [`corner_shade`], one of whose factors is always 1.
+        let share = |bend: f32| lesser(lesser(bend * (1.0 / FULL_BEND), 1.0), 1.8 - bend);
+        for i in 0..open.len() {
+            // The bend is relative to depth, as a pixel's width grows with it.
+            let bend = |sum: f32| (0.5 * sum - centre[i]) * (unit * depth_m[i]);
+            let (level, upright) =
+                (share(bend(left[i] + right[i])), share(bend(above[i] + below[i])));
+            let most = if level > upright { level } else { upright };
+            let most = if most > 0.0 { most } else { 0.0 };
+            // The whole number nearest to one of 15 bits, by the mantissa of a sum with 2^23. Unlike
+            // a conversion it needs no treatment of numbers out of range.
+            let whole = (WHOLE - corner * WHOLE * most + 8_388_608.0).to_bits() & 0x7fff;
+            open[i] = (whole as u16) << 1;
+        }
     }
 }
 

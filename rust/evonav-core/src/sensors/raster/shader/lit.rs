@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use evonav_simd::Kernel;
+
 use crate::{
     sensors::raster::{
         canvas::{Canvas, LANES},
@@ -13,12 +15,12 @@ use crate::{
         shader::{
             bends::Bends,
             edges::Edges,
-            response::{pack, respond},
+            response::Develop,
             runs::{Runs, spans},
             surface::Surface,
         },
     },
-    textures::Texture,
+    textures::{MOST_PLACES, Texture},
     world::mesh::SceneMesh,
 };
 
@@ -90,8 +92,8 @@ impl Lit {
             let Self { bends, open, scale, .. } = self;
             bends.open(canvas, row, lens.optics, scale, CORNER_SHADE, open);
             self.light(mesh, light, lens, &rays, canvas, row);
-            self.bright.iter_mut().for_each(|channel| respond(channel, &self.open));
-            pack(&self.bright, &mut self.packed, pixels);
+            let Self { bright, open, packed, .. } = self;
+            evonav_simd::compute(Develop { bright, open, packed, pixels });
             for run in &self.empty {
                 // The ends of a run lie on one side of the horizon in level pictures.
                 let colour = if rays.is_below_horizon([run.start, row]) { GROUND } else { SKY };
@@ -126,7 +128,7 @@ impl Lit {
             }
             shot.run(index, surface, run.clone(), bright);
             if let Some(texture) = surface.texture {
-                shot.colour(surface, texture, run, bright);
+                evonav_simd::compute(Colour { shot: &shot, surface, texture, run, bright });
             }
         }
     }
@@ -217,27 +219,6 @@ impl Shot<'_> {
         }
     }
 
-    /// Multiply the light on a run of pixels, and on some after it, by a texture.
-    #[inline(never)]
-    fn colour(
-        &self,
-        surface: &Surface,
-        texture: &Texture,
-        run: Range<usize>,
-        bright: &mut [Vec<u16>; 3],
-    ) {
-        for first in run.clone().step_by(LANES) {
-            let scale = lanes(self.scale, first);
-            let middle = ((first + LANES).min(run.end - 1) - first) / 2;
-            let length2 = self.rays.length2([first + middle, self.row]);
-            let sums = surface.sample(texture, [first, self.row], scale, scale[middle], length2);
-            for (channel, (bright, sums)) in bright.iter_mut().zip(&sums).enumerate() {
-                let bright = bright[first..].first_chunk_mut().expect("rows are padded");
-                surface.colour(channel, sums, bright);
-            }
-        }
-    }
-
     /// Add the sun to pixels that it may reach; arguments as of [`Self::between`].
     #[inline(never)]
     fn add_sun(
@@ -274,6 +255,47 @@ impl Shot<'_> {
                     *smooth += (f32::from(full.saturating_sub(*smooth)) * reach) as u16;
                 }
             }
+        }
+    }
+}
+
+/// Multiplies the light on a run of pixels, and on some after it, by a texture.
+struct Colour<'a> {
+    shot: &'a Shot<'a>,
+    surface: &'a Surface,
+    texture: &'a Texture,
+    run: Range<usize>,
+    bright: &'a mut [Vec<u16>; 3],
+}
+
+impl Kernel for Colour<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { shot: &Shot { rays, row, scale, .. }, surface, texture, run, bright } = self;
+        let (mut u, mut v) = ([0.0; MOST_PLACES], [0.0; MOST_PLACES]);
+        let mut sums = [[0; MOST_PLACES]; 3];
+        let (mut first, mut end, mut level) = (run.start, run.start, 0);
+        while first < run.end {
+            // Blocks are looked up together while they are at the same level.
+            let mut next = level;
+            while end < run.end && end - first < MOST_PLACES {
+                let middle = end + ((end + LANES).min(run.end - 1) - end) / 2;
+                next = surface.level(texture, scale[middle], rays.length2([middle, row]));
+                if end > first && next != level {
+                    break;
+                }
+                (level, end) = (next, end + LANES);
+            }
+            let num = end - first;
+            let uv = [&mut u[..num], &mut v[..num]];
+            surface.coordinates([first, row], &scale[first..end], uv);
+            texture.sample(level, &u[..num], &v[..num], &mut sums);
+            for (channel, (bright, sums)) in bright.iter_mut().zip(&sums).enumerate() {
+                surface.colour(channel, &sums[..num], &mut bright[first..end]);
+            }
+            (first, level) = (end, next);
         }
     }
 }

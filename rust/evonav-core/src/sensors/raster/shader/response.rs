@@ -1,4 +1,6 @@
-//! The camera's response to brightness, for rows of pixels, in numbers of 16 bits.
+//! The camera's response to brightness, in numbers of 16 bits.
+
+use evonav_simd::Kernel;
 
 use crate::sensors::raster::canvas::LANES;
 
@@ -15,11 +17,44 @@ pub(super) fn product(a: u16, b: u16) -> u16 {
     ((u32::from(a) * u32::from(b)) >> 16) as u16
 }
 
-/// Compute a row of one channel in place: turn brightness, [`FINE`] times, into grey levels.
-///
-/// # Arguments
-/// * `open` - the share of light that corners leave, [`u16::MAX`] times.
-pub(super) fn respond(bright: &mut [u16], open: &[u16]) {
+/// Turns a row's brightness, [`FINE`] times, into colours.
+pub(super) struct Develop<'a> {
+    /// Brightness by channel, which becomes grey levels.
+    pub bright: &'a mut [Vec<u16>; 3],
+    /// The share of light that corners leave, [`u16::MAX`] times.
+    pub open: &'a [u16],
+    /// Working memory, of the length of `bright`.
+    pub packed: &'a mut [u32],
+    pub pixels: &'a mut [u8],
+}
+
+impl Kernel for Develop<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { bright, open, packed, pixels } = self;
+        for channel in bright.iter_mut() {
+            respond(channel, open);
+        }
+        let [red, green, blue] = &*bright;
+        for (((packed, red), green), blue) in packed.iter_mut().zip(red).zip(green).zip(blue) {
+            *packed = u32::from(red | green << 8) | u32::from(*blue) << 16;
+        }
+        let (whole, rest) = pixels.as_chunks_mut();
+        let (blocks, _) = packed.as_chunks();
+        for (pixels, block) in whole.iter_mut().zip(blocks) {
+            *pixels = bytes_of(block);
+        }
+        if !rest.is_empty() {
+            rest.copy_from_slice(&bytes_of(&blocks[whole.len()])[..rest.len()]);
+        }
+    }
+}
+
+/// Turn brightness into grey levels.
+#[inline(always)]
+fn respond(bright: &mut [u16], open: &[u16]) {
     /// Brightness of 1, and what 1 becomes when it is multiplied by that.
     const ONE: f32 = 255.0 * FINE;
     const SHARE: f32 = ONE / 65536.0;
@@ -33,22 +68,6 @@ pub(super) fn respond(bright: &mut [u16], open: &[u16]) {
         // Pixels that are not those of a surface, which get their colours later, have any brightness.
         let slope = A.wrapping_add(product(x, B.wrapping_sub(product(x, C))));
         *bright = (product(x, slope).wrapping_add(16) >> 5).min(255);
-    }
-}
-
-/// Put the channels of a row together: whole blocks of `packed`, of which `pixels` gets the first.
-pub(super) fn pack(channels: &[Vec<u16>; 3], packed: &mut [u32], pixels: &mut [u8]) {
-    let [red, green, blue] = channels;
-    for (((packed, red), green), blue) in packed.iter_mut().zip(red).zip(green).zip(blue) {
-        *packed = u32::from(red | green << 8) | u32::from(*blue) << 16;
-    }
-    let mut blocks = packed.as_chunks().0.iter();
-    let (whole, rest) = pixels.as_chunks_mut();
-    for (pixels, block) in whole.iter_mut().zip(&mut blocks) {
-        *pixels = bytes_of(block);
-    }
-    if let Some(block) = blocks.next() {
-        rest.copy_from_slice(&bytes_of(block)[..rest.len()]);
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::{
     sensors::raster::{
-        canvas::LANES,
         lens::Lens,
         light::Light,
         shader::{
@@ -92,42 +91,39 @@ impl Surface {
         }
     }
 
-    /// Return the texture's colours, by channel, of a block of pixels that starts at
-    /// `[column, row]`: 256 times factors of [`NEUTRAL`].
+    /// Return the [`Texture::level`] at which a block of pixels is looked up.
+    ///
+    /// # Arguments
+    /// * `middle`, `length2` - the depth in the middle of the pixels that show the face (1 in
+    ///   orthographic views), and the result of
+    ///   [`Rays::length2`](crate::sensors::raster::lens::Rays::length2) there.
+    #[inline(always)]
+    pub fn level(&self, texture: &Texture, middle: f32, length2: f32) -> usize {
+        let middle2 = middle * middle;
+        texture.level(self.detail * middle2 * (self.slant * middle2 * length2).max(1.0))
+    }
+
+    /// Set the texture's coordinates at pixels of a row from `[column, row]` on.
     ///
     /// # Arguments
     /// * `scale` - depths; 1 in orthographic views.
-    /// * `middle`, `length2` - the scale in the middle of the pixels that show the face, and the
-    ///   result of [`Rays::length2`](crate::sensors::raster::lens::Rays::length2) there.
     #[inline(always)]
-    pub fn sample(
-        &self,
-        texture: &Texture,
-        [column, row]: [usize; 2],
-        scale: &[f32; LANES],
-        middle: f32,
-        length2: f32,
-    ) -> [[u16; LANES]; 3] {
+    pub fn coordinates(&self, [column, row]: [usize; 2], scale: &[f32], uv: [&mut [f32]; 2]) {
         let (first, row) = (column as f32 + 0.5, row as f32 + 0.5);
-        let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
-        let [[du, u_down, u_at], [dv, v_down, v_at]] = self.coordinates;
-        let (u_row, v_row) = (u_down * row + u_at, v_down * row + v_at);
-        for lane in 0..LANES {
-            let at = first + lane as f32;
-            u[lane] = (du * at + u_row) * scale[lane];
-            v[lane] = (dv * at + v_row) * scale[lane];
+        for (coordinate, [du, u_down, u_at]) in uv.into_iter().zip(self.coordinates) {
+            let u_row = u_down * row + u_at;
+            for ((u, scale), place) in coordinate.iter_mut().zip(scale).zip(0_i32..) {
+                *u = (du * (first + place as f32) + u_row) * scale;
+            }
         }
-        let middle2 = middle * middle;
-        let width2 = self.detail * middle2 * (self.slant * middle2 * length2).max(1.0);
-        texture.sample(&u, &v, width2)
     }
 
     /// Turn the root of the light on pixels into brightness.
     ///
     /// # Arguments
-    /// * `sums` - the results of [`Self::sample`] for a channel.
+    /// * `sums` - what was looked up in the texture, for a channel.
     #[inline(always)]
-    pub fn colour(&self, channel: usize, sums: &[u16; LANES], bright: &mut [u16; LANES]) {
+    pub fn colour(&self, channel: usize, sums: &[u16], bright: &mut [u16]) {
         const WHITE: u16 = (255.0 * RAISED * FINE) as u16;
         const LEAST: u16 = (BLACK * FINE) as u16;
         let factor = self.factor[channel];
