@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from evonav.controlled.generate import ControlledOptions
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.oracle import during_record, target_record
 from evonav.generation import GenerationParameters, generate_task
 from evonav.generation.validation import validate_task
+from evonav.gym.sources import FolderTasks
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task
 from evonav.tasks.files import load_task, write_task
@@ -126,3 +128,11 @@ def test_another_delta_or_target_is_a_problem(changing: Task) -> None:
 def test_bad_parameters_are_named(house: House, extensions: dict[str, object], field: str) -> None:
     with pytest.raises(InvalidArgumentError, match=field):
         task_of(house, **extensions)
+
+
+def test_gymnasium_and_controlled_arms_say_that_they_do_not_take_it(changing: Task, tmp_path: Path) -> None:
+    write_task(changing, tmp_path)
+    with pytest.raises(InvalidArgumentError, match=r"extension `during_stage`\), which Gymnasium does not play"):
+        FolderTasks(tmp_path).task(0)
+    with pytest.raises(InvalidArgumentError, match=r"parameters\.extensions\.during_stage is on"):
+        ControlledOptions(parameters=changing.header.parameters)

@@ -69,8 +69,9 @@ def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
     for stage in range(1, task.num_stages + 1):
         house = House(task.house_json(stage), name=f"{task.task_id}/houses/stage_{stage}.json.gz")
         image = image_uri(task.reference_images[stage - 1], IMAGE_PX)
-        maps[stage] = floor_plan_of(house, task_id=task.task_id, stage=stage, reference_image=image)
-    moving = moving_ids(list(maps.values()))
+        at_end = None if task.oracle(stage).during is None else House(task.house_json_at_end(stage))
+        maps[stage] = floor_plan_of(house, task_id=task.task_id, stage=stage, reference_image=image, at_end=at_end)
+    moving = moving_ids([plan for start in maps.values() for plan in (start, start.at_end)])
     return TaskDrawing(task, prefix, frame_of(maps.values()), maps, door_ends(house), moving)
 
 
@@ -91,18 +92,19 @@ def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     evolution = drawing.task.oracle(stage).evolution
     removed = {record.id for record in evolution.removals}
     leaving = {change.id for change in evolution.changes} - removed
-    return _plan(drawing, stage - 1, evolution, frame, {"moved": leaving, "gone": removed})
+    plan = drawing.maps[stage - 1].at_end
+    return _plan(drawing, plan, evolution, frame, {"moved": leaving, "gone": removed})
 
 
 def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     """Draw the house of a stage with what was changed, and from where: content of an `svg` element."""
-    oracle, previous = drawing.task.oracle(stage), drawing.maps.get(stage - 1)
+    oracle, previous = drawing.task.oracle(stage), _before(drawing, stage)
     evolution = oracle.evolution
     moved = {change.id for change in evolution.changes}
     added = {record.id for record in evolution.additions}
     old = [] if previous is None else [item for item in previous.objects if item.object_id in moved]
     ghosts = furniture(old, frame, "items ghost")
-    plan = _plan(drawing, stage, evolution, frame, {"moved": moved - added, "new": added}, ghosts)
+    plan = _plan(drawing, drawing.maps[stage], evolution, frame, {"moved": moved - added, "new": added}, ghosts)
     arrows = relocation_arrows(
         transition_record(oracle.evolution).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
     )
@@ -114,7 +116,7 @@ def course_svg(drawing: TaskDrawing, stage: int) -> str:
     oracle, frame = drawing.task.oracle(stage), drawing.frame
     evolution = oracle.evolution
     stressed = {"moved": {change.id for change in evolution.changes}}
-    plan = _plan(drawing, stage, evolution, frame, stressed)
+    plan = _plan(drawing, drawing.maps[stage], evolution, frame, stressed)
     between = join(
         f'<path class="between" stroke-width="{0.6 * frame.unit:.1f}" d="{outline(room.polygon_m)}">'
         f"{title('transition room')}</path>"
@@ -131,7 +133,7 @@ def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
     changed |= {record.id for record in (*evolution.additions, *evolution.removals)}
     changed |= {state.id for state in evolution.states}
     points: list[Point] = []
-    for stage_map in (drawing.maps[stage - 1], drawing.maps[stage]):
+    for stage_map in (drawing.maps[stage - 1].at_end, drawing.maps[stage]):
         points += [p for room in stage_map.rooms if room.room_id == evolution.room_id for p in room.polygon_m]
         points += [p for item in stage_map.objects if item.object_id in changed for p in item.polygon_m]
         points += [p for name, ends in drawing.doors.items() if name in changed for p in ends]
@@ -147,7 +149,7 @@ def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
         transition_record(oracle.evolution).relocations,
         frame,
         stage_map=stage_map,
-        previous_map=drawing.maps.get(stage - 1),
+        previous_map=_before(drawing, stage),
     )
     return join(
         [
@@ -160,16 +162,20 @@ def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
     )
 
 
+def _before(drawing: TaskDrawing, stage: int) -> FloorPlan | None:
+    """Return the house as the stage before left it; `None` for stage 1."""
+    return drawing.maps[stage - 1].at_end if stage > 1 else None
+
+
 def _plan(
     drawing: TaskDrawing,
-    stage: int,
+    stage_map: FloorPlan,
     evolution: Evolution,
     frame: Frame,
     stressed: Mapping[str, set[str]],
     ghosts: str = "",
 ) -> str:
-    """Draw a stage's house; `stressed` has the ids that are drawn in a CSS class of their own."""
-    stage_map = drawing.maps[stage]
+    """Draw a house of a stage; `stressed` has the ids that are drawn in a CSS class of their own."""
 
     def use(name: str) -> str:
         return f'<use href="#{drawing.prefix}-{name}"/>'
