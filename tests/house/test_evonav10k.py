@@ -14,9 +14,10 @@ import pytest
 import evonav
 from evonav.cli import main
 from evonav.errors import HouseError, InvalidArgumentError, StoreError
+from evonav.generation import generate_task
 from evonav.generation.dataset import generate_dataset, inherited_names
 from evonav.generation.worker import GenerationOptions
-from evonav.house import evonav10k, stream_houses
+from evonav.house import House, evonav10k, stream_houses
 from evonav.house.evonav10k import SPLITS, HousesDifferError, MadeSplit, made_split, split_path
 from evonav.house.files import HouseTexts
 from evonav.house.generated import house_maker
@@ -54,6 +55,23 @@ def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("split", FIRST_HOUSES)
 def test_the_first_houses_stay_the_same(split: Split) -> None:
     assert hashlib.sha256(text_of(split, 3).encode()).hexdigest() == FIRST_HOUSES[split]
+
+
+def test_the_first_task_of_test_90_stays_the_same() -> None:
+    """The first in the folder; its id ends in a checksum of house and seed."""
+    house = House(house_maker(json.dumps({"split": "test"})).make(SPLITS["test"].seed, 16), name="evonav-10k:test:17")
+    task = generate_task(house, seed=0)
+    assert task.header.house.sha256.startswith("fffa2a3e22e8f48f")
+    goals = [
+        (task.oracle(stage).evolution.outcome, task.public(stage).category, task.oracle(stage).target.id)
+        for stage in range(1, 5)
+    ]
+    assert goals == [
+        ("first_stage", "CounterTop", "2|0"),
+        ("evolved", "RemoteControl", "small|3|7"),
+        ("evolved", "PepperShaker", "small|2|1"),
+        ("not_triggered", "Book", "small|3|6"),
+    ]
 
 
 def test_the_splits_have_their_sizes_and_no_seed_in_common() -> None:
