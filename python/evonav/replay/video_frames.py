@@ -121,7 +121,7 @@ def _header(moment: Moment) -> str:
     agent = record.agent[-40:]
     task_left = MARGIN + _LETTER * 26 * len(agent) + 18
     changed = " changed" if record.transition.relocations else ""
-    change = change_words(record, maps) if first_round == 0 else f"during the stage: {change_words(record, maps)}"
+    change = change_words(record, maps) if first_round == 0 else f"now: {change_words(record, maps)}"
     truth = change if changed else f"what is true: {change}"
     heads = ("what it sees", "what it knows: map and memory", truth)
     return (
