@@ -163,7 +163,8 @@ def write_files_of(page: Path, place: Path) -> None:
         if language == "python" and (found := re.match(r"# (\w+\.py)\b", text)):
             texts[found[1]] = texts.get(found[1], "") + text
         if language == "toml":
-            texts["theta.toml"] = text
+            named = re.match(r"# (\w+\.toml)\b", text)
+            texts[named[1] if named else "theta.toml"] = text
     for name, text in texts.items():
         (place / name).write_text(text)
 
