@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from evonav.agents.grid import eroded
 from evonav.decision.candidates import Point2
 from evonav.memory import Frontier, FrontierConfig, OccupancyMap
 from evonav.memory.occupancy import UNKNOWN
@@ -106,7 +106,7 @@ class Explorer:
         for conflicts in found:  # views overlap: a cell counts once
             for cells in (conflicts.freed, conflicts.obstructed):
                 is_conflict[cells[:, 0], cells[:, 1]] = True
-        num_conflicting = int(_eroded(is_conflict, self.config.conflict_margin_cells).sum())
+        num_conflicting = int(eroded(is_conflict, self.config.conflict_margin_cells).sum())
         return num_conflicting >= self.config.min_conflict_cells
 
     def _give_up_unseeable(self, observation: Observation, here: Point2) -> None:
@@ -145,16 +145,6 @@ class Explorer:
     def stop_exploring(self) -> None:
         """Note that the agent goes elsewhere: its arrival says nothing about a frontier."""
         self._last = None
-
-
-def _eroded(cells: NDArray[np.bool_], margin_cells: int) -> NDArray[np.bool_]:
-    """Return the cells whose neighbours up to `margin_cells` rows and columns away are all set, too."""
-    for _ in range(margin_cells):
-        padded = np.pad(cells, 1)
-        shifts = range(3)
-        rows, cols = cells.shape
-        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in shifts for c in shifts])
-    return cells
 
 
 def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:

@@ -125,6 +125,8 @@ def owners_of(
 
 def eroded(floor: NDArray[np.bool_], depth: int) -> NDArray[np.bool_]:
     """Return the cells whose square of `depth` cells in each direction is all floor."""
+    if depth == 0:
+        return floor
     width = 2 * depth + 1
     for _ in range(2):  # along the rows, then along the columns
         sums = np.zeros((len(floor) + width, floor.shape[1]), np.int32)

@@ -1,6 +1,6 @@
 """Change a house around an agent that stands in it."""
 
-from evonav import _core
+from evonav.world.embedded import core_of
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
@@ -28,18 +28,6 @@ def change_around(
         HouseError: The change names an object that the house does not contain.
         InvalidArgumentError: The change is malformed.
     """
-    intrinsics = config.intrinsics
-    core = _core.EmbeddedSimulator(
-        house_json,
-        name="house",
-        image_px=(config.width_px, config.height_px),
-        vertical_fov_rad=intrinsics.vertical_fov_rad,
-        clip_m=(config.near_m, config.far_m),
-        camera_height_m=config.camera_height_m,
-        agent_radius_m=config.agent_radius_m,
-        agent_height_m=config.agent_height_m,
-        allow_unknown_assets=True,
-        style=config.style,
-    )
+    core = core_of(house_json, config, name="house", allow_unknown_assets=True)
     changed, skipped = core.change_around(delta_json, agent_m=(pose.x_m, pose.z_m), target_id=target_id)
     return changed, tuple(skipped)

@@ -75,18 +75,7 @@ class EmbeddedSimulator:
             name = name or house.name
             house = house.to_json()
         self._house_name = name or "house"
-        core = _core.EmbeddedSimulator(
-            house,
-            name=self._house_name,
-            image_px=(self.config.width_px, self.config.height_px),
-            vertical_fov_rad=self.intrinsics.vertical_fov_rad,
-            clip_m=(self.config.near_m, self.config.far_m),
-            camera_height_m=self.config.camera_height_m,
-            agent_radius_m=self.config.agent_radius_m,
-            agent_height_m=self.config.agent_height_m,
-            allow_unknown_assets=self.allow_unknown_assets,
-            style=self.config.style,
-        )
+        core = core_of(house, self.config, name=self._house_name, allow_unknown_assets=self.allow_unknown_assets)
         self._appearance = ()
         return self._enter(core, pose)
 
@@ -339,6 +328,29 @@ class EmbeddedSimulator:
                 pose = replace(pose, x_m=x_m, z_m=z_m)
             self._pose = self.config.standing(pose)
         return self._pose
+
+
+def core_of(
+    house_json: str, config: SimulatorConfig, *, name: str, allow_unknown_assets: bool
+) -> _core.EmbeddedSimulator:
+    """Load a house in the Rust core, with a simulator's camera, body and style.
+
+    Raises:
+        HouseError: The house is malformed or contains an unknown asset.
+        InvalidArgumentError: A number of the configuration is out of range, or there is no such style.
+    """
+    return _core.EmbeddedSimulator(
+        house_json,
+        name=name,
+        image_px=(config.width_px, config.height_px),
+        vertical_fov_rad=config.intrinsics.vertical_fov_rad,
+        clip_m=(config.near_m, config.far_m),
+        camera_height_m=config.camera_height_m,
+        agent_radius_m=config.agent_radius_m,
+        agent_height_m=config.agent_height_m,
+        allow_unknown_assets=allow_unknown_assets,
+        style=config.style,
+    )
 
 
 def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:

@@ -40,10 +40,9 @@ class SearchedCells:
 
     def see(self, view: View) -> None:
         """Take in the surfaces that a view shows."""
-        rows, cols = seen_cells(view, self.coarse.frame, self._config.detection_range_m)
         frame = self.coarse.frame
-        dx_m = view.pose.x_m - (frame.corner_m[0] + (cols + 0.5) * frame.cell_m)
-        dz_m = view.pose.z_m - (frame.corner_m[1] + (rows + 0.5) * frame.cell_m)
+        rows, cols = seen_cells(view, frame, self._config.detection_range_m)
+        dx_m, dz_m = ((view.pose.x_m, view.pose.z_m) - frame.centres_m(np.stack([rows, cols], axis=-1))).T
         sectors = (np.arctan2(dx_m, dz_m) % math.tau / math.tau * NUM_SECTORS).astype(int) % NUM_SECTORS
         missed = 1.0 - self._config.detection_rate
         gaps_m = np.hypot(dx_m, dz_m)
@@ -90,8 +89,7 @@ def seen_cells(view: View, frame: MapFrame, range_m: float) -> tuple[NDArray[np.
     points_m = unproject(depth_m, view.pose, intrinsics).reshape(-1, 3)
     dx_m, dz_m = points_m[:, 0] - view.pose.x_m, points_m[:, 2] - view.pose.z_m
     points_m = points_m[dx_m**2 + dz_m**2 <= range_m**2]  # none without a depth: these are not finite
-    cols = np.floor((points_m[:, 0] - frame.corner_m[0]) / frame.cell_m).astype(np.int64)
-    rows = np.floor((points_m[:, 2] - frame.corner_m[1]) / frame.cell_m).astype(np.int64)
+    rows, cols = frame.cells_at(points_m[:, ::2]).T
     is_inside = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
     flat = np.zeros(frame.rows * frame.cols, np.bool_)
     flat[rows[is_inside] * frame.cols + cols[is_inside]] = True
