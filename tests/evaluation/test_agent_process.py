@@ -21,6 +21,7 @@ from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentFailedError,
     AgentHosting,
+    AgentProcess,
     check_importable,
 )
 from evonav.evaluation.hosting.processes import AgentProcesses
@@ -174,15 +175,36 @@ def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
         assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in found)
 
 
-def test_an_agent_lost_between_stages_begins_anew(tasks, tmp_path, monkeypatch):
-    """Its process ends after stage 1: stage 2 is not run by an agent that never received the task."""
+@pytest.mark.parametrize("num_retries", [0, 1])
+def test_an_agent_lost_between_stages_fails_the_next_one(tasks, tmp_path, monkeypatch, num_retries):
+    """Its process ends as it tells the costs of stage 1: stage 2 is not run by an agent that remembers nothing."""
     monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
     config = RunConfig(backend=replace(TOY, decision=Component("unruly_agents:Fatal")), protocol=SHORT)
-    evaluate(["toy_agents:Explorer"], tasks[:1], tmp_path / "run", config=config, num_workers=1)
+    arguments = ["toy_agents:Explorer"], tasks[:1], tmp_path / "run"
+    evaluate(*arguments, config=config, num_workers=1, num_retries=num_retries)
     found = records(tmp_path / "run", "toy_agents:Explorer")
     assert (tmp_path / "alive").exists()
-    assert EndState.ERRORED not in {record.state for record in found}
-    assert [record.memory_lost_at for record in found] == [None, 2, 2]
+    assert [record.is_scored for record in found] == [True, num_retries > 0, True]
+    assert [record.memory_lost_at for record in found] == [None, None, None if num_retries else 3]
+    with RunStore(tmp_path / "run") as store:
+        (failure,) = store.failures()
+    assert (failure.kind, failure.stage, failure.is_retried) == (ErrorKind.CRASH, 2, num_retries > 0)
+    assert "exit code 3" in failure.message
+
+
+class Killed:
+    """A fork server that is killed before it forks."""
+
+    def fork(self, *arguments, **options):
+        raise ConnectionResetError("closed")
+
+
+def test_a_process_that_does_not_start_is_a_crash(tmp_path):
+    hosting = AgentHosting(log=str(tmp_path / LOG_NAME), is_sandboxed=True, scratch=str(tmp_path))
+    with pytest.raises(AgentFailedError, match="the agent's process does not start: closed") as caught:
+        AgentProcess("random-walk", hosting, Killed())
+    assert caught.value.kind is ErrorKind.CRASH
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):

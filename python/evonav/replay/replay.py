@@ -19,7 +19,6 @@ from evonav.decision.change_notice import recorded_notice
 from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.spec import EpisodeSpec, drawn_shift_m, opaque_task_id
 from evonav.evaluation.hosting.shifted import Shift
 from evonav.evaluation.protocol import ProtocolConfig
@@ -197,7 +196,7 @@ def _answers_itself(backend: Backend) -> bool:
 def _loss(record: StageRecord) -> Loss | None:
     """Return the loss of the agent's process in a stage, if there was one."""
     error = record.error
-    if record.state is not EndState.ERRORED or error is None or error.kind not in LOSSES:
+    if record.state is not EndState.ERRORED or error is None or not error.kind.loses_memory:
         return None
     return Loss(len(record.trace), error.kind, error.message)
 

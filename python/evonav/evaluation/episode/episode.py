@@ -9,7 +9,7 @@ from dataclasses import replace
 from time import process_time
 
 from evonav.agents.agent import Agent
-from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver
+from evonav.evaluation.episode.observer import EpisodeObserver
 from evonav.evaluation.episode.oracle_baselines import OracleBaseline, as_oracle_baseline
 from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec
@@ -87,10 +87,11 @@ class Episode:
             if run.failure is not None and not run.failure.is_agents:
                 failure = record
                 continue
+            is_lost = self._is_replaced
             if run.failure is not None:
                 failed = (*failed, stage)
+                is_lost = is_lost or run.failure.loses_memory
             pose = self._end_pose(stage)
-            is_lost = run.failure in LOSSES or self._context.agent.is_lost or self._is_replaced
             self._is_replaced = False
             if is_lost:
                 self._state = EpisodeState()
@@ -102,7 +103,7 @@ class Episode:
 
     def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:
         """Return the costs of the agent's decision model in the stage; empty if they are unknown."""
-        if failure in LOSSES:
+        if failure is not None and failure.loses_memory:
             self._last_costs = {}
             return {}
         costs, before = self._context.agent.costs(), self._last_costs

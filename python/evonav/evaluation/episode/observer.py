@@ -36,10 +36,6 @@ class EpisodeObserver(Protocol):
         ...
 
 
-LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
-"""Failures that end the agent's process, and its memory with it."""
-
-
 class StageFailedError(Exception):
     """A stage that cannot continue, and the kind of its error."""
 

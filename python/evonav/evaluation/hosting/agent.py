@@ -12,7 +12,6 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.model_relay import is_relayed
 from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, failure_of
 from evonav.evaluation.hosting.processes import AgentProcesses
-from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
@@ -32,11 +31,6 @@ class HostedAgent(ABC):
     def cpu_s(self) -> float:
         """CPU time that processes of its own have used."""
         return 0.0
-
-    @property
-    def is_lost(self) -> bool:
-        """True if the agent has lost its memory with its process; the next one must begin with the task."""
-        return False
 
     @abstractmethod
     def begin_task(self, task: TaskInfo) -> None:
@@ -140,7 +134,8 @@ class RemoteAgent(HostedAgent):
         self._task_id = task_id
         self._process: AgentProcess | None = None
         self._sensors: SensorConfig | None = None
-        self._is_lost = False
+        self._lost_between: AgentFailedError | None = None
+        """The loss of the process after a stage, by which the next one fails."""
         self._last_parts: Mapping[str, bytes] = {}
         """Parts of the answer to the last `act`."""
         self._label = name
@@ -157,11 +152,6 @@ class RemoteAgent(HostedAgent):
         return None if self._process is None else self._process.memory_mb
 
     @property
-    def is_lost(self) -> bool:
-        """True if the agent has lost its memory with its process; the next one must begin with the task."""
-        return self._is_lost
-
-    @property
     def sensors(self) -> SensorConfig:
         """The sensors that the agent needs."""
         if self._sensors is None:
@@ -173,7 +163,6 @@ class RemoteAgent(HostedAgent):
         """Start in a new house."""
         self._label = f"{self._name} {self._task_id or task.task_id}"
         self._describe(self._label)
-        self._is_lost = False
         self._sense(self._ask("begin_task", task))
 
     def begin_stage(self, goal: Goal) -> None:
@@ -205,7 +194,11 @@ class RemoteAgent(HostedAgent):
             return {}
         try:
             costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
-        except (InvalidArgumentError, AgentFailedError):  # they decide nothing
+        except InvalidArgumentError:  # they decide nothing
+            return {}
+        except AgentFailedError as error:
+            if error.kind.loses_memory:
+                self._lost_between = error
             return {}
         trusted = {} if self._process.relay is None else self._process.relay.costs()
         return {**{str(name): amount for name, amount in costs.items()}, **trusted}
@@ -217,6 +210,9 @@ class RemoteAgent(HostedAgent):
         self._process = self._sensors = None
 
     def _make(self) -> None:
+        if self._lost_between is not None:
+            error, self._lost_between = self._lost_between, None
+            raise error
         with self._processes.waiting():
             self._process = self._processes.lend(self._name)
             self._describe(self._label)
@@ -244,8 +240,7 @@ class RemoteAgent(HostedAgent):
             with self._processes.waiting():
                 return process.ask(operation, *arguments)
         except AgentFailedError as error:
-            self._is_lost = error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT)
-            if self._is_lost or operation == "make":
+            if error.kind.loses_memory or operation == "make":
                 self.close()
             raise
         finally:

@@ -86,8 +86,9 @@ class OutputLog:
             self._left = MAX_LOG_BYTES
 
     def end(self) -> None:
-        """Wait up to a second for the last output."""
-        self._thread.join(timeout=1.0)
+        """Wait up to a second for the last output; a process that did not start has none."""
+        if self._thread.is_alive():
+            self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
         with os.fdopen(self._reader, "rb") as output:

@@ -155,6 +155,7 @@ class AgentProcess:
             with one_thread_each():
                 self._process = self._started(fork_server, inherited, stderr, path)
         except OSError as error:
+            self._connection.close()
             self._ends.close()
             raise AgentFailedError(ErrorKind.CRASH, f"the {self.noun}'s process does not start: {error}") from None
         finally:

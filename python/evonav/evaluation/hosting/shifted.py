@@ -158,11 +158,6 @@ class ShiftedAgent(HostedAgent):
         """CPU time that processes of its own have used."""
         return self._agent.cpu_s
 
-    @property
-    def is_lost(self) -> bool:
-        """True if the agent has lost its memory with its process; the next one must begin with the task."""
-        return self._agent.is_lost
-
     def begin_task(self, task: TaskInfo) -> None:
         """Start in a new house."""
         self._agent.begin_task(self._shift.shifted_task(task))

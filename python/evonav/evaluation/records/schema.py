@@ -62,7 +62,12 @@ class ErrorKind(str, Enum):
     @property
     def is_agents(self) -> bool:
         """True if the agent caused the error: such a failure costs its stage, and the episode continues."""
-        return self in (ErrorKind.AGENT, ErrorKind.DECISION, ErrorKind.CRASH, ErrorKind.TIMEOUT)
+        return self in (ErrorKind.AGENT, ErrorKind.DECISION) or self.loses_memory
+
+    @property
+    def loses_memory(self) -> bool:
+        """True if the agent's process ended, and its memory with it."""
+        return self in (ErrorKind.CRASH, ErrorKind.TIMEOUT)
 
 
 _PHRASES = {

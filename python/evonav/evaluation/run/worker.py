@@ -29,7 +29,6 @@ from evonav.agents.agent import Agent, SensorConfig
 from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
@@ -45,7 +44,7 @@ from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
 WORK = "evonav.evaluation.run.worker:EpisodeWork"
-RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, *LOSSES)
+RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, ErrorKind.CRASH, ErrorKind.TIMEOUT)
 """Failures that a retry may avoid; an exception of an agent or simulator would be the same again."""
 MAX_CONTEXTS = 2
 """Largest number of contexts of a worker; the least recently used one is closed, unless an episode uses it."""
