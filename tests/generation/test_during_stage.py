@@ -1,6 +1,7 @@
 """Changes during stages, in generation: valid tasks that stay feasible, and nothing else changes."""
 
 import json
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from evonav.controlled.generate import ControlledOptions
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.oracle import during_record, target_record
 from evonav.generation import GenerationParameters, generate_task
+from evonav.generation.statistics.compute import statistics_of
+from evonav.generation.statistics.task_summary import TaskSummary, summary_of
 from evonav.generation.validation import validate_task
 from evonav.gym.sources import FolderTasks
 from evonav.house import House, bundled_houses
@@ -41,6 +44,28 @@ def test_the_house_changes_in_a_round_of_the_range_and_the_task_is_valid(changin
     assert len(during) == 4
     assert all(2 <= one.round <= 9 and one.evolution.outcome == "evolved" for one in during)
     assert len({one.round for one in during}) > 1
+
+
+def _summary(task: Task) -> TaskSummary:
+    return summary_of(task.header, task.oracle_stages, task.public_stages, task.house_json(1))
+
+
+def test_statistics_count_changes_during_stages(house: House, changing: Task) -> None:
+    tasks = (changing, task_of(house, during_stage={"probability": 0.0, "rounds": [2, 9]}))
+    found = statistics_of(map(_summary, tasks))
+    during = [stage.during for stage in changing.oracle_stages if stage.during is not None]
+    num_moved = sum(one.is_target_relocated for one in during)
+    assert (found.metric("during").n, found.metric("during_target").n) == (8, 4)
+    shares = [found.metric(key).raw for key in ("during", "during_target")]
+    assert [None if one is None else one.value for one in shares] == [0.5, num_moved / 4]
+    modes, rounds = found.distribution("during_modes"), found.quantity("during_round")
+    assert modes is not None
+    assert dict(zip(modes.names, modes.counts, strict=True)) == Counter(one.evolution.mode for one in during)
+    assert rounds is not None
+    assert rounds.mean == pytest.approx(sum(one.round for one in during) / 4)
+    never = statistics_of([_summary(task_of(house))])
+    assert never.metric("during").raw is None
+    assert never.distribution("during_modes") is None
 
 
 def test_later_stages_start_from_the_house_after_the_change(changing: Task) -> None:

@@ -24,6 +24,7 @@ class MetricInfo:
 
 
 _EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", "Objects", "Tasks"
+_DURING = "Changes during stages"
 
 # `paper`: Sec. 3.2 and its plot. `expected` of evolutions: binomial, K uniform on {3, 4, 5}. Other `expected`: a trial
 # of Algorithm 1 in ProcTHOR-10k's mix, without images and rejected goals (scripts/try_readings.py, docs/dataset.md).
@@ -56,6 +57,8 @@ METRICS = (
     MetricInfo("unmoved", "found no other place", _OBJECTS),
     MetricInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
     MetricInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    MetricInfo("during", "stages with a change", _DURING),
+    MetricInfo("during_target", "  that moved the target", _DURING),
     MetricInfo("num_stages", "stages per task", _TASKS, "stages", paper=4.010, expected=4.0),
     MetricInfo("goals_refused", "goals rejected per stage", _TASKS, "goals"),
 )
@@ -70,6 +73,7 @@ DISTRIBUTIONS = {
     "modes": "Modes of evolutions",
     "modes_drawn": "Modes drawn, applied or not",
     "relocated_ratio": "Share of objects relocated by the end",
+    "during_modes": "Modes of changes during stages",
     "outcomes": "Outcomes of transitions",
     "failures": "Reasons why a triggered change failed",
     "num_stages": "Stages per task",
@@ -85,6 +89,7 @@ DISTRIBUTIONS = {
 QUANTITIES = {
     "relocated_ratio": ("Share of objects relocated by the end", "share"),
     "displacement_m": ("Displacement of relocated objects", "m"),
+    "during_round": ("Round of changes during stages", "rounds"),
     "path_m": ("Reference path of a stage", "m"),
     "task_path_m": ("Reference path of a task", "m"),
     "reference_distance_m": ("Reference pose to target", "m"),

@@ -15,7 +15,7 @@ from evonav.house import House
 from evonav.parallel.pool import Answer, Job, answers, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.tasks.manifest import PublicStage, TaskHeader
-from evonav.tasks.oracle import Evolution, OracleStage
+from evonav.tasks.oracle import DuringRecord, Evolution, OracleStage
 from evonav.tasks.records import parse_record, read_file, read_gzip
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
@@ -119,6 +119,8 @@ def summary_of(
     for stage in oracle:
         _add_goal(summary, stage, room_types, earlier)
         earlier.add(stage.target.id)
+        if theta.extensions.during_stage is not None:
+            _add_during(summary, stage.during)
         if stage.stage > 1:
             _add_transition(summary, stage, previous, objects_by_room)
             previous = stage.evolution
@@ -205,6 +207,14 @@ def _add_transition(
             summary.add_value("displacement_m", change.displacement_m)
     if previous is not None and previous.outcome == "evolved":
         summary.add("room_again", previous.room_id == evolution.room_id)
+
+
+def _add_during(summary: TaskSummary, during: DuringRecord | None) -> None:
+    summary.add("during", during is not None)
+    if during is not None:
+        summary.add("during_target", during.is_target_relocated)
+        summary.count("during_modes", during.evolution.mode or "(none)")
+        summary.add_value("during_round", during.round)
 
 
 def read_summary(root: Path) -> TaskSummary:
