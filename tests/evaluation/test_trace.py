@@ -1,6 +1,7 @@
 """Replays for the viewer: equal to the records or said not to be, and what they add is true."""
 
 import itertools
+import json
 import math
 import shutil
 from dataclasses import replace
@@ -23,9 +24,12 @@ from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.generation import GenerationParameters, generate_task
+from evonav.house import bundled_houses
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import EXPLORED, FREE
 from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.files import write_task
 from evonav.tasks.listing import task_files
 
 TOY = Backend(tasks=Component("toy_house:load_case"), simulator=Component("test_trace:colour_simulator"))
@@ -304,6 +308,23 @@ def test_bundled_tasks_replay_with_the_embedded_simulator(tmp_path):
     assert all(stage.differences == () for stage in stages)
     sizes = [len(view.jpeg) for stage in stages for step in stage.rounds for view in step.views]
     assert max(sizes) < 40_000
+
+
+def test_a_house_that_changes_during_a_stage_is_replayed(tmp_path):
+    during = {"during_stage": {"probability": 1.0, "rounds": [1, 3]}}
+    config = GenerationParameters.model_validate_json(json.dumps({"num_stages": [3], "extensions": during}))
+    task = generate_task(next(iter(bundled_houses(1))), seed=0, config=config)
+    write_task(task, tmp_path / "tasks")
+    evaluate(
+        ["ftu"],
+        task_files(tmp_path / "tasks"),
+        tmp_path / "run",
+        config=RunConfig(protocol=ProtocolConfig(max_rounds=5)),
+        num_workers=0,
+    )
+    stages = replay_of(tmp_path / "run", "ftu", task.header.task_id)
+    assert [stage.differences for stage in stages] == [()] * 3
+    assert all(stage.record.during.at_round is not None for stage in stages)
 
 
 def test_what_is_not_there_is_said(fu_run, tmp_path):
