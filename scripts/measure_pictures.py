@@ -3,7 +3,7 @@
     python scripts/measure_pictures.py [--houses FILE ...] [--recorded FOLDER] [--sheet 24] [--out out/pictures]
 
 1. Recall of a published COCO detector (YOLOv4-tiny at 608 pixels, confidence 0.1, IoU 0.3), by type, on views of the
-   held-out houses: objects of its classes that fill more than 1% of the picture.
+   held-out houses: objects of its classes that fill more than 1% of the picture; also of those that no border cuts.
 2. Statistics of the pictures, beside those of recorded AI2-THOR frames (`--recorded`), which are brought to our size.
 3. With `--sheet N`, N views of design houses on one sheet, and with `--recorded` also recorded frames beside ours.
 
@@ -44,6 +44,8 @@ STRICT = 0.2
 """Confidence below which OpenCV's reader of Darknet drops detections, whatever it is asked for."""
 SURE = 0.25
 """Confidence from which a detection counts as one that the detector fires."""
+WHOLE = "all that no border cuts"
+"""Row of the objects whose mask does not reach the picture's border."""
 NUM_STATISTICS = 100
 """Views whose statistics are compared with recorded frames."""
 
@@ -110,15 +112,17 @@ def write_sheets(asked: argparse.Namespace, network: YoloV4Tiny | None, recorded
 
 
 def recall_by_type(network: YoloV4Tiny, some: Iterable[PictureView]) -> dict[str, Recall]:
-    """Return the recall of `all`, and of each type that occurs, the most frequent first."""
+    """Return the recall of `all`, of `WHOLE`, and of each type that occurs, the most frequent first."""
     found: dict[str, list[float]] = defaultdict(list)
     for view in some:
         for truth, confidence in zip(view.truths, matched(network, view), strict=True):
             found["all"].append(confidence)
+            if not truth.is_cut(view.rgb.shape[0]):
+                found[WHOLE].append(confidence)
             found[truth.type].append(confidence)
     return {
         kind: Recall(tuple(found[kind]))
-        for kind in sorted(found, key=lambda kind: (kind != "all", -len(found[kind]), kind))
+        for kind in sorted(found, key=lambda kind: (kind != "all", kind != WHOLE, -len(found[kind]), kind))
     }
 
 

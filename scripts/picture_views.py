@@ -78,6 +78,11 @@ class Truth:
     box_px: tuple[int, int, int, int]
     """Left, top, right, bottom of its mask."""
 
+    def is_cut(self, side_px: int) -> bool:
+        """Return whether it reaches the border of a square picture, so that a part of it may be missing."""
+        left, top, right, bottom = self.box_px
+        return min(left, top) == 0 or max(right, bottom) == side_px
+
 
 @dataclass(frozen=True)
 class PictureView:
