@@ -85,6 +85,7 @@ def test_a_box_finds_one_object_of_a_type_that_its_class_is_right_for() -> None:
     recalls = measure_pictures.recall_by_type(network, [PictureView("house", frame, truths)])
     assert {kind: (one.found(), len(one.confidences)) for kind, one in recalls.items()} == {
         "all": (2, 4),
+        measure_pictures.WHOLE: (1, 1),
         "Chair": (1, 2),
         "ArmChair": (1, 1),
         "Bed": (0, 1),
