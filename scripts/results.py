@@ -49,10 +49,17 @@ RANKING_AGENTS = ("fu", "stage-reset", "ftu")
 """Agents that rank entries by image features, and by labels where there are none."""
 WIDE_AGENTS = ("fu", "3d-mem", "msgnav")
 """Agents that are also run with the camera of 3D-Mem's and MSGNav's released code, 120 degrees wide."""
+LOOKING, DECLINING = (
+    f"{ROOT / 'scripts' / 'departing_agents.py'}:{name}"
+    for name in ("msgnav_looking_on_arrival", "unigoal_that_may_decline")
+)
+"""Agents that depart from their originals in one point."""
 DEPARTURES = (
     *(("our fallback for frontiers", ("plus", f"{agent}+"), ("main", agent)) for agent in ("3d-mem", "msgnav")),
     *(("entries ranked by labels", ("labels", agent), ("main", agent)) for agent in RANKING_AGENTS),
     *(("a camera of 120 degrees", ("wide", agent), ("main", agent)) for agent in WIDE_AGENTS),
+    ("a check that sees the place itself", ("departing", LOOKING), ("main", "msgnav")),
+    ("UniGoal may name no category", ("departing", DECLINING), ("main", "unigoal")),
 )
 """What is different, and folder and agent of the runs with and without it."""
 ROOM_GROUPS = ((2, 3), (4, 5), (6, 10))
@@ -70,6 +77,7 @@ def main() -> None:
             small = pooled_tasks(asked.small)
             run_agents(asked.out / "small", agents, small, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, Backend(perception=read_word(HEADLINE)), asked)
+        run_agents(asked.out / "departing", (LOOKING, DECLINING), tasks, Backend(perception=read_word(HEADLINE)), asked)
         run_agents(asked.out / "labels", RANKING_AGENTS, tasks, Backend(), asked)
         wide = Backend(perception=read_word(HEADLINE), simulator=SimulatorSettings(hfov_deg=120.0).component())
         run_agents(asked.out / "wide", WIDE_AGENTS, tasks, wide, asked)
