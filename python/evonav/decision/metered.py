@@ -3,37 +3,22 @@
 import time
 from typing import Any, TypeVar
 
-from evonav.decision.goal_input import GoalInput, goal_input_of
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.account import Account
+from evonav.decision.wrapper import ModelWrapper
 
 A = TypeVar("A")
 
 
-class Metered:
+class Metered(ModelWrapper):
     """Answers as another model does, and adds up the costs."""
 
     def __init__(self, model: DecisionModel) -> None:
         """Measure the costs of `model`."""
-        self.model = model
+        super().__init__(model)
         self._wall_s = 0.0
         self._cpu_s = 0.0
         self._num_questions = 0
-
-    @property
-    def needs_images(self) -> bool:
-        """True if the measured model needs images."""
-        return self.model.needs_images
-
-    @property
-    def needs_colours(self) -> bool:
-        """True if the model, without images, needs the names of the colours in them."""
-        return bool(getattr(self.model, "needs_colours", False))
-
-    @property
-    def goal_input(self) -> GoalInput:
-        """Form of the goal that the model's agents go by."""
-        return goal_input_of(self.model)
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the measured model's answer."""

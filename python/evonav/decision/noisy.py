@@ -15,9 +15,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from evonav.decision.goal_input import GoalInput, goal_input_of
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.text.matcher import Matcher
+from evonav.decision.wrapper import ModelWrapper
 from evonav.errors import InvalidArgumentError
 
 A = TypeVar("A")
@@ -78,7 +78,7 @@ class NoiseRates:
         return cls(**options)
 
 
-class Noisy:
+class Noisy(ModelWrapper):
     """A decision model with mistakes. It counts questions, so each episode needs its own.
 
     A confused answer goes to another remembered object of the goal's class, each as likely as the model's rules score
@@ -106,29 +106,14 @@ class Noisy:
             raise InvalidArgumentError(
                 f"noise confused = {rates.confused:g}: needs a model that scores objects by rules, text or looks"
             )
+        super().__init__(model)
         self._matcher = matcher
-        self.model = model
         self.rates = rates
         self.counts: Counter[str] = Counter()
         """Number of mistakes by name; `no_other` counts questions without another answer."""
         self._seed = seed
         self._sleep = sleep
         self._num_asked: Counter[str] = Counter()
-
-    @property
-    def needs_images(self) -> bool:
-        """True if the model needs images."""
-        return self.model.needs_images
-
-    @property
-    def needs_colours(self) -> bool:
-        """True if the model, without images, needs the names of the colours in them."""
-        return bool(getattr(self.model, "needs_colours", False))
-
-    @property
-    def goal_input(self) -> GoalInput:
-        """Form of the goal that the model's agents go by."""
-        return goal_input_of(self.model)
 
     def check(self) -> None:
         """Check the model."""
