@@ -18,7 +18,7 @@ use evonav_core::{
     world::navigation::AgentBody,
 };
 
-const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
+const HOUSE: &str = include_str!("../../evonav-core/tests/data/house_100_objects.json");
 const NUM_SLOTS: usize = 16;
 const IMAGE_PX: [usize; 2] = [128, 128];
 

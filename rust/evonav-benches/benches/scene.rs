@@ -12,7 +12,7 @@ use evonav_core::{
     },
 };
 
-const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
+const HOUSE: &str = include_str!("../../evonav-core/tests/data/house_100_objects.json");
 
 fn bench_scene(c: &mut Criterion) {
     let house = House::from_json("house", HOUSE).expect("a valid house");

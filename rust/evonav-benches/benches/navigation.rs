@@ -15,7 +15,7 @@ use evonav_core::{
 };
 
 fn bench_navigation(c: &mut Criterion) {
-    let json = include_str!("../tests/data/house_100_objects.json");
+    let json = include_str!("../../evonav-core/tests/data/house_100_objects.json");
     let house = House::from_json("house_100_objects", json).expect("a valid house");
     let scene = Scene::build(&house, Catalogue::bundled(), UnknownAssets::Error).expect("a scene");
     let build = || {

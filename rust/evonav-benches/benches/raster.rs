@@ -23,7 +23,7 @@ use evonav_core::{
 };
 use evonav_simd::Kernel;
 
-const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
+const HOUSE: &str = include_str!("../../evonav-core/tests/data/house_100_objects.json");
 
 fn house() -> (House, Scene) {
     let house = House::from_json("house", HOUSE).expect("a valid house");
