@@ -130,8 +130,8 @@ def leaking(told: str) -> list[MockReply]:
 def test_no_error_answer_or_exchange_has_a_key_that_the_server_repeats(stub: Stub, tmp_path: Path, form: str) -> None:
     config = VlmConfig("m", base_url=stub.url, api_key=KEY, timeout_s=5.0, max_retries=0)
     store = ResponseCache(tmp_path / "exchanges.sqlite")
+    client = VlmClient(config, store=store, mode="auto", keeps_failures=True)
     for number, reply in enumerate(leaking(FORMS[form](KEY))):
-        client = VlmClient(config, store=store, mode="auto", keeps_failures=True)
         stub.script = [reply]
         try:
             told = repr(client.ask(QUESTION, attempt=number))

@@ -59,11 +59,11 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
     """Bundled tasks ask much and with images; toy ones are many, and all ask the same at once."""
     monkeypatch.setenv("OPENAI_API_KEY", "none")
     found, most, cpu_s = {}, {}, {}
-    toy_tasks = many_tasks(tmp_path / "tasks", 16)
-    for num_workers, at_once in ((1, 1), (1, 4), (2, 2)) if backend == "bundled" else ((1, 1), (1, 16), (2, 4)):
+    toy_tasks = many_tasks(tmp_path / "tasks", 6)
+    for num_workers, at_once in ((1, 1), (1, 3), (2, 2)) if backend == "bundled" else ((1, 1), (1, 6), (2, 3)):
         name = f"{num_workers}-{at_once}"
         with serving(faulty_reply) as stub, bundled_tasks() as directory:
-            tasks, reader = short_tasks(directory, 1, 4)
+            tasks, reader = short_tasks(directory, 1, 3)
             host = {
                 "server": {"base_url": stub.url, "max_retries": 0},
                 "cache": str(tmp_path / f"{name}.exchanges"),
@@ -89,7 +89,7 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
     assert most.pop("1-1") == 1
     assert all(number > 1 for number in most.values())
     assert all(one == found["1-1"] for one in found.values())
-    assert len(found["1-1"][0]) == (4 + 4 if backend == "bundled" else 48 + 48)
+    assert len(found["1-1"][0]) == (3 + 3 if backend == "bundled" else 18 + 18)
 
 
 @pytest.mark.parametrize(

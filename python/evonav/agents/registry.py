@@ -139,11 +139,11 @@ def agent_factory(name: str) -> Callable[..., Agent]:
         return import_callable(BUILT_IN[name][0], "agent")
     if name in _REGISTERED:
         return _REGISTERED[name]
-    for entry in entry_points(group=ENTRY_POINT_GROUP):
-        if entry.name == name:
-            return import_callable(entry.value, "agent")
     if ":" in name:
         return import_callable(name, "agent")
+    for entry in entry_points(group=ENTRY_POINT_GROUP):  # which reads a file of every installed package
+        if entry.name == name:
+            return import_callable(entry.value, "agent")
     if name.endswith(".py"):
         raise InvalidArgumentError(f"agent `{name}` is a file: name the class in it, too, such as `{name}:MyAgent`")
     known = ", ".join(sorted(agent_descriptions()))

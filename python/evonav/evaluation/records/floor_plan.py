@@ -1,14 +1,15 @@
 """Record floor plans: rooms, walls, openings and exact footprints of a house, from which maps are drawn."""
 
 from base64 import b64encode
-from dataclasses import asdict
+from dataclasses import fields
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.drawing.plan import HousePlan, plan_of
+from evonav.drawing.plan import HouseFootprint, HouseHole, HousePlan, HouseRoom, plan_of
 from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Opening, RoomFootprint
 from evonav.house import House
 
@@ -33,9 +34,9 @@ def floor_plan_of(
         task_id=task_id,
         house=house.name,
         stage=stage,
-        rooms=tuple(RoomFootprint(**asdict(room)) for room in plan.rooms),
+        rooms=tuple(RoomFootprint(**_values(room)) for room in plan.rooms),
         walls=plan.walls,
-        openings=tuple(Opening(**asdict(opening)) for opening in plan.openings),
+        openings=tuple(Opening(**_values(opening)) for opening in plan.openings),
         objects=_footprints(plan),
         reference_image=reference_image,
         objects_at_end=() if at_end is None else _footprints(plan_of(at_end)),
@@ -43,7 +44,12 @@ def floor_plan_of(
 
 
 def _footprints(plan: HousePlan) -> tuple[ObjectFootprint, ...]:
-    return tuple(ObjectFootprint(**asdict(item)) for item in plan.objects)
+    return tuple(ObjectFootprint(**_values(item)) for item in plan.objects)
+
+
+def _values(item: HouseRoom | HouseHole | HouseFootprint) -> dict[str, Any]:
+    """Return the values of an item by name. They are immutable: `asdict` would copy every number."""
+    return {field.name: getattr(item, field.name) for field in fields(item)}
 
 
 def image_uri(image: NDArray[np.uint8], side_px: int) -> str:
