@@ -213,6 +213,16 @@ def test_a_cell_is_the_mean_of_what_it_showed():
     assert labels.similarity(related("Find the fridge."))[cell] == pytest.approx(seen[cell] / 24, rel=1e-4)
 
 
+def test_one_view_may_show_more_labels_than_there_was_room_for():
+    one, many = LabelMap(FRAME), LabelMap(FRAME)
+    view = a_cup("Fridge")
+    names = (*(f"Thing{number}" for number in range(40)), "Fridge")
+    one.see(view)
+    many.see(a_view(view.depth_m, np.where(view.detections.masks == 0, 40, -1).astype(np.int32), names))
+    fridge = related("Find the fridge.")
+    np.testing.assert_array_equal(many.similarity(fridge), one.similarity(fridge))
+
+
 def test_a_cell_is_explored_after_some_sure_looks_and_not_after_one():
     labels = LabelMap(FRAME)
     labels.see(a_cup())

@@ -100,7 +100,7 @@ class LabelMap:
             if detections.features is not None:
                 feature = detections.features[index]
                 self._features[label] = self._features[label] + feature if label in self._features else feature
-        if len(self._numbers) > len(self._sums):
+        while len(self._numbers) > len(self._sums):
             self._sums = np.concatenate([self._sums, np.zeros_like(self._sums)])
         return np.array([*(self._numbers[label] for label in detections.labels), 0])
 
