@@ -13,10 +13,13 @@ from evonav.speed_benchmark.timing import Sampling, one_core
 
 PRODUCT = {"agents", "generation", "gym", "mapping", "navigation", "rendering"}
 """Sections of `evonav bench`, modules of `evonav.speed_benchmark`; the other modules are beside this one."""
-ON_ALL_CORES = {"gym"}
+ON_ALL_CORES = {"before_after", "gym"}
+ON_REQUEST = {"before_after"}
+"""Sections that only run when they are named: they need more than this checkout."""
 SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
+    "before_after": "Before and after",
     "evaluation": "Evaluation",
     "generation": "Task generation",
     "gym": "Gymnasium",
@@ -39,7 +42,7 @@ def main() -> None:
     if not set(names) <= SECTIONS.keys() or (options and not names):
         known = "\n".join(f"  {name:14} {title}" for name, title in sorted(SECTIONS.items()))
         sys.exit(f"usage: python -m benches [NAME ... [OPTION ...]]\n{known}")
-    for name in names or SECTIONS:
+    for name in names or sorted(SECTIONS.keys() - ON_REQUEST):
         module = importlib.import_module(f"{'evonav.speed_benchmark' if name in PRODUCT else 'benches'}.{name}")
         if options and not hasattr(module, "configure"):
             sys.exit(f"{name} takes no options")

@@ -13,11 +13,12 @@ from scipy.sparse.csgraph import dijkstra
 
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
 from evonav.memory.presence import DepthEvidence
-from evonav.memory_benchmark.peers.open3d_faiss import Cloud, associate, axes_of, detect, merged
+from evonav.memory_benchmark.peers.open3d_faiss import Cloud, associate, detect, merged
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import compare
+from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
 
@@ -50,7 +51,12 @@ def run() -> list[Row]:
 # Occupancy
 
 
-def _floor() -> OccupancyGrid:
+WALK = [(5.9 + 0.45 * (i % 40), 5.9 + 4.0 * (i // 20), turn * math.pi / 2) for i in range(60) for turn in range(4)]
+"""`(x, z)` and headings of an agent that sees a part of the floor."""
+AGENT_M, AGENT_CELL = (14.0, 9.9), (99, 140)
+
+
+def floor() -> OccupancyGrid:
     """Rooms of 40 x 40 cells with a door in every wall and something in the way."""
     row, col = np.mgrid[:400, :400] % 40
     is_door = ((row >= 15) & (row < 23)) | ((col >= 15) & (col < 23))
@@ -63,7 +69,7 @@ def _place(x_m: float, z_m: float, yaw_rad: float) -> Pose:
 
 
 def _visibility() -> list[Row]:
-    grid, rng = _floor(), np.random.default_rng(0)
+    grid, rng = floor(), np.random.default_rng(0)
     poses = [_place(*rng.uniform(8, 30, 2), yaw) for yaw in rng.uniform(0, 6, 200)]
     bearings, ranges_m = np.linspace(-math.pi / 4, math.pi / 4, 300)[:, None], np.arange(0, 3, 0.05)[None]
 
@@ -84,34 +90,28 @@ def _visibility() -> list[Row]:
     return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, [MADE] * len(poses), calls=20)
 
 
-def _explored_floor() -> OccupancyMap:
+def explored_floor() -> OccupancyMap:
     """A part of the floor as an agent that walked through it knows it."""
-    grid = _floor()
+    grid = floor()
     seen = OccupancyMap(MapFrame(400, 400, grid.cell_m, grid.corner_m))
-    for step in range(60):
-        x_m, z_m = 5.9 + 0.45 * (step % 40), 5.9 + 4.0 * (step // 20)
-        for quarter in range(4):
-            pose = _place(x_m, z_m, quarter * math.pi / 2)
-            seen.integrate(visible_occupancy(grid, pose, _INTRINSICS, 3.0), (x_m, z_m))
+    for x_m, z_m, yaw_rad in WALK:
+        seen.integrate(visible_occupancy(grid, _place(x_m, z_m, yaw_rad), _INTRINSICS, 3.0), (x_m, z_m))
     return seen
 
 
-_AGENT_M, _AGENT_CELL = (14.0, 9.9), (99, 140)
-
-
 def _frontiers() -> list[Row]:
-    seen = _explored_floor()
+    seen = explored_floor()
     free, unexplored = (seen.cells == 1).astype(np.uint8), (~seen.explored).astype(np.uint8)
 
     def ours(_: int) -> object:
         seen.clear_frontiers()
-        return seen.update_frontiers(_AGENT_M)
+        return seen.update_frontiers(AGENT_M)
 
     def peer(_: int) -> list[frozenset[tuple[int, int]]]:
-        return _frontiers_opencv(free, unexplored, _AGENT_CELL)
+        return frontiers_opencv(free, unexplored, AGENT_CELL)
 
-    regions = _frontiers_opencv(free, unexplored, _AGENT_CELL, cells=True)
-    found = {tuple(cell) for frontier in seen.update_frontiers(_AGENT_M) for cell in frontier.cells.tolist()}
+    regions = frontiers_opencv(free, unexplored, AGENT_CELL, cells=True)
+    found = {tuple(cell) for frontier in seen.update_frontiers(AGENT_M) for cell in frontier.cells.tolist()}
     if {cell for region in regions for cell in region} != found:
         raise AssertionError("the peer found other frontiers")
     return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, [MADE] * 200)
@@ -120,9 +120,10 @@ def _frontiers() -> list[Row]:
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.float32)
 
 
-def _frontiers_opencv(
+def frontiers_opencv(
     free: NDArray[np.uint8], unexplored: NDArray[np.uint8], agent: tuple[int, int], *, cells: bool = False
 ) -> list[frozenset[tuple[int, int]]]:
+    """The regions' cells; none where `cells` is false, which leaves their lists out of the time."""
     _, labels = cv2.connectedComponents(free, connectivity=4)
     island = labels == labels[agent]
     num_unexplored = cv2.filter2D(unexplored, cv2.CV_8U, _NEIGHBOURS, borderType=cv2.BORDER_CONSTANT)
@@ -134,16 +135,16 @@ def _frontiers_opencv(
 
 
 def _distances() -> list[Row]:
-    seen = _explored_floor()
-    targets_m = np.array([frontier.position_m for frontier in seen.update_frontiers(_AGENT_M)])
+    seen = explored_floor()
+    targets_m = np.array([frontier.position_m for frontier in seen.update_frontiers(AGENT_M)])
     is_free, cell_m = seen.cells == 1, seen.map_frame.cell_m
     cells = np.floor(targets_m / cell_m).astype(np.int64)[:, ::-1]
 
     def ours(_: int) -> NDArray[np.float64]:
-        return seen.distances_m(_AGENT_M, targets_m)
+        return seen.distances_m(AGENT_M, targets_m)
 
     def peer(_: int) -> NDArray[np.float64]:
-        return _distances_scipy(is_free, _AGENT_CELL, cells) * cell_m
+        return _distances_scipy(is_free, AGENT_CELL, cells) * cell_m
 
     if len(targets_m) < 5 or not np.allclose(ours(0), peer(0), rtol=0.1):
         raise AssertionError("the peer found other distances")
@@ -178,12 +179,17 @@ def _boxes() -> NDArray[np.float64]:
     return np.stack([i % 10 * 0.8, 0.2 + 0.05 * (i % 7), i // 10 * 0.8], axis=1)
 
 
+def _image_axes(pose: Pose) -> NDArray[np.float64]:
+    """Rows: right, down, forward."""
+    return camera_axes(pose) * [[1.0], [-1.0], [1.0]]
+
+
 def _look(boxes: NDArray[np.float64], x_m: float, height_m: float, z_m: float, yaw_rad: float, tilt_rad: float) -> View:
     """Depth and masks of boxes, ray by ray; masks count in their order."""
     pose = Pose(x_m, height_m, z_m, yaw_rad, tilt_rad)
     uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
     local = np.stack([*np.meshgrid(uv, uv), np.ones((SIDE_PX, SIDE_PX))], axis=-1)
-    rays = local @ axes_of(pose)
+    rays = local @ _image_axes(pose)
     depth_m = np.full((SIDE_PX, SIDE_PX), np.inf, np.float32)
     masks = np.full((SIDE_PX, SIDE_PX), -1, np.int32)
     for index, box in enumerate(boxes):
@@ -202,17 +208,25 @@ def _view(pose: Pose, depth_m: NDArray[np.float32], masks: NDArray[np.int32], nu
     return View(pose, _INTRINSICS, depth_m, found, occupancy)
 
 
-def _full_map(num_boxes: int = 100) -> ObjectMap:
-    """Every box seen from four sides and above."""
-    entries = ObjectMap(ObjectMapConfig(max_distance_m=10.0, views_per_cleanup=0))
-    for box in _boxes()[:num_boxes]:
+def looks_at_boxes() -> list[View]:
+    """Every box from four sides and above."""
+    looks = []
+    for box in _boxes():
         x, y, z = box.tolist()
         for turn, (dx, dz) in enumerate([(0, -0.9), (-0.9, 0), (0, 0.9), (0.9, 0)]):
-            entries.update(_look(box[None], x + dx, y + 0.7, z + dz, turn * math.pi / 2, 0.7))
+            looks.append(_look(box[None], x + dx, y + 0.7, z + dz, turn * math.pi / 2, 0.7))
+    return looks
+
+
+def full_map(looks: list[View]) -> ObjectMap:
+    """A map of these."""
+    entries = ObjectMap(ObjectMapConfig(max_distance_m=10.0, views_per_cleanup=0))
+    for look in looks:
+        entries.update(look)
     return entries
 
 
-def _frame() -> View:
+def frame() -> View:
     """The twenty boxes that show most of themselves."""
     view = _look(_boxes(), 3.4, 1.9, 1.2, 0.2, 0.6)
     areas = np.bincount(view.detections.masks[view.detections.masks >= 0], minlength=100)
@@ -221,7 +235,7 @@ def _frame() -> View:
     return _view(view.pose, view.depth_m, number_of[view.detections.masks], 20)
 
 
-def _stored(entries: ObjectMap) -> list[Cloud]:
+def clouds_of(entries: ObjectMap) -> list[Cloud]:
     """The entries of a map as the peer keeps them."""
     stored = []
     for entry in entries.entries:
@@ -232,7 +246,7 @@ def _stored(entries: ObjectMap) -> list[Cloud]:
     return stored
 
 
-def _associate_open3d(stored: list[Cloud], view: View, config: ObjectMapConfig) -> list[int | None]:
+def associate_open3d(stored: list[Cloud], view: View, config: ObjectMapConfig) -> list[int | None]:
     """Entry of each detection, `None` for a new one; entries are not changed, merged ones are made and dropped."""
     found = detect(view, config)
     matches = associate(stored, found, config)
@@ -243,26 +257,26 @@ def _associate_open3d(stored: list[Cloud], view: View, config: ObjectMapConfig) 
 
 
 def _object_frame() -> list[Row]:
-    view, num = _frame(), 7
-    maps = [_full_map() for _ in range(num)]
+    view, looks, num = frame(), looks_at_boxes(), 7
+    maps = [full_map(looks) for _ in range(num)]
     first, config = maps[0], maps[0].config
-    stored = _stored(first)
-    theirs = [None if i is None else first.entries[i].id for i in _associate_open3d(stored, view, config)]
-    if list(_full_map().update(view).entry_ids) != theirs or len(first) != 100:
+    stored = clouds_of(first)
+    theirs = [None if i is None else first.entries[i].id for i in associate_open3d(stored, view, config)]
+    if list(full_map(looks).update(view).entry_ids) != theirs or len(first) != 100:
         raise AssertionError("the peer associates otherwise")
 
     def ours(number: int) -> object:
         return maps[number].update(view)
 
     def peer(_: int) -> object:
-        return _associate_open3d(stored, view, config)
+        return associate_open3d(stored, view, config)
 
     faiss.omp_set_num_threads(1)
     return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, [MADE] * num)
 
 
 def _depth_evidence() -> list[Row]:
-    view, entries = _frame(), _full_map()
+    view, entries = frame(), full_map(looks_at_boxes())
     ids = [entry.id for entry in entries.entries]
     clouds = [cloud for entry_id in ids if (cloud := entries.points_m(entry_id)) is not None]
 
@@ -281,7 +295,7 @@ def _depth_evidence() -> list[Row]:
 def _depth_evidence_numpy(clouds: list[NDArray[np.float32]], view: View) -> NDArray[np.int64]:
     """`(E, 4)` counts for 256 points of each cloud: seen through, supported, occluded, out of view."""
     points = np.stack([cloud[np.arange(256) * len(cloud) // 256] for cloud in clouds])
-    x, y, z = np.moveaxis((points.astype(np.float64) - view.pose.position_m) @ axes_of(view.pose).T, -1, 0)
+    x, y, z = np.moveaxis((points.astype(np.float64) - view.pose.position_m) @ _image_axes(view.pose).T, -1, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         u, v = (SIDE_PX / 2 + _INTRINSICS.focal_px / z * offset for offset in (x, y))
     is_inside = (z > 0) & (u >= 0) & (u < SIDE_PX) & (v >= 0) & (v < SIDE_PX)

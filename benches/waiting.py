@@ -7,12 +7,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from evonav.agents.hosting.forking import PROCESS_NAME
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS, MockReply, MockServer, serving
 
@@ -44,7 +44,8 @@ def run() -> str:
     alone_mb = None
     for num_workers, at_once in NUMBERS:
         num_episodes = num_workers * at_once
-        asked_per_s, cores, memory_mb = measured(num_workers, at_once)
+        of_numbers = partial(command, num_workers=num_workers, at_once=at_once)
+        asked_per_s, cores, memory_mb = measured(of_numbers, num_episodes)
         more = "" if alone_mb is None else f"{(memory_mb - alone_mb) / (num_episodes - 1):.0f} MB"
         alone_mb = memory_mb if alone_mb is None else alone_mb
         each = f"{1e3 * cores / asked_per_s:.0f} ms" if asked_per_s else ""
@@ -62,21 +63,27 @@ def reply(request: dict[str, Any]) -> MockReply:
     return {**answer, "hang_s": LATENCY_S}
 
 
-def measured(num_workers: int, at_once: int) -> tuple[float, float, float]:
-    """Questions a second, cores in use, and memory of a run in the middle of it."""
+def measured(
+    command: Callable[[str, Path], list[str]], num_episodes: int, environment: Mapping[str, str] = os.environ
+) -> tuple[float, float, float]:
+    """Questions a second, cores in use, and memory of a run in the middle of it.
+
+    Args:
+        command: Starts the run, given the model's address and the folder of the run.
+        num_episodes: How many go at once.
+        environment: Of the run.
+    """
     server = MockServer(reply)
     server.requests = None
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(server),
-        _running(folder, server.url, num_workers, at_once) as pid,
+        _running(command(server.url, Path(folder) / "run"), environment) as pid,
     ):
         began_s = time.monotonic()
-        while len(_agents(pid)) < num_workers * at_once:
+        while len(_tree(pid)) <= num_episodes or server.num_requests < 2 * num_episodes:
             if time.monotonic() - began_s > LONGEST_START_S:
-                raise AssertionError(f"{len(_agents(pid))} agents after {LONGEST_START_S:g} s")
-            time.sleep(0.5)
-        while server.num_requests < 2 * num_workers * at_once and time.monotonic() - began_s < LONGEST_START_S:
+                raise AssertionError(f"{len(_tree(pid))} processes, {server.num_requests} questions so far")
             time.sleep(0.5)
         before, cpu_s, from_s = server.num_requests, _cpu_s(pid), time.monotonic()
         memory_mb = []
@@ -87,12 +94,21 @@ def measured(num_workers: int, at_once: int) -> tuple[float, float, float]:
         return (server.num_requests - before) / passed_s, (_cpu_s(pid) - cpu_s) / passed_s, max(memory_mb)
 
 
+def command(url: str, out: Path, num_workers: int, at_once: int) -> list[str]:
+    """The run: five agents on the bundled tasks."""
+    how_many = ["--workers", str(num_workers), "--episodes-at-once", str(at_once)]
+    return [sys.executable, "-m", "evonav", *asking(url, out), *how_many]
+
+
+def asking(url: str, out: Path, agents: str = AGENTS) -> list[str]:
+    """Arguments of a run that asks the model."""
+    asked = ["--decision", "vlm", "--model", "mock", "--base-url", url, "--max-retries", "0"]
+    return ["evaluate", "--agent", agents, *asked, "--out", str(out)]
+
+
 @contextmanager
-def _running(folder: str, url: str, num_workers: int, at_once: int) -> Iterator[int]:
-    command = [sys.executable, "-m", "evonav", "evaluate", "--agent", AGENTS, "--decision", "vlm", "--model", "mock"]
-    command += ["--base-url", url, "--max-retries", "0", "--workers", str(num_workers)]
-    command += ["--episodes-at-once", str(at_once), "--out", str(Path(folder) / "run")]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def _running(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[int]:
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield process.pid
     finally:
@@ -111,15 +127,6 @@ def _tree(pid: int) -> list[int]:
     while fresh:
         fresh = {child for child, parent in parents.items() if parent in fresh}
         found += sorted(fresh)
-    return found
-
-
-def _agents(pid: int) -> list[int]:
-    found = []
-    for child in _tree(pid):
-        with suppress(OSError):
-            if Path(f"/proc/{child}/comm").read_text().strip() == PROCESS_NAME:
-                found.append(child)
     return found
 
 

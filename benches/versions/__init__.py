@@ -1,0 +1,1 @@
+"""Measure two versions of evonav in turn."""
