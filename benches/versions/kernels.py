@@ -151,7 +151,7 @@ def _astar() -> Peer:
         house, start, end = queries[number]
         return search(grids[house], start, end)
 
-    return Peer("pyastar2d, its grid ready", call)
+    return Peer("pyastar2d, its grid ready", call, calls=1)
 
 
 def _dijkstra() -> Peer:

@@ -652,3 +652,8 @@ def default_house_parameters() -> str:
 
 def inspect_house(source: House, stage: House, *, touch_m: float, rest_m: float, allow_unknown_assets: bool) -> str:
     """Return findings (JSON): `kind`, `id`, `other_id`, `amount_m`, `is_own` (the source house has the same one)."""
+
+# vectors
+
+def has_wide_vectors() -> bool:
+    """Return whether kernels compute with AVX2; not if `EVONAV_NARROW_VECTORS` is set, by which tests compare both."""

@@ -13,6 +13,7 @@ mod perception;
 mod sensors;
 mod simulator;
 mod unigoal;
+mod vectors;
 
 use pyo3::prelude::*;
 
@@ -48,6 +49,7 @@ mod _core {
             embedded::{PyEmbeddedSimulator, map_spec},
         },
         unigoal::BevMap,
+        vectors::has_wide_vectors,
     };
 
     #[pymodule_init]

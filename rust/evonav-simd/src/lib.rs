@@ -4,6 +4,27 @@
 //! instructions with those of 256 bits. Fused multiplication and addition, which rounds once
 //! instead of twice, is left out: results are the same, bit for bit, on every processor.
 
+#[cfg(target_arch = "x86_64")]
+use std::sync::LazyLock;
+
+/// Environment variable that keeps a process to the vectors of every processor of its target, so
+/// that tests can compare both.
+pub const NARROW_VECTORS: &str = "EVONAV_NARROW_VECTORS";
+
+#[cfg(target_arch = "x86_64")]
+static IS_WIDE: LazyLock<bool> = LazyLock::new(|| {
+    std::env::var_os(NARROW_VECTORS).is_none() && is_x86_feature_detected!("avx2")
+});
+
+/// Return whether this process computes with wider vectors than those of every processor.
+#[must_use]
+pub fn is_wide() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return *IS_WIDE;
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
 /// A computation whose inner loops gain from wide vectors.
 pub trait Kernel {
     /// The result.
@@ -33,7 +54,7 @@ pub trait Kernel {
 #[inline]
 pub fn compute<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
+    if is_wide() {
         // SAFETY: the processor has AVX2.
         return unsafe { with_avx2(kernel) };
     }

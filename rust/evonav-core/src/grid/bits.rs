@@ -100,6 +100,11 @@ impl BitGrid {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
+    /// Return whether no bit is 1.
+    pub fn is_empty(&self) -> bool {
+        self.words.iter().all(|&word| word == 0)
+    }
+
     /// Return the words of a row: column `col` is bit `col % 64` of word `col / 64`. Empty for a
     /// row outside the grid.
     pub fn row(&self, row: usize) -> &[u64] {
@@ -138,16 +143,18 @@ impl BitGrid {
     /// 0.
     pub(crate) fn window(&self, row: usize, first: i64) -> u64 {
         let row_words = self.row(row);
-        let word = first.div_euclid(64);
-        let at = |word: i64| usize::try_from(word).ok().and_then(|w| row_words.get(w)).copied();
-        let pair = u128::from(at(word).unwrap_or(0)) | u128::from(at(word + 1).unwrap_or(0)) << 64;
-        (pair >> first.rem_euclid(64)) as u64
+        let at = |word: i64| row_words.get(word as usize).copied().unwrap_or(0);
+        // A word before the first becomes one far behind the last.
+        let (word, shift) = (first >> 6, first & 63);
+        let next = if shift == 0 { 0 } else { at(word + 1) << (64 - shift) };
+        at(word) >> shift | next
     }
 
     /// Return the number of 1 bits among the 5 x 5 cells around a cell.
     pub(crate) fn count_5x5(&self, row: usize, col: usize) -> u32 {
         let rows = row.saturating_sub(2)..=row + 2;
-        rows.map(|r| (self.window(r, col as i64 - 2) & 0b11111).count_ones()).sum()
+        let window = |r: usize| (self.window(r, col as i64 - 2) & 0b11111) as u32;
+        rows.fold(0_u32, |bits, r| bits << 5 | window(r)).count_ones()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{
     memory::{
         frontiers::{
             frontier::{Frontier, FrontierConfig},
-            regions::find_regions,
+            regions::{Span, find_regions},
             viewpoints::{place, place_at_border},
         },
         occupancy::OccupancyMap,
@@ -122,10 +122,20 @@ fn reconcile(
 ) -> (Vec<Frontier>, Vec<Vec<[i32; 2]>>) {
     let mut is_taken = vec![false; regions.len()];
     let mut is_staying = vec![false; old.len()];
-    let overlaps: Vec<Vec<Overlap>> = old
-        .iter()
-        .map(|frontier| regions.iter().map(|r| Overlap::new(&frontier.cells, r)).collect())
-        .collect();
+    let spans: Vec<Span> = regions.iter().map(|region| Span::of(region)).collect();
+    let overlaps_of = |frontier: &Frontier| {
+        let span = Span::of(&frontier.cells);
+        let pairs = regions.iter().zip(&spans);
+        let overlap = |(region, other): (&Vec<_>, &Span)| {
+            if span.meets(other) {
+                Overlap::new(&frontier.cells, region)
+            } else {
+                Overlap { shared: 0, either: frontier.cells.len() + region.len() }
+            }
+        };
+        pairs.map(overlap).collect()
+    };
+    let overlaps: Vec<Vec<Overlap>> = old.iter().map(overlaps_of).collect();
     for (i, row) in overlaps.iter().enumerate() {
         // The region is the same except for a few cells.
         if let Some(j) = (0..regions.len()).find(|&j| !is_taken[j] && row[j].is_same()) {

@@ -2,10 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use evonav_simd::Kernel;
+
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
     grid::{
+        GridSpec,
         bits::{BitGrid, beside},
         components::{Components, Run, take_groups},
     },
@@ -33,7 +36,7 @@ pub(crate) fn find_regions(
     let (mut inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
     given_up.into_iter().flat_map(BitGrid::cells).for_each(|[row, col]| inner.remove(row, col));
     let mut regions = Vec::new();
-    if edges.count() > 0 {
+    if !edges.is_empty() {
         for runs in Components::new(&inner).by_component() {
             let num_cells: usize = runs.iter().map(Run::len).sum();
             if num_cells >= config.min_cells.max(2) {
@@ -115,26 +118,33 @@ fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitG
     let (rows, cols) = (island.rows(), island.cols());
     let (mut inner, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
     let num_words = cols.div_ceil(64);
-    let unexplored = |row: usize, word: usize| match explored.row(row).get(word) {
-        Some(&bits) => !bits & explored.word_mask(word),
-        None => 0,
+    let masks: Vec<u64> = (0..num_words).map(|word| explored.word_mask(word)).collect();
+    // Unexplored cells of the rows above, here and below, with a word of none on both sides.
+    let mut unexplored = [(); 3].map(|()| vec![0_u64; num_words + 2]);
+    let fill = |words: &mut [u64], row: usize| {
+        let explored = explored.row(row);
+        for (word, mask) in masks.iter().enumerate() {
+            words[word + 1] = explored.get(word).map_or(0, |bits| !bits & mask);
+        }
     };
-    // The word, and the word shifted so that each bit is its left or its right neighbour.
-    let neighbours = |row: usize, word: usize| {
-        let here = unexplored(row, word);
-        let before = if word > 0 { unexplored(row, word - 1) } else { 0 };
-        [here << 1 | before >> 63, here, here >> 1 | unexplored(row, word + 1) << 63]
-    };
+    fill(&mut unexplored[2], 0);
     for row in 0..rows {
+        unexplored.rotate_left(1);
+        fill(&mut unexplored[2], row + 1);
+        let [above, here, below] = &unexplored;
         for word in 0..num_words {
             let candidates = island.row(row)[word];
             if candidates == 0 {
                 continue;
             }
-            let above = if row > 0 { neighbours(row - 1, word) } else { [0; 3] };
-            let [left, _, right] = neighbours(row, word);
-            let (ones_a, twos_a) = add3(above);
-            let (ones_b, twos_b) = add3(neighbours(row + 1, word));
+            // The word, and the word shifted so that each bit is its left or its right neighbour.
+            let neighbours = |words: &[u64]| {
+                let [before, here, after] = [word, word + 1, word + 2].map(|i| words[i]);
+                [here << 1 | before >> 63, here, here >> 1 | after << 63]
+            };
+            let [left, _, right] = neighbours(here);
+            let (ones_a, twos_a) = add3(neighbours(above));
+            let (ones_b, twos_b) = add3(neighbours(below));
             let (ones_c, twos_c) = (left ^ right, left & right);
             // The number of neighbours in binary: eights, fours, twos (and ones), 64 cells at once.
             let (ones, carry) = add3([ones_a, ones_b, ones_c]);
@@ -161,7 +171,9 @@ fn split_wide(
     max_span_rad: f64,
     regions: &mut Vec<Vec<[i32; 2]>>,
 ) {
-    if is_narrow(map, agent_m, &cells, max_span_rad) {
+    if is_in_narrow_box(map, agent_m, &cells, max_span_rad)
+        || is_narrow(map, agent_m, &cells, max_span_rad)
+    {
         regions.push(cells);
         return;
     }
@@ -191,11 +203,87 @@ fn offset_m(map: &OccupancyMap, agent_m: Vec2, cell: &[i32; 2]) -> Vec2 {
 /// Return the sum of the directions of cells seen from the agent, which points in the mean
 /// direction.
 pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec2 {
-    cells.iter().fold([0.0; 2], |sum, cell| {
-        let [x, z] = offset_m(map, agent_m, cell);
-        let length = (x * x + z * z).sqrt().max(1e-9);
-        [sum[0] + x / length, sum[1] + z / length]
-    })
+    evonav_simd::compute(MeanDirection { spec: map.spec(), agent_m, cells })
+}
+
+struct MeanDirection<'a> {
+    spec: &'a GridSpec,
+    agent_m: Vec2,
+    cells: &'a [[i32; 2]],
+}
+
+impl Kernel for MeanDirection<'_> {
+    type Output = Vec2;
+
+    /// Roots and quotients of eight cells at once, sums in the order of the cells.
+    #[inline(always)]
+    fn compute(self) -> Vec2 {
+        let (corner_m, cell_m) = (self.spec.corner_m, self.spec.cell_m);
+        let (mut sum_x, mut sum_z) = (0.0, 0.0);
+        for some in self.cells.chunks(8) {
+            let (mut xs, mut zs) = ([0.0; 8], [0.0; 8]);
+            for ((x, z), cell) in xs.iter_mut().zip(&mut zs).zip(some) {
+                *x = corner_m[0] + (f64::from(cell[1]) + 0.5) * cell_m - self.agent_m[0];
+                *z = corner_m[1] + (f64::from(cell[0]) + 0.5) * cell_m - self.agent_m[1];
+            }
+            for (x, z) in xs.iter_mut().zip(&mut zs) {
+                let length = (*x * *x + *z * *z).sqrt();
+                let length = if length > 1e-9 { length } else { 1e-9 };
+                (*x, *z) = (*x / length, *z / length);
+            }
+            for (x, z) in xs.iter().zip(&zs).take(some.len()) {
+                (sum_x, sum_z) = (sum_x + x, sum_z + z);
+            }
+        }
+        [sum_x, sum_z]
+    }
+}
+
+/// Return whether a box around cells, two cells or more from the agent, spans less than an angle.
+fn is_in_narrow_box(
+    map: &OccupancyMap,
+    agent_m: Vec2,
+    cells: &[[i32; 2]],
+    max_span_rad: f64,
+) -> bool {
+    let Span { low, high } = Span::of(cells);
+    let corners =
+        [low, [low[0], high[1]], [high[0], low[1]], high].map(|cell| offset_m(map, agent_m, &cell));
+    let ahead = [0, 1].map(|i| corners[0][i] + corners[3][i]);
+    let away_m = 2.0 * map.spec().cell_m;
+    let is_away = (0..2).any(|i| corners[0][i] > away_m || corners[3][i] < -away_m);
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for [x, z] in corners {
+        let along = x * ahead[0] + z * ahead[1];
+        if along <= 0.0 {
+            return false;
+        }
+        let tangent = (x * ahead[1] - z * ahead[0]) / along;
+        (least, most) = (least.min(tangent), most.max(tangent));
+    }
+    is_away && most.atan() - least.atan() < max_span_rad - 1e-9
+}
+
+/// The rows and columns of some cells, the last included.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    pub(crate) low: [i32; 2],
+    pub(crate) high: [i32; 2],
+}
+
+impl Span {
+    pub(crate) fn of(cells: &[[i32; 2]]) -> Self {
+        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
+        for cell in cells {
+            low = [low[0].min(cell[0]), low[1].min(cell[1])];
+            high = [high[0].max(cell[0]), high[1].max(cell[1])];
+        }
+        Self { low, high }
+    }
+
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|i| self.low[i] <= other.high[i] && other.low[i] <= self.high[i])
+    }
 }
 
 /// Return whether cells surely span at most an angle, without an arc tangent for each cell.
@@ -230,7 +318,7 @@ fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Ve
         && angles.iter().any(|a| is_near_cut(a) && *a > 0.0)
     {
         let mut sorted = angles.clone();
-        sorted.sort_by(f64::total_cmp);
+        sorted.sort_unstable_by(f64::total_cmp);
         let across = sorted[0] + TAU - sorted[sorted.len() - 1];
         let mut widest = (across, -PI);
         for pair in sorted.windows(2) {

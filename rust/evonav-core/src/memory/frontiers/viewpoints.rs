@@ -4,10 +4,18 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::bits::{BitGrid, ones},
     memory::{
-        frontiers::{Frontier, FrontierConfig, regions::mean_direction},
+        frontiers::{
+            Frontier, FrontierConfig,
+            regions::{Span, mean_direction},
+        },
         occupancy::OccupancyMap,
     },
 };
+
+/// Number of cells among which a view position is chosen.
+const NUM_RANKED: usize = 5;
+/// Relative error of squares of lengths beside `hypot`, far above rounding.
+const HAIR: f64 = 1e-12;
 
 /// Create the frontier of a region: its direction and view position.
 pub(crate) fn place(
@@ -26,18 +34,19 @@ pub(crate) fn place(
         candidates = edges.cells().collect();
     }
     // Of the five cells that lie best in that direction, the one nearest to the agent is used.
-    let mut ranked: Vec<(f64, f64, [usize; 2])> = candidates
-        .into_iter()
-        .map(|cell| {
-            let centre_m = map.spec().centre_m(cell);
-            let distance_m = distance_2d_m(centre_m, agent_m);
-            let along_m =
-                (centre_m[0] - agent_m[0]) * ahead[0] + (centre_m[1] - agent_m[1]) * ahead[1];
-            (along_m / distance_m.max(1e-9), distance_m, cell)
-        })
-        .collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
-    ranked.truncate(5);
+    let mut ranked: Vec<(f64, f64, [usize; 2])> = Vec::with_capacity(NUM_RANKED + 1);
+    for cell in candidates {
+        let centre_m = map.spec().centre_m(cell);
+        let distance_m = distance_2d_m(centre_m, agent_m);
+        let along_m = (centre_m[0] - agent_m[0]) * ahead[0] + (centre_m[1] - agent_m[1]) * ahead[1];
+        let share = along_m / distance_m.max(1e-9);
+        // Cells come in order, so that an equal one stays behind those before it.
+        let place = ranked.partition_point(|other| other.0.total_cmp(&share).is_ge());
+        if place < NUM_RANKED {
+            ranked.insert(place, (share, distance_m, cell));
+            ranked.truncate(NUM_RANKED);
+        }
+    }
     let nearest = ranked.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let position_m =
         nearest.map_or(agent_m, |&(_, _, cell)| push_away(map, map.spec().centre_m(cell), config));
@@ -69,40 +78,46 @@ pub(crate) fn place_at_border(
 /// Return the edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them,
 /// row-major.
 fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
-    let mut region = BitGrid::new(edges.rows(), edges.cols());
-    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-    for cell in cells {
-        let cell = cell.map(|i| i as usize);
-        region.insert(cell[0], cell[1]);
-        low = [low[0].min(cell[0]), low[1].min(cell[1])];
-        high = [high[0].max(cell[0]), high[1].max(cell[1])];
+    if cells.is_empty() {
+        return Vec::new();
     }
-    let low = low.map(|i| i.saturating_sub(2));
+    let span = Span::of(cells);
+    let (low, high) = (span.low.map(|i| (i - 2).max(0) as usize), span.high.map(|i| i as usize));
     let rows = low[0]..(high[0] + 3).min(edges.rows());
-    rows.flat_map(|row| {
-        let row_words = edges.row(row).iter().enumerate().skip(low[1] / 64);
-        row_words
-            .take((high[1] + 2) / 64 - low[1] / 64 + 1)
-            .flat_map(move |(index, &word)| ones(word).map(move |bit| [row, index * 64 + bit]))
-    })
-    .filter(|&[row, col]| (2..=12).contains(&region.count_5x5(row, col)))
-    .collect()
+    let mut region = BitGrid::new(rows.len(), edges.cols());
+    for cell in cells {
+        region.insert(cell[0] as usize - low[0], cell[1] as usize);
+    }
+    let mut found = Vec::new();
+    for row in rows {
+        for first in (low[1]..high[1] + 3).step_by(64) {
+            let width = (high[1] + 3 - first).min(64) as u32;
+            let bits = edges.window(row, first as i64) & (u64::MAX >> (64 - width));
+            let beside = ones(bits)
+                .map(|bit| [row, first + bit])
+                .filter(|&[row, col]| (2..=12).contains(&region.count_5x5(row - low[0], col)));
+            found.extend(beside);
+        }
+    }
+    found
 }
 
 /// Move a point away from the nearest obstacle while its clearance grows and it stays on free
 /// floor.
 fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> Vec2 {
     let mut moved_m = 0.0;
-    while let Some((obstacle_m, clearance_m)) = nearest_blocked(map, point_m, config.clearance_m)
+    let mut nearest = nearest_blocked(map, point_m, config.clearance_m);
+    while let Some((obstacle_m, clearance_m)) = nearest
         && moved_m + config.push_step_m <= config.max_push_m + 1e-9
         && clearance_m > 0.0
     {
         let step = config.push_step_m / clearance_m;
         let next_m = [0, 1].map(|i| point_m[i] + (point_m[i] - obstacle_m[i]) * step);
-        let is_free = map.spec().cell_of(next_m).is_some_and(|[r, c]| map.free().get(r, c));
-        let next_clearance_m =
-            nearest_blocked(map, next_m, config.clearance_m).map_or(f64::INFINITY, |n| n.1);
-        if !is_free || next_clearance_m <= clearance_m {
+        if !map.spec().cell_of(next_m).is_some_and(|[r, c]| map.free().get(r, c)) {
+            break;
+        }
+        nearest = nearest_blocked(map, next_m, config.clearance_m);
+        if nearest.is_some_and(|(_, next_clearance_m)| next_clearance_m <= clearance_m) {
             break;
         }
         point_m = next_m;
@@ -111,24 +126,35 @@ fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> 
     point_m
 }
 
-/// Return the centre of the nearest blocked cell closer than `within_m`, and its distance.
+/// Return the centre of the nearest blocked cell closer than `within_m`, and its distance; the
+/// first, row-major, of equally near ones.
 fn nearest_blocked(map: &OccupancyMap, point_m: Vec2, within_m: f64) -> Option<(Vec2, f64)> {
     let spec = map.spec();
     let [row, col] = spec.cell_of(point_m)?;
     let reach = (within_m / spec.cell_m).ceil().min((spec.rows + spec.cols) as f64) as usize;
     let rows = row.saturating_sub(reach)..(row + reach + 1).min(spec.rows);
     let first = col as i64 - reach as i64;
-    let windows = rows.flat_map(|r| (0..=2 * reach as i64).step_by(64).map(move |w| (r, w)));
-    windows
-        .flat_map(|(r, w)| {
+    let mut nearest: Option<(Vec2, f64)> = None;
+    // Lengths are computed for cells alone whose squares may be the least.
+    let mut most_m2 = within_m * within_m * (1.0 + HAIR);
+    for r in rows {
+        for w in (0..=2 * reach as i64).step_by(64) {
             let width = (2 * reach as i64 + 1 - w).min(64) as u32;
             let bits = map.blocked().window(r, first + w) & (u64::MAX >> (64 - width));
-            ones(bits).map(move |bit| [r, (first + w + bit as i64) as usize])
-        })
-        .map(|cell| {
-            let centre_m = spec.centre_m(cell);
-            (centre_m, distance_2d_m(centre_m, point_m))
-        })
-        .filter(|&(_, distance_m)| distance_m < within_m)
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+            for bit in ones(bits) {
+                let centre_m = spec.centre_m([r, (first + w + bit as i64) as usize]);
+                let [x, z] = [0, 1].map(|i| centre_m[i] - point_m[i]);
+                if x * x + z * z > most_m2 {
+                    continue;
+                }
+                let distance_m = distance_2d_m(centre_m, point_m);
+                let least_m = nearest.map_or(within_m, |(_, least_m)| least_m);
+                if distance_m < least_m {
+                    nearest = Some((centre_m, distance_m));
+                    most_m2 = (x * x + z * z) * (1.0 + HAIR);
+                }
+            }
+        }
+    }
+    nearest
 }
