@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from generated_folder import OPTIONS, assert_same
+from generated_folder import OPTIONS, assert_same, write_houses
 from processes import children
 
 from evonav.generation.dataset import generate_dataset
@@ -45,21 +45,27 @@ def workers_of(pid):
 
 
 @pytest.fixture(scope="module")
-def large_clean_folder(large_house_file, tmp_path_factory):
-    out = tmp_path_factory.mktemp("many-clean")
-    generate_dataset(large_house_file, out, options=OPTIONS)
+def more_houses(tmp_path_factory):
+    """24 small houses, of which two give no task: time enough to kill what makes them."""
+    return write_houses(tmp_path_factory.mktemp("more") / "small.jsonl", 22)
+
+
+@pytest.fixture(scope="module")
+def more_tasks(more_houses, tmp_path_factory):
+    out = tmp_path_factory.mktemp("more-clean")
+    generate_dataset(more_houses, out, options=OPTIONS)
     return out
 
 
 @pytest.mark.slow
-def test_killed_six_times_it_ends_as_if_it_was_not(large_house_file, large_clean_folder, tmp_path):
+def test_killed_six_times_it_ends_as_if_it_was_not(more_houses, more_tasks, tmp_path):
     # A run that ends before it can be killed is compared, and the kills go on in a new folder.
     draws, num_kills = random.Random(0), 0
     for attempt in range(6):
         out, ended = tmp_path / str(attempt), False
         while not ended:
             process = subprocess.Popen(
-                command(large_house_file, out, "--workers", 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+                command(more_houses, out, "--workers", 2), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
             if num_kills < 6:
                 wait_for_lines(process, out, num_lines(out) + draws.choice([1, 1, 2, 3, 5]))
@@ -69,7 +75,7 @@ def test_killed_six_times_it_ends_as_if_it_was_not(large_house_file, large_clean
             num_kills += not ended
             for root in out.glob("*/task.json"):
                 load_task(root.parent)  # whole, or not there
-        assert_same(out, large_clean_folder)
+        assert_same(out, more_tasks)
         if num_kills >= 6:
             return
     pytest.fail(f"only {num_kills} runs could be killed before they ended")
@@ -77,11 +83,11 @@ def test_killed_six_times_it_ends_as_if_it_was_not(large_house_file, large_clean
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find the workers")
-def test_workers_killed_six_times_cost_nothing(large_house_file, large_clean_folder, tmp_path):
+def test_workers_killed_four_times_cost_nothing(more_houses, more_tasks, tmp_path):
     draws, num_kills = random.Random(1), 0
-    for attempt in range(6):
+    for attempt in range(4):
         out, num_left = tmp_path / str(attempt), MAX_LOSSES  # of more, one house may lose all, and is then given up
-        process = subprocess.Popen(command(large_house_file, out, "--workers", 3), stdout=subprocess.DEVNULL)
+        process = subprocess.Popen(command(more_houses, out, "--workers", 3), stdout=subprocess.DEVNULL)
         while process.poll() is None:
             wait_for_lines(process, out, num_lines(out) + 3)
             workers = workers_of(process.pid)
@@ -89,17 +95,17 @@ def test_workers_killed_six_times_cost_nothing(large_house_file, large_clean_fol
                 os.kill(draws.choice(workers), signal.SIGKILL)
                 num_left -= 1
         assert process.returncode == 0
-        assert_same(out, large_clean_folder)
+        assert_same(out, more_tasks)
         num_kills += MAX_LOSSES - num_left
-        if num_kills >= 6:
+        if num_kills >= 4:
             return
     pytest.fail(f"only {num_kills} workers were found to be killed")
 
 
 @pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_says_how_to_go_on(large_house_file, tmp_path, signal_):
+def test_an_interrupt_says_how_to_go_on(more_houses, tmp_path, signal_):
     out = tmp_path / "out"
-    process = subprocess.Popen(command(large_house_file, out, "--workers", 1), stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command(more_houses, out, "--workers", 1), stderr=subprocess.PIPE, text=True)
     wait_for_lines(process, out, 3)
     process.send_signal(signal_)
     _, stderr = process.communicate(timeout=20)

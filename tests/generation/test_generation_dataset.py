@@ -241,18 +241,16 @@ def test_ray_makes_the_same(house_file, clean_folder, tmp_path, monkeypatch, fau
     pytest.importorskip("ray")
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
     monkeypatch.setenv("RAY_TMPDIR", "/tmp")  # paths of sockets have a greatest length
-    faults(_0=f"die once {tmp_path / 'flag'}")
-    generate_dataset(house_file, tmp_path / "out", options=OPTIONS, workforce=local(2, engine="ray"))
+    faults(_0=f"die once {tmp_path / 'flag'}", _1="hang", _4="raise", _7="die")
+    out, workforce = tmp_path / "out", local(2, engine="ray")
+    summary = generate_dataset(house_file, out, options=OPTIONS, workforce=workforce, house_timeout_s=20.0)
     assert (tmp_path / "flag").exists()
-    assert_same(tmp_path / "out", clean_folder)
-    faults(_1="hang", _4="raise", _7="die")
-    workforce = local(2, engine="ray")
-    summary = generate_dataset(
-        house_file, tmp_path / "faulty", options=OPTIONS, workforce=workforce, house_timeout_s=8.0
-    )
     assert summary.reasons == {
         "timeout": 1, "error": 1, "crash": 1, "malformed_house": 1, "too_few_rooms": 1
     }  # fmt: skip
+    faults()
+    assert generate_dataset(house_file, out, options=OPTIONS, retry_failed=True).num_new == 3
+    assert_same(out, clean_folder)
 
 
 def resident_mb():
