@@ -346,18 +346,19 @@ class AgentProcess:
         self._is_group_ended = True
 
 
-def check_importable(name: str, hosting: AgentHosting) -> None:
+def check_importable(name: str, hosting: AgentHosting, fork_server: ForkServer | None = None) -> None:
     """Check that an agent can be imported, in a process of its own, which then ends.
 
     Args:
         name: Name of the agent.
         hosting: Settings of the process.
+        fork_server: See `AgentProcess`.
 
     Raises:
         InvalidArgumentError: The agent cannot be imported.
     """
     try:
-        AgentProcess(name, replace(hosting, log=None)).close()
+        AgentProcess(name, replace(hosting, log=None), fork_server).close()
     except AgentFailedError as error:
         text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
         message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice

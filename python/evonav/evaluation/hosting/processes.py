@@ -31,7 +31,7 @@ class AgentProcesses:
         """
         self.hosting = hosting
         self.waiting = waiting
-        self._fork_server = _new_fork_server(hosting)
+        self._fork_server = new_fork_server(hosting)
         self._lock = threading.Lock()
         self._idle: list[AgentProcess] = []
         """Those that were used last come last."""
@@ -81,7 +81,7 @@ class AgentProcesses:
             self._fork_server.close()
 
 
-def _new_fork_server(hosting: AgentHosting) -> ForkServer | None:
+def new_fork_server(hosting: AgentHosting) -> ForkServer | None:
     """Return what forks processes; what they inherit of it holds nothing that an agent in a sandbox must not have."""
     if not fork_server.IS_SUPPORTED:
         return None

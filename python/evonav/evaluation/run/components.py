@@ -1,6 +1,7 @@
 """Name the parts of a run by import path, so that workers build them for themselves."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +14,9 @@ from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
 from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.hosting.fork_server import ForkServer
 from evonav.evaluation.hosting.process import AgentHosting, check_importable
+from evonav.evaluation.hosting.processes import new_fork_server
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style, vertical_fov_deg
@@ -143,12 +146,25 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     return new_oracle_baseline(name, decision) if name in ORACLE_BASELINES else new_agent(agent_factory(name), decision)
 
 
-def check_agent_name(name: str, hosting: AgentHosting | None = None) -> None:
+def check_agent_names(names: Sequence[str], hosting: AgentHosting) -> None:
+    """Check that workers can make agents of these names: several share the imports of one process.
+
+    Raises:
+        InvalidArgumentError: See `check_agent_name`.
+    """
+    fork_server = new_fork_server(hosting) if len(names) > 1 else None  # which starts nothing yet
+    with nullcontext() if fork_server is None else closing(fork_server):
+        for name in names:
+            check_agent_name(name, hosting, fork_server)
+
+
+def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server: ForkServer | None = None) -> None:
     """Check that workers can make an agent of this name.
 
     Args:
         name: Name of an agent.
         hosting: Settings of agents' processes: one that is not built in is imported there. Default: in this process.
+        fork_server: Server that forks the process; default: a fresh one is started.
 
     Raises:
         InvalidArgumentError: No agent has this name, or it cannot be imported.
@@ -159,7 +175,7 @@ def check_agent_name(name: str, hosting: AgentHosting | None = None) -> None:
         if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
             agent_factory(name)
         else:
-            check_importable(name, hosting)
+            check_importable(name, hosting, fork_server)
     except InvalidArgumentError as error:
         if ":" in name or name.endswith(".py") or RULE_MARK in name:
             raise

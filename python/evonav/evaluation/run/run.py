@@ -21,7 +21,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
-from evonav.evaluation.run.components import Backend, check_agent_name
+from evonav.evaluation.run.components import Backend, check_agent_names
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress as Progress  # also for those who import it from here
 from evonav.evaluation.run.scheduler import RunJobs, Schedule
@@ -291,10 +291,8 @@ def _check_requests(requests: Sequence[RunRequest], workforce: Workforce) -> Non
                     f"`{name}`: a worker cannot import the script that is running; move it to a module of its own, "
                     "or use num_workers=0"
                 )
-        for agent in request.agents:
-            if (agent, hosting.isolation) not in checked:
-                check_agent_name(agent, hosting)
-                checked.add((agent, hosting.isolation))
+        check_agent_names([one for one in request.agents if (one, hosting.isolation) not in checked], hosting)
+        checked.update((agent, hosting.isolation) for agent in request.agents)
 
 
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:
