@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import zlib
+from functools import cache
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -18,8 +19,9 @@ def text_of(name: str) -> Markup:
     return Markup(text)  # noqa: S704 - our own file
 
 
+@cache
 def page_environment() -> Environment:
-    """Return the package's templates; text is escaped, and characters that no page may contain are replaced."""
+    """Return the package's templates, each compiled once; text is escaped, and what no page may contain is replaced."""
     environment = Environment(
         loader=PackageLoader("evonav.report"),
         autoescape=True,
