@@ -4,13 +4,21 @@ import json
 import os
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+# In a small process between: the greatest memory of a child counts from that of the process that starts it.
+_CHILD = """
+import json, resource, subprocess, sys, time
+began_s = time.monotonic()
+done = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(json.dumps([time.monotonic() - began_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))
+sys.exit(done.returncode)
+"""
 
 
 @dataclass(frozen=True)
@@ -61,17 +69,11 @@ class Version:
 
     def run(self, *arguments: str | Path) -> Used:
         """Runs a command to its end."""
-        began_s = time.monotonic()
-        process = subprocess.Popen(
-            self.command(*arguments), env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-        )
-        assert process.stderr is not None  # a pipe
-        said = process.stderr.read()
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise AssertionError(f"{self.folder}: {arguments} gave {process.returncode}: {said.decode()[-2000:]}")
-        return Used(time.monotonic() - began_s, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
+        command = [sys.executable, "-c", _CHILD, *self.command(*arguments)]
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise AssertionError(f"{self.folder}: {arguments} gave {done.returncode}: {done.stderr[-2000:]}")
+        return Used(*json.loads(done.stdout))
 
     def _ask(self, operation: tuple[Any, ...], number: int, *, is_asked: bool) -> dict[str, Any]:
         request = {"operation": operation, "number": number, "is_asked": is_asked}
