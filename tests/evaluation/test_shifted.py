@@ -116,7 +116,6 @@ def test_the_agent_behind_a_shift_passes_everything_on():
     assert public == {
         "sensors",
         "cpu_s",
-        "is_lost",
         "begin_task",
         "begin_stage",
         "act",

@@ -1,4 +1,4 @@
-"""A small simulator in NumPy for tests of the protocol: boxes on a floor, rays against boxes, A* on a grid.
+"""A small simulator in NumPy for tests of the protocol: boxes on a floor, rays against boxes, Dijkstra on a grid.
 
 It shares nothing with evonav's own simulator. Houses are ProcTHOR-like JSON whose objects carry their `size`.
 """
@@ -21,8 +21,6 @@ from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, Sce
 CELL_M = 0.1
 WIDTH_M, DEPTH_M = 8.0, 5.0
 WALL_M = 0.1
-STEPS = tuple((row, col, math.hypot(row, col)) for row in (-1, 0, 1) for col in (-1, 0, 1) if row or col)
-"""Ways to a neighbouring cell, with their lengths in cells."""
 
 # Two rooms of 4 x 5 m; the wall between them has a 1 m doorway.
 WALLS = {
@@ -208,18 +206,17 @@ class ToySimulator:
         blocked = np.pad(self._blocked, 1, constant_values=1).tolist()  # the pad also catches index -1
         cost, parent, queue = {start: 0.0}, {}, [(0.0, start)]
         while queue:
-            _, cell = heapq.heappop(queue)
+            so_far, cell = heapq.heappop(queue)
             if cell == goal:
                 break
-            for d_row, d_col, step in STEPS:
+            for d_row, d_col in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
                 after = (cell[0] + d_row, cell[1] + d_col)
                 if blocked[after[0] + 1][after[1] + 1]:
                     continue
-                length = cost[cell] + step
+                length = so_far + math.hypot(d_row, d_col)
                 if length < cost.get(after, math.inf):
                     cost[after], parent[after] = length, cell
-                    straight = math.hypot(after[0] - goal[0], after[1] - goal[1])
-                    heapq.heappush(queue, (length + straight, after))
+                    heapq.heappush(queue, (length, after))
         if goal not in cost:
             return np.zeros((0, 3))
         cells = [goal]
