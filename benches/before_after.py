@@ -23,7 +23,7 @@ Again: `python -m benches before_after --before FOLDER [--houses FILE]`.
 
 @dataclass
 class Options:
-    """Of the command line."""
+    """Options that the command line sets."""
 
     before: Path | None = None
     houses: Path | None = None

@@ -70,8 +70,8 @@ def measured(
 
     Args:
         command: Starts the run, given the model's address and the folder of the run.
-        num_episodes: How many go at once.
-        environment: Of the run.
+        num_episodes: Number of episodes at once.
+        environment: Environment variables of the run.
     """
     server = MockServer(reply)
     server.requests = None

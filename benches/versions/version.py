@@ -28,7 +28,7 @@ class Used:
     wall_s: float
     cpu_s: float
     peak_mb: float
-    """Of the largest process."""
+    """Peak resident memory of the process that used the most."""
 
 
 class Version:
