@@ -4,6 +4,7 @@ import json
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -285,6 +286,19 @@ def test_the_first_outcome_kept_is_everybodys(path: Path) -> None:
         assert second.outcome(key_of(request)) == ours
     assert (len(first), first.num_failures) == (2, 1)
     assert (second.forget_failures(), first.num_failures) == (1, 0)
+
+
+def test_a_cache_opens_while_another_process_creates_it(path: Path) -> None:
+    """SQLite refuses to switch a file to WAL at once, whatever the timeout, while another connection writes."""
+    path.parent.mkdir(exist_ok=True)
+    other = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
+    other.execute("CREATE TABLE other (x)")
+    other.execute("BEGIN IMMEDIATE")
+    timer = threading.Timer(0.1, other.execute, ("COMMIT",))
+    timer.start()
+    assert len(ResponseCache(path)) == 0
+    timer.join()
+    assert sqlite3.connect(path).execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
 def test_no_more_questions_at_a_time_than_asked_for(stub: Stub, config: VlmConfig) -> None:

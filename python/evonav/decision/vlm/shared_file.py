@@ -2,11 +2,15 @@
 
 import sqlite3
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from evonav.errors import StoreError
+
+_TIMEOUT_S = 60.0
+"""Longest wait for another process to finish its transaction."""
 
 
 class SharedFile:
@@ -28,8 +32,8 @@ class SharedFile:
         self._lock = threading.Lock()
         with self._store_errors():
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db = sqlite3.connect(self.path, timeout=_TIMEOUT_S, check_same_thread=False, isolation_level=None)
+            _switch_to_wal(self._db)
             self._db.execute("PRAGMA synchronous = NORMAL")
             self._db.executescript(schema)
 
@@ -61,3 +65,20 @@ class SharedFile:
             yield
         except (sqlite3.Error, OSError, ValueError) as error:
             raise StoreError(f"{self.path}: {self._what}: {error}") from error
+
+
+def _switch_to_wal(db: sqlite3.Connection) -> None:
+    """Switch a file to WAL, also while other processes open it for the first time.
+
+    SQLite refuses the switch at once, without its timeout, while another process has begun to write.
+    """
+    deadline = time.monotonic() + _TIMEOUT_S
+    while True:
+        try:
+            db.execute("PRAGMA journal_mode = WAL")
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > deadline:
+                raise
+            time.sleep(0.005)
+        else:
+            return
