@@ -81,6 +81,36 @@ def test_the_place_of_the_target_is_scored():
     assert (sure.p_near, sure.brier, sure.rank) == (1.0, 0.0, 1)
 
 
+@given(
+    st.dictionaries(
+        st.tuples(st.integers(-9, 9), st.integers(-9, 9)), st.sampled_from([0.0, 0.01, 0.02, 1 / 30]), min_size=1
+    ),
+    st.sampled_from([0.5, 1.0, 2.0]),
+    st.floats(-20.0, 20.0),
+)
+def test_the_largest_mass_is_that_of_a_plain_search(cells, radius_m, corner_m):
+    """Squares at exactly the radius, and ties, count as they do with exact sums one by one."""
+    centres_m = tuple((corner_m + 0.5 * x, 0.5 * z - corner_m) for x, z in cells)
+    probabilities = tuple(cells.values())
+    plain = [
+        (
+            math.fsum(
+                p
+                for other_m, p in zip(centres_m, probabilities, strict=True)
+                if math.dist(other_m, centre_m) < radius_m
+            ),
+            centre_m,
+        )
+        for centre_m, own in zip(centres_m, probabilities, strict=True)
+        if own > 0.0
+    ]
+    top, middle_m = max(plain, default=(0.0, (1e9, 1e9)))
+    target_m = (corner_m + 0.3, 0.7 - corner_m)
+    score = place_score(PlacesRecord(cell_m=0.5, centres_m=centres_m, probabilities=probabilities), target_m, radius_m)
+    assert score.top == min(top, 1.0)
+    assert score.is_top_right == (math.dist(middle_m, target_m) < radius_m)
+
+
 def test_calibration_compares_with_what_came_true():
     found = calibration([(0.8, True), (0.8, True), (0.8, False), (0.1, False)])
     assert found.n == 4

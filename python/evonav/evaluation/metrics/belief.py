@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
+import numpy as np
+
 from evonav.evaluation.records.base import PlacesRecord, Point2
 from evonav.evaluation.records.schema import StageRecord
 
@@ -12,6 +14,9 @@ NUM_BINS = 10
 """Number of bins of the expected calibration error, all of the same width."""
 MIN_P = 1e-4
 """Smallest probability in a logarithm: one certain mistake must not outweigh all other stages."""
+
+_SLACK = 1e-6
+"""More than the rounding errors of squared distances within a house, in square metres, and of sums."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +64,32 @@ def place_score(places: PlacesRecord, target_m: Point2, radius_m: float) -> Plac
     squares = math.fsum(p * p for _, p in cells) + rest * rest
     brier = squares - 2.0 * (rest if own is None else own) + 1.0
     rank = 1 + (len(cells) if own is None else sum(p > own for _, p in cells))
-    top, centre_m = max(((_mass_within(cells, c, radius_m), c) for c, p in cells if p > 0.0), default=(0.0, None))
+    top, centre_m = max(
+        ((_mass_within(cells, c, radius_m), c) for c in _likeliest(cells, radius_m)), default=(0.0, None)
+    )
     is_right = centre_m is not None and math.dist(centre_m, target_m) < radius_m
     return PlaceScore(min(p_near, 1.0), brier, rank, min(top, 1.0), is_right)
 
 
 def _mass_within(cells: Sequence[tuple[Point2, float]], centre_m: Point2, radius_m: float) -> float:
     return math.fsum(p for other_m, p in cells if math.dist(other_m, centre_m) < radius_m)
+
+
+def _likeliest(cells: Sequence[tuple[Point2, float]], radius_m: float) -> list[Point2]:
+    """Return the middles around which most probability may lie: all that rounding errors leave in question."""
+    likely = [(centre_m, p) for centre_m, p in cells if p > 0.0]
+    if not likely:
+        return []
+    centres_m, p = np.array([centre_m for centre_m, _ in likely]), np.array([p for _, p in likely])
+    squares_m2 = (centres_m**2).sum(axis=1)
+    least, most = np.empty(len(likely)), np.empty(len(likely))
+    rows = max(1, 10**6 // len(likely))  # a few megabytes at a time
+    for first in range(0, len(likely), rows):
+        part = slice(first, first + rows)
+        distances2_m2 = squares_m2[part, None] + squares_m2 - 2.0 * centres_m[part] @ centres_m.T
+        least[part] = (distances2_m2 < radius_m**2 - _SLACK) @ p
+        most[part] = (distances2_m2 < radius_m**2 + _SLACK) @ p
+    return [likely[index][0] for index in np.flatnonzero(most > least.max() - _SLACK)]
 
 
 def calibration(probabilities: Iterable[tuple[float, bool]]) -> Calibration | None:
