@@ -131,6 +131,14 @@ fn bench_raster(c: &mut Criterion) {
     c.bench_function("light/build", |b| {
         b.iter(|| Light::build(&house, &scene, black_box(&mesh)));
     });
+    c.bench_function("light/build_and_first_picture", |b| {
+        let view = View::from(cameras_300[0]);
+        let want = Want { rgb: Some(Style::Default), instances: true };
+        b.iter(|| {
+            let light = Light::build(&house, &scene, black_box(&mesh));
+            render_lit(&mesh, Some(&light), &view, want, &mut frame)
+        });
+    });
     c.bench_function("light/load_with_light_100_objects", |b| {
         b.iter(|| {
             let (house, scene) = self::house();

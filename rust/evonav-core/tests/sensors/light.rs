@@ -251,7 +251,7 @@ proptest! {
             let ahead = |point_m: Vec3| [0, 2].map(|k| point_m[k] + 0.12 * face.normal[k]);
             let rooms = rooms_around(&house, ahead(middle_m));
             let is_floor = face.body == 0 && face.normal[1] > 0.5;
-            num_sunny += check_slope(&light, index, face.normal, &corners[0])?;
+            num_sunny += check_slope(&mesh, &light, index, face.normal, &corners[0])?;
             let points_m: Vec<Vec3> = match is_floor {
                 false => corners.as_flattened().to_vec(),
                 true => grid_m(&room),
@@ -259,7 +259,7 @@ proptest! {
             for point_m in points_m {
                 let smooth = sources(&house, &scene, &rooms, point_m, face.normal);
                 let open = below.open(ahead(point_m), (point_m[1] / 0.7).clamp(0.0, 1.0));
-                let found = light.on_face(index, point_m).expect("a face");
+                let found = light.on_face(&mesh, index, point_m).expect("a face");
                 // Lamps and windows are interpolated between points of the floor.
                 let slack = if is_floor { 0.02 } else { 0.004 };
                 for channel in 0..3 {
@@ -278,6 +278,7 @@ proptest! {
 /// Where the sun shines on more than a hand's breadth, a face takes up as much of it as its slope
 /// says. Return the number of such places.
 fn check_slope(
+    mesh: &SceneMesh,
     light: &Light,
     face: usize,
     normal: Vec3,
@@ -300,7 +301,7 @@ fn check_slope(
             });
         if is_sunny {
             num_sunny += 1;
-            let found = light.on_face(face, point_m).expect("a face")[3];
+            let found = light.on_face(mesh, face, point_m).expect("a face")[3];
             prop_assert!(
                 (f64::from(found) - facing).abs() < 1e-3,
                 "{found} at {point_m:?}, not {facing}"
@@ -337,10 +338,10 @@ fn panes_shine_by_themselves() {
     let mut num_glowing = 0;
     for (index, _) in glowing {
         num_glowing += 1;
-        assert_eq!(light.on_face(index, [1.0, 1.0, 1.0]), Some([1.35, 1.35, 1.35, 0.0]));
+        assert_eq!(light.on_face(&mesh, index, [1.0, 1.0, 1.0]), Some([1.35, 1.35, 1.35, 0.0]));
     }
     assert!(num_glowing > 0);
-    assert_eq!(light.on_face(usize::MAX, [0.0; 3]), None);
+    assert_eq!(light.on_face(&mesh, usize::MAX, [0.0; 3]), None);
 }
 
 /// Sunny places of a map are brighter than the same places in the light of their room alone.
@@ -386,4 +387,42 @@ fn maps_of_any_width_show_the_sun() {
         let [shade, sun] = lights.map(|levels| levels.iter().sum::<f64>() / levels.len() as f64);
         assert!(sun > 1.15 * shade, "{sun} in the sun, {shade} in the shade at {width_px}");
     }
+}
+
+/// What was seen before changes no picture, though it decides when the light on a part is computed.
+#[test]
+fn pictures_do_not_depend_on_what_was_seen_before() {
+    let house = house();
+    let scene = Scene::build(&house, Catalogue::bundled(), UnknownAssets::Error).expect("known");
+    let mesh = SceneMesh::build(&scene);
+    let centre_m = Aabb::of_points(mesh.triangles().flat_map(|t| t.vertices_m)).centre_m();
+    let view_of = |index: usize| {
+        let yaw_rad = index as f64 * std::f64::consts::FRAC_PI_3;
+        let camera = Camera {
+            width_px: 96,
+            height_px: 72,
+            vertical_fov_rad: 1.4,
+            position_m: [centre_m[0], 1.5, centre_m[2]],
+            yaw_rad,
+            horizon_rad: 0.3,
+        };
+        View::from(camera)
+    };
+    let want = Want { rgb: Some(Style::Default), instances: false };
+    let draw = |light: &Light, index: usize| {
+        let mut frame = FrameBuffer::default();
+        render_lit(&mesh, Some(light), &view_of(index), want, &mut frame).expect("a valid view");
+        frame.rgb
+    };
+    let own = Light::build(&house, &scene, &mesh);
+    let forwards: Vec<_> = (0..6).map(|index| draw(&own, index)).collect();
+    assert!(forwards.windows(2).all(|pair| pair[0] != pair[1]));
+    let shared = Light::build(&house, &scene, &mesh);
+    let pictures: Vec<_> = std::thread::scope(|scope| {
+        let (shared, draw) = (&shared, &draw);
+        let draw_one = |index| scope.spawn(move || draw(shared, index));
+        let threads: Vec<_> = (0..6).rev().map(draw_one).collect();
+        threads.into_iter().rev().map(|thread| thread.join().expect("a picture")).collect()
+    });
+    assert_eq!(pictures, forwards);
 }

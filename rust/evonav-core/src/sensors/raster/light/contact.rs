@@ -21,6 +21,7 @@ const MAX_SIDE: f64 = 2000.0;
 const BELOW_M: f64 = 0.5;
 
 /// The openness to light of places in a house, over a grid: 1 where nothing is near.
+#[derive(Debug)]
 pub(in crate::sensors::raster) struct Contact {
     corner_m: Vec2,
     size: [usize; 2],

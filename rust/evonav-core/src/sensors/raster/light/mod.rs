@@ -1,8 +1,10 @@
 //! The light in a house: what falls on each surface, computed once for a house and its state.
 //!
 //! Sunlight comes through windows and open doors and is looked up pixel by pixel in a map of
-//! shadows. All other light is smooth: it is computed at a few points of each face and interpolated.
+//! shadows. All other light is smooth: it is computed at a few points of each face when the face is
+//! first seen, and interpolated.
 
+mod baker;
 mod coarse;
 mod contact;
 mod field;
@@ -34,26 +36,27 @@ pub struct Light {
 }
 
 impl Light {
-    /// Compute the light in a house.
+    /// Find the sources of light in a house and the shadows of its sun; the rest is computed when a
+    /// face is first seen.
     ///
     /// # Arguments
     /// * `scene`, `mesh` - of the house.
     ///
     /// # Complexity
-    /// O(area of all surfaces); about 13 ms for a house of a hundred objects.
+    /// O(area of the house); seeing a face for the first time takes O(its area).
     pub fn build(house: &House, scene: &Scene, mesh: &SceneMesh) -> Self {
         let sources = sources::Sources::of(house, scene);
         let bounds = mesh.parts.iter().fold(Aabb::EMPTY, |all, part| all.union(part.aabb));
         let contact = contact::Contact::of(scene, mesh, &bounds);
-        let sun = Sun::build(sources.sun_direction(), mesh, &bounds);
-        let field = Field::build(scene, mesh, &sources, &contact, &sun);
-        Self { field, sun: Arc::new(sun), sunlight: SUNLIGHT }
+        let sun = Arc::new(Sun::build(sources.sun_direction(), mesh, &bounds));
+        let field = Field::new(scene, mesh, sources, contact, Arc::clone(&sun));
+        Self { field, sun, sunlight: SUNLIGHT }
     }
 
     /// Return the light with random factors, which are drawn for each group of connected rooms.
     ///
     /// # Complexity
-    /// O(points of the light): a small part of what [`Self::build`] takes.
+    /// O(parts of the mesh); each face is computed again when it is first seen.
     pub fn varied(&self, lighting: &Lighting) -> Self {
         let [red, green, blue] = lighting.sun();
         Self {
@@ -68,11 +71,12 @@ impl Light {
     /// face.
     ///
     /// # Arguments
+    /// * `mesh` - the mesh of the light.
     /// * `face` - index in [`SceneMesh::faces`].
-    pub fn on_face(&self, face: usize, point_m: Vec3) -> Option<[f32; 4]> {
-        let face = self.field.faces.get(face)?;
+    pub fn on_face(&self, mesh: &SceneMesh, face: usize, point_m: Vec3) -> Option<[f32; 4]> {
+        let face = self.field.of_face(mesh, face)?;
         let [x, y, z] = point_m.map(|coordinate| coordinate as f32);
-        Some(self.field.at(face, face.axes.map(|[a, b, c, d]| a * x + b * y + c * z + d)))
+        Some(face.at(face.axes().map(|[a, b, c, d]| a * x + b * y + c * z + d)))
     }
 
     /// Return the direction towards the sun, in the world frame.

@@ -16,6 +16,7 @@ const LAMP: f64 = 1.06;
 const HALVED_M2: f64 = 6.5;
 
 /// A window as a small bright surface.
+#[derive(Debug)]
 struct Pane {
     centre_m: Vec3,
     normal: Vec2,
@@ -23,7 +24,7 @@ struct Pane {
 }
 
 /// Rooms that are connected by open borders, and their light.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Space {
     polygons_m: Vec<Vec<Vec2>>,
     lamps: Vec<Lamp>,
@@ -31,6 +32,7 @@ struct Space {
 }
 
 /// The light of all rooms.
+#[derive(Debug)]
 pub(in crate::sensors::raster) struct Sources {
     spaces: Vec<Space>,
 }
@@ -66,6 +68,11 @@ impl Sources {
             }
         }
         sources
+    }
+
+    /// Return the number of spaces.
+    pub fn num_spaces(&self) -> usize {
+        self.spaces.len()
     }
 
     /// Return the space that contains a point of the floor.

@@ -56,6 +56,7 @@ pub(super) struct Lit {
 
 /// Common to all runs of a row.
 struct Shot<'a> {
+    mesh: &'a SceneMesh,
     light: Option<&'a Light>,
     rays: &'a Rays,
     row: usize,
@@ -114,7 +115,7 @@ impl Lit {
         row: usize,
     ) {
         let Self { runs, surfaces, scale, bright, empty, .. } = self;
-        let shot = Shot { light, rays, row, nearness: canvas.row(row), scale };
+        let shot = Shot { mesh, light, rays, row, nearness: canvas.row(row), scale };
         empty.clear();
         for (run, tag) in spans(runs.of_row(row), canvas.width_px) {
             let Some(index) = (tag as usize).checked_sub(1) else {
@@ -172,9 +173,9 @@ impl Shot<'_> {
             let u = column as f32 + 0.5;
             places.map(|[du, at]| (du * u + at) * self.scale[column])
         };
-        let face = self.light.map(|light| (&light.field, &light.field.faces[index]));
-        let end = |place: [f32; 2]| match face {
-            Some((field, face)) => End::of(field.at(face, place), surface),
+        let face = self.light.and_then(|light| light.field.of_face(self.mesh, index));
+        let end = |place: [f32; 2]| match &face {
+            Some(face) => End::of(face.at(place), surface),
             None => End::of([EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0], surface),
         };
         let (mut first, mut from) = (run.start, place(run.start));

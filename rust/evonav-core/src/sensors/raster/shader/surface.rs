@@ -57,8 +57,8 @@ impl Surface {
     ) -> Self {
         let (face, skin) = (&mesh.faces[index], &mesh.skins[index]);
         let Some((plane, facing)) = lens.nearness_plane(face) else { return Self::default() };
-        let places = match light {
-            Some(light) => light.field.faces[index].axes.map(|[x, y, z, offset]| {
+        let places = match light.and_then(|light| light.field.of_face(mesh, index)) {
+            Some(face) => face.axes().map(|[x, y, z, offset]| {
                 lens.on_plane(plane, [x, y, z].map(f64::from), f64::from(offset))
             }),
             None => [[0.0; 3]; 2],
