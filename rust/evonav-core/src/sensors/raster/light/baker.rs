@@ -1,4 +1,4 @@
-//! What lamps, windows and the sun give to the points of a face.
+//! Compute what lamps, windows and the sun give to the points of a face.
 
 use std::sync::Arc;
 
