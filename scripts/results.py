@@ -248,8 +248,8 @@ def departure_table(out: Path, agents: Sequence[str]) -> Table:
         part = found.parts[0]
         success, spl = part.effects["success"], part.effects["spl"]
         rates_of = (percent(success.mean_a), percent(success.mean_b))
-        rows.append((words, theirs[1], *rates_of, points(success), points(spl)))
-    columns = ("Departure", "agent", "SR % without", "SR % with", "SR, points", "SPL, points")
+        rows.append((words, theirs[1], *rates_of, points(success), points(spl), str(part.n)))
+    columns = ("Departure", "agent", "SR % without", "SR % with", "SR, points", "SPL, points", "n")
     return Table("Departures", columns, tuple(rows), ("With minus without, 95% bootstrap over houses, paired.",))
 
 

@@ -243,7 +243,7 @@ def test_ray_makes_the_same(house_file, clean_folder, tmp_path, monkeypatch, fau
     monkeypatch.setenv("RAY_TMPDIR", "/tmp")  # paths of sockets have a greatest length
     faults(_0=f"die once {tmp_path / 'flag'}", _1="hang", _4="raise", _7="die")
     out, workforce = tmp_path / "out", local(2, engine="ray")
-    summary = generate_dataset(house_file, out, options=OPTIONS, workforce=workforce, house_timeout_s=20.0)
+    summary = generate_dataset(house_file, out, options=OPTIONS, workforce=workforce, house_timeout_s=40.0)
     assert (tmp_path / "flag").exists()
     assert summary.reasons == {
         "timeout": 1, "error": 1, "crash": 1, "malformed_house": 1, "too_few_rooms": 1

@@ -310,8 +310,8 @@ def test_departures_are_with_minus_without(script, tmp_path: Path) -> None:
     run_of("main", "3d-mem", "ab")
     run_of("plus", "3d-mem+", "abcde")
     table = script.departure_table(tmp_path, ["3d-mem"])
-    ((words, agent, without, with_it, success, _),) = table.rows
-    assert (words, agent, without, with_it) == ("our fallback for frontiers", "3d-mem", "33.3", "83.3")
+    ((words, agent, without, with_it, success, _, num),) = table.rows
+    assert (words, agent, without, with_it, num) == ("our fallback for frontiers", "3d-mem", "33.3", "83.3", "6")
     assert success.startswith("+50.0 [")
 
 
