@@ -1,13 +1,17 @@
-//! The sun's shadows against the ray caster.
+//! The sun's shadows against the ray caster, and pictures in any order.
 
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,
         part::{Part, Primitive},
     },
-    geometry::{Vec3, add, euler_rotation_deg},
+    geometry::{Aabb, Vec3, add, euler_rotation_deg},
     house::House,
-    sensors::{raster::Light, ray_caster::RayCaster},
+    sensors::{
+        camera::{Camera, View},
+        raster::{FrameBuffer, Light, Style, Want, render_lit},
+        ray_caster::RayCaster,
+    },
     world::{
         mesh::{SceneMesh, Triangle},
         scene::{BodyKind, Scene},
@@ -147,4 +151,41 @@ fn the_sun_is_nowhere_in_a_house_where_rays_to_it_are_blocked() {
         num_blocked += i32::from(found == Some(false));
     }
     assert!(num_blocked > 1000, "too few clear places: {num_blocked}");
+}
+
+/// What was seen before changes no picture, though it decides when the light on a part is computed.
+#[test]
+fn pictures_do_not_depend_on_what_was_seen_before() {
+    let (house, scene) = house();
+    let mesh = SceneMesh::build(&scene);
+    let centre_m = Aabb::of_points(mesh.triangles().flat_map(|t| t.vertices_m)).centre_m();
+    let view_of = |index: usize| {
+        let yaw_rad = index as f64 * std::f64::consts::FRAC_PI_3;
+        let camera = Camera {
+            width_px: 96,
+            height_px: 72,
+            vertical_fov_rad: 1.4,
+            position_m: [centre_m[0], 1.5, centre_m[2]],
+            yaw_rad,
+            horizon_rad: 0.3,
+        };
+        View::from(camera)
+    };
+    let want = Want { rgb: Some(Style::Default), instances: false };
+    let draw = |light: &Light, index: usize| {
+        let mut frame = FrameBuffer::default();
+        render_lit(&mesh, Some(light), &view_of(index), want, &mut frame).expect("a valid view");
+        frame.rgb
+    };
+    let own = Light::build(&house, &scene, &mesh);
+    let forwards: Vec<_> = (0..6).map(|index| draw(&own, index)).collect();
+    assert!(forwards.windows(2).all(|pair| pair[0] != pair[1]));
+    let shared = Light::build(&house, &scene, &mesh);
+    let pictures: Vec<_> = std::thread::scope(|scope| {
+        let (shared, draw) = (&shared, &draw);
+        let draw_one = |index| scope.spawn(move || draw(shared, index));
+        let threads: Vec<_> = (0..6).rev().map(draw_one).collect();
+        threads.into_iter().rev().map(|thread| thread.join().expect("a picture")).collect()
+    });
+    assert_eq!(pictures, forwards);
 }

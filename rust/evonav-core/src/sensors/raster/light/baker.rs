@@ -6,7 +6,7 @@ use crate::{
     geometry::{Vec2, Vec3, sub},
     sensors::raster::{
         canvas::LANES,
-        light::{coarse::Coarse, contact::Contact, field::FaceLight, sources::Sources, sun::Sun},
+        light::{coarse::Coarse, contact::Contact, sources::Sources, sun::Sun},
     },
     world::{
         mesh::{Face, PartMesh, SceneMesh, dot},
@@ -27,6 +27,18 @@ const FLOOR_STEP: usize = 3;
 const PROBE_M: f64 = 0.09;
 /// Brightness of what shines by itself: screens, and the world behind panes.
 const GLOW: f32 = 1.35;
+
+/// The light on one face: a grid of points over the rectangle around it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FaceLight {
+    /// Column and row of a world point: `axes . [x, y, z, 1]`.
+    pub axes: [[f32; 4]; 2],
+    /// Columns and rows, 2 or more.
+    pub size: [u16; 2],
+    pub first: u32,
+    /// Index of the space before the face, if its light is that of a space.
+    pub space: Option<u32>,
+}
 
 /// All that decides the light on a face, besides the mesh.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::{
     sensors::raster::light::{
-        baker::{Around, Baker},
+        baker::{Around, Baker, FaceLight},
         contact::Contact,
         sources::Sources,
         sun::Sun,
@@ -14,18 +14,6 @@ use crate::{
         scene::Scene,
     },
 };
-
-/// The light on one face: a grid of points over the rectangle around it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct FaceLight {
-    /// Column and row of a world point: `axes . [x, y, z, 1]`.
-    pub axes: [[f32; 4]; 2],
-    /// Columns and rows, 2 or more.
-    pub size: [u16; 2],
-    pub first: u32,
-    /// Index of the space before the face, if its light is that of a space.
-    pub space: Option<u32>,
-}
 
 /// The light on the faces of a part. A point has the light without the sun, by channel, and the
 /// share of sunlight that the surface's slope takes up.
