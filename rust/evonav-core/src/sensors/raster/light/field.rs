@@ -25,17 +25,19 @@ struct PartLight {
 }
 
 impl PartLight {
-    /// Multiply by factors, by channel, of each space.
-    fn tint(&mut self, tints: &[[f32; 3]]) {
+    /// Return the light times factors, by channel, of each space.
+    fn tinted(&self, tints: &[[f32; 3]]) -> Self {
+        let mut light = self.clone();
         for face in &self.faces {
             let Some(space) = face.space else { continue };
             let [red, green, blue] = tints[space as usize];
             let num_points = usize::from(face.size[0]) * usize::from(face.size[1]);
-            for point in &mut self.points[face.first as usize..][..num_points] {
+            for point in &mut light.points[face.first as usize..][..num_points] {
                 let [r, g, b, slope] = *point;
                 *point = [r * red, g * green, b * blue, slope];
             }
         }
+        light
     }
 }
 
@@ -43,11 +45,19 @@ impl PartLight {
 /// picture shows a small share of a house.
 #[derive(Debug, Clone)]
 pub(in crate::sensors::raster) struct Field {
-    baker: Arc<Baker>,
-    /// Number of each face's part in `parts`.
-    part_of: Arc<[u32]>,
-    /// Factors of the light of each space, by channel; empty for factors of 1.
+    own: Arc<Own>,
+    /// Factors of the light of each space, by channel, and the parts with them; empty for the
+    /// house's own light.
     tints: Vec<[f32; 3]>,
+    tinted: Vec<OnceLock<PartLight>>,
+}
+
+/// The house's own light, which all its tints share.
+#[derive(Debug)]
+struct Own {
+    baker: Baker,
+    /// Number of each face's part in `parts`.
+    part_of: Vec<u32>,
     /// The parts of the mesh, then its trim.
     parts: Vec<OnceLock<PartLight>>,
 }
@@ -66,17 +76,16 @@ impl Field {
             part_of[part.faces.clone()].fill(index);
         }
         let parts = vec![OnceLock::new(); parts_of(mesh).count()];
-        let baker = Arc::new(Baker { kinds, sources, contact, sun });
-        Self { baker, part_of: part_of.into(), tints: Vec::new(), parts }
+        let own = Own { baker: Baker { kinds, sources, contact, sun }, part_of, parts };
+        Self { own: Arc::new(own), tints: Vec::new(), tinted: Vec::new() }
     }
 
-    /// Return the light times factors, by channel, of each space.
+    /// Return the house's own light times factors, by channel, of each space.
     pub fn tinted(&self, tint: impl Fn(usize) -> [f32; 3]) -> Self {
         Self {
-            baker: Arc::clone(&self.baker),
-            part_of: Arc::clone(&self.part_of),
-            tints: (0..self.baker.sources.num_spaces()).map(tint).collect(),
-            parts: vec![OnceLock::new(); self.parts.len()],
+            own: Arc::clone(&self.own),
+            tints: (0..self.own.baker.sources.num_spaces()).map(tint).collect(),
+            tinted: vec![OnceLock::new(); self.own.parts.len()],
         }
     }
 
@@ -86,13 +95,18 @@ impl Field {
     /// * `mesh` - the mesh of the light.
     #[inline(always)]
     pub fn of_face(&self, mesh: &SceneMesh, index: usize) -> Option<FaceField<'_>> {
-        let number = *self.part_of.get(index)? as usize;
-        let part = &self.parts[number];
-        let part = part.get().unwrap_or_else(|| part.get_or_init(|| self.bake(mesh, number)));
+        let number = *self.own.part_of.get(index)? as usize;
+        let own = || self.own.parts[number].get_or_init(|| self.own.bake(mesh, number));
+        let part = match self.tinted.get(number) {
+            Some(part) => part.get_or_init(|| own().tinted(&self.tints)),
+            None => own(),
+        };
         let face = &part.faces[index - part.first_face];
         Some(FaceField { face, points: &part.points[face.first as usize..] })
     }
+}
 
+impl Own {
     #[cold]
     fn bake(&self, mesh: &SceneMesh, number: usize) -> PartLight {
         let (solid, trim) = (&mesh.parts, &mesh.trim);
@@ -101,11 +115,7 @@ impl Field {
         let mut points = Vec::new();
         let bake = |index| self.baker.bake(mesh, part, &around, index, &mut points);
         let faces = part.faces.clone().map(bake).collect();
-        let mut light = PartLight { first_face: part.faces.start, faces, points };
-        if !self.tints.is_empty() {
-            light.tint(&self.tints);
-        }
-        light
+        PartLight { first_face: part.faces.start, faces, points }
     }
 }
 

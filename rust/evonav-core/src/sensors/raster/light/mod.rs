@@ -56,7 +56,7 @@ impl Light {
     /// Return the light with random factors, which are drawn for each group of connected rooms.
     ///
     /// # Complexity
-    /// O(parts of the mesh); each face is computed again when it is first seen.
+    /// O(parts of the mesh); what this light has computed is not computed again.
     pub fn varied(&self, lighting: &Lighting) -> Self {
         let [red, green, blue] = lighting.sun();
         Self {
