@@ -173,6 +173,9 @@ def number_instances(
     min_area_px: int,
     max_box_fraction: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
+def renumber_masks(masks: NDArray[np.int32], numbers: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Replace each detection of `(H, W)` masks by its new number, negative for none."""
+
 def draw_normals(seed: int, labels: Sequence[Sequence[str]], *, num_draws: int) -> NDArray[np.float64]:
     """Draw standard normal numbers, `(N, num_draws)`: one row from each named stream."""
 

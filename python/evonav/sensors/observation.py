@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav import _core
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -29,10 +30,10 @@ class Detections:
         taken = list(indices)
         if taken == list(range(len(self.labels))):
             return self
-        numbers = np.full(len(self.labels) + 1, -1, np.int32)  # index -1 finds the last
+        numbers = np.full(len(self.labels), -1, np.int32)
         numbers[taken] = np.arange(len(taken), dtype=np.int32)
         return Detections(
-            masks=numbers[self.masks],
+            masks=_core.renumber_masks(self.masks, numbers),
             labels=tuple(self.labels[index] for index in taken),
             confidences=self.confidences[taken],
             features=None if self.features is None else self.features[taken],

@@ -91,7 +91,10 @@ class SimulatorConfig:
 
     def on_floor(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `(N, 3)` positions of the agent at `(N, 2)` points, `(x, z)`."""
-        return np.insert(np.asarray(points_m, dtype=np.float64).reshape(-1, 2), 1, self.agent_height_m / 2, axis=1)
+        ground_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        positions_m = np.full((len(ground_m), 3), self.agent_height_m / 2)
+        positions_m[:, ::2] = ground_m
+        return positions_m
 
     def stepped(self, pose: Pose, action: Action) -> Pose:
         """Return the pose that an action leads to if nothing is in the way."""

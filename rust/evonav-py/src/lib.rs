@@ -43,7 +43,10 @@ mod _core {
                 distort_masks, draw_normals, mask_outlines, noisy_depth, paint_blobs, surface_sites,
             },
         },
-        sensors::{encode_png, instance_areas, mask_extents, number_instances, visible_cells},
+        sensors::{
+            encode_png, instance_areas, mask_extents, number_instances, renumber_masks,
+            visible_cells,
+        },
         simulator::{
             batch::{PyBatchSimulator, PyGeodesicField},
             embedded::{PyEmbeddedSimulator, map_spec},

@@ -56,6 +56,21 @@ pub fn number_instances<'py>(
     Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
 }
 
+/// Give the detections of masks other numbers.
+#[pyfunction]
+pub fn renumber_masks<'py>(
+    py: Python<'py>,
+    masks: PyReadonlyArray2<'py, i32>,
+    numbers: PyReadonlyArray1<'py, i32>,
+) -> PyResult<Bound<'py, PyArray2<i32>>> {
+    let (image, shape) = arrays::row_major("masks", &masks)?;
+    let numbers = numbers.as_slice()?;
+    let renumbered = py
+        .detach(|| instance_masks::renumber_masks(image, shape[1], numbers))
+        .map_err(error::to_py)?;
+    arrays::image_of(py, renumbered, shape)
+}
+
 /// Count the pixels of each instance.
 #[pyfunction]
 pub fn instance_areas<'py>(

@@ -1,6 +1,6 @@
 //! Images of masks: validation and neighbouring pixels.
 
-use crate::{Error, sensors::instance_masks::runs};
+use crate::{Error, sensors::runs::runs};
 
 /// The size of a validated image of masks.
 pub(super) struct MaskImage {
@@ -11,8 +11,8 @@ pub(super) struct MaskImage {
 impl MaskImage {
     pub fn new(masks: &[i32], width_px: usize, num_masks: usize) -> Result<Self, Error> {
         Error::require_rows("masks", masks.len(), width_px)?;
-        for (mask, _) in runs(masks) {
-            Error::require("masks", mask, "negative or the index of a detection", |mask| {
+        for run in runs(masks, width_px) {
+            Error::require("masks", run.value, "negative or the index of a detection", |mask| {
                 usize::try_from(mask).is_ok_and(|mask| mask < num_masks) || mask < 0
             })?;
         }

@@ -1,6 +1,9 @@
 //! Instance images of the simulator as anonymous detections.
 
-use crate::Error;
+use crate::{
+    Error,
+    sensors::runs::{Run, runs},
+};
 
 /// The smallest and largest masks that count as detections.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,23 +47,20 @@ pub fn number_instances(
     Error::require_rows("instances", image.len(), width_px)?;
     let mut extents = vec![Extent::EMPTY; is_detectable.len()];
     let mut order = Vec::new();
-    // Value and length of every run.
-    let mut seen = Vec::new();
-    for (row, pixels) in image.chunks_exact(width_px).enumerate() {
-        for (value, cols) in runs(pixels) {
-            seen.push((value, cols[1] - cols[0]));
-            let Some(instance) = usize::try_from(value).ok().and_then(|v| v.checked_sub(1)) else {
-                Error::require("instances", value, "0 or 1 + an index of an object", |v| v == 0)?;
-                continue;
-            };
-            let extent = extents.get_mut(instance).ok_or_else(|| {
-                Error::invalid("instances", value, "0 or 1 + an index of an object")
-            })?;
-            if extent.area_px == 0 {
-                order.push(instance);
-            }
-            extent.add(row, cols);
+    let found: Vec<Run> = runs(image, width_px).collect();
+    for run in &found {
+        let instance = usize::try_from(run.value).ok().and_then(|value| value.checked_sub(1));
+        let Some(instance) = instance else {
+            Error::require("instances", run.value, "0 or 1 + an index of an object", |v| v == 0)?;
+            continue;
+        };
+        let extent = extents.get_mut(instance).ok_or_else(|| {
+            Error::invalid("instances", run.value, "0 or 1 + an index of an object")
+        })?;
+        if extent.area_px == 0 {
+            order.push(instance);
         }
+        extent.add(run);
     }
     let max_box_px = filter.max_box_fraction * image.len() as f64;
     order.retain(|&instance| {
@@ -74,10 +74,38 @@ pub fn number_instances(
         number_of[instance + 1] = number as i32;
     }
     let mut labels = Vec::with_capacity(image.len());
-    for (value, len) in seen {
-        labels.resize(labels.len() + len, number_of[value as usize]);
+    for run in found {
+        labels.resize(labels.len() + run.len(), number_of[run.value as usize]);
     }
     Ok(Masks { labels, instances: order })
+}
+
+/// Give the detections of an image other numbers.
+///
+/// # Arguments
+/// * `masks` - row-major, `width_px` a row; negative where nothing is.
+/// * `numbers` - new number of each detection, negative for none.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the image is not whole rows, or holds a number outside the table.
+///
+/// # Complexity
+/// O(pixels).
+pub fn renumber_masks(masks: &[i32], width_px: usize, numbers: &[i32]) -> Result<Vec<i32>, Error> {
+    Error::require_rows("masks", masks.len(), width_px)?;
+    let mut renumbered = Vec::with_capacity(masks.len());
+    for run in runs(masks, width_px) {
+        let number = match usize::try_from(run.value) {
+            Err(_) => -1,
+            Ok(mask) => *numbers.get(mask).ok_or_else(|| outside(run.value))?,
+        };
+        renumbered.resize(renumbered.len() + run.len(), number);
+    }
+    Ok(renumbered)
+}
+
+fn outside(mask: i32) -> Error {
+    Error::invalid("masks", mask, "negative or the index of a detection")
 }
 
 /// Count the pixels of each instance, by which an evaluator decides what is in view.
@@ -96,11 +124,11 @@ pub fn number_instances(
 /// O(pixels), one pass; a run of equal pixels is added in one step.
 pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, Error> {
     let mut areas = vec![0; num_instances + 1];
-    for run in image.chunk_by(|a, b| a == b) {
-        let area = usize::try_from(run[0])
-            .ok()
-            .and_then(|value| areas.get_mut(value))
-            .ok_or_else(|| Error::invalid("instances", run[0], "0 or 1 + an index of an object"))?;
+    for run in runs(image, image.len()) {
+        let area =
+            usize::try_from(run.value).ok().and_then(|value| areas.get_mut(value)).ok_or_else(
+                || Error::invalid("instances", run.value, "0 or 1 + an index of an object"),
+            )?;
         *area += run.len() as i64;
     }
     areas.remove(0);
@@ -125,35 +153,11 @@ pub fn mask_extents(
 ) -> Result<Vec<Extent>, Error> {
     Error::require_rows("masks", masks.len(), width_px)?;
     let mut extents = vec![Extent::EMPTY; num_masks];
-    for (row, pixels) in masks.chunks_exact(width_px).enumerate() {
-        for (mask, cols) in runs(pixels) {
-            let Ok(mask) = usize::try_from(mask) else { continue };
-            let extent = extents.get_mut(mask).ok_or_else(|| {
-                Error::invalid("masks", mask, "negative or the index of a detection")
-            })?;
-            extent.add(row, cols);
-        }
+    for run in runs(masks, width_px) {
+        let Ok(mask) = usize::try_from(run.value) else { continue };
+        extents.get_mut(mask).ok_or_else(|| outside(run.value))?.add(&run);
     }
     Ok(extents)
-}
-
-/// Return the runs of equal pixels: value, index of the first pixel, and index after the last.
-pub(crate) fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
-    let mut next = 0;
-    std::iter::from_fn(move || {
-        let (start, &value) = (next, pixels.get(next)?);
-        next += 1;
-        // Eight pixels are compared at once.
-        let differ =
-            |chunk: &[i32]| chunk.iter().fold(false, |found, &pixel| found | (pixel != value));
-        while pixels.get(next..next + 8).is_some_and(|chunk| !differ(chunk)) {
-            next += 8;
-        }
-        while pixels.get(next) == Some(&value) {
-            next += 1;
-        }
-        Some((value, [start, next]))
-    })
 }
 
 /// Area and bounding box of some pixels.
@@ -171,12 +175,13 @@ impl Extent {
     const EMPTY: Self = Self { area_px: 0, rows: [0; 2], cols: [0; 2] };
 
     /// Add part of a row; rows must come in ascending order.
-    fn add(&mut self, row: usize, cols: [usize; 2]) {
+    fn add(&mut self, run: &Run) {
+        let Run { row, cols, .. } = *run;
         *self = if self.area_px == 0 {
-            Self { area_px: cols[1] - cols[0], rows: [row, row + 1], cols }
+            Self { area_px: run.len(), rows: [row, row + 1], cols }
         } else {
             Self {
-                area_px: self.area_px + cols[1] - cols[0],
+                area_px: self.area_px + run.len(),
                 rows: [self.rows[0], row + 1],
                 cols: [self.cols[0].min(cols[0]), self.cols[1].max(cols[1])],
             }

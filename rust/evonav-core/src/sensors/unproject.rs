@@ -2,7 +2,10 @@
 
 use crate::{
     Error,
-    sensors::{camera::Camera, instance_masks::runs},
+    sensors::{
+        camera::Camera,
+        runs::{Run, runs},
+    },
 };
 
 /// A point in the world frame, in single precision: 8 micrometres at 100 m.
@@ -50,19 +53,16 @@ pub fn unproject_masks(
     if let Some(depth) = first_nan(depth_m) {
         return Err(Error::invalid("depth_m", depth, "not NaN"));
     }
-    // Detection, row and columns of each run of pixels.
-    let mut found: Vec<(usize, usize, [usize; 2])> = Vec::new();
+    let depth_of = |run: &Run| &depth_m[run.row * camera.width_px..][run.cols[0]..run.cols[1]];
+    let mut found: Vec<(usize, Run)> = Vec::new();
     let mut num_px = vec![0; num_detections];
-    let rows = masks.chunks_exact(camera.width_px).zip(depth_m.chunks_exact(camera.width_px));
-    for (row, (masks, depth_m)) in rows.enumerate() {
-        for (mask, [begin, end]) in runs(masks) {
-            let Ok(detection) = usize::try_from(mask) else { continue };
-            let count = num_px.get_mut(detection).ok_or_else(|| {
-                Error::invalid("masks", mask, "negative or the index of a detection")
-            })?;
-            *count += depth_m[begin..end].iter().filter(|&&depth| has_depth(depth)).count();
-            found.push((detection, row, [begin, end]));
-        }
+    for run in runs(masks, camera.width_px) {
+        let Ok(detection) = usize::try_from(run.value) else { continue };
+        let count = num_px.get_mut(detection).ok_or_else(|| {
+            Error::invalid("masks", run.value, "negative or the index of a detection")
+        })?;
+        *count += depth_of(&run).iter().filter(|&&depth| has_depth(depth)).count();
+        found.push((detection, run));
     }
     let strides: Vec<usize> =
         num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
@@ -76,11 +76,10 @@ pub fn unproject_masks(
     let first = camera.ray([0.5, 0.5]);
     let [along_u, along_v] = [camera.ray([1.5, 0.5]), camera.ray([0.5, 1.5])]
         .map(|ray| [0, 1, 2].map(|i| ray[i] - first[i]));
-    for (detection, row, [begin, end]) in found {
-        let start = [0, 1, 2].map(|i| first[i] + along_v[i] * row as f64);
+    for (detection, run) in found {
+        let start = [0, 1, 2].map(|i| first[i] + along_v[i] * run.row as f64);
         let (skip, cloud) = (&mut skips[detection], &mut clouds[detection]);
-        let depth_m = &depth_m[row * camera.width_px..][begin..end];
-        for (col, &depth) in (begin..end).zip(depth_m) {
+        for (col, &depth) in (run.cols[0]..).zip(depth_of(&run)) {
             if !has_depth(depth) {
                 continue;
             }

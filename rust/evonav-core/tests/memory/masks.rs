@@ -1,7 +1,7 @@
 //! Masks of instances in images, counted pixel by pixel.
 
 use evonav_core::sensors::instance_masks::{
-    MaskFilter, instance_areas, mask_extents, number_instances,
+    MaskFilter, instance_areas, mask_extents, number_instances, renumber_masks,
 };
 use proptest::{collection::vec, prelude::*};
 
@@ -36,6 +36,22 @@ proptest! {
             prop_assert_eq!(extent.rows, range(|i| i / 10));
             prop_assert_eq!(extent.cols, range(|i| i % 10));
         }
+    }
+
+    #[test]
+    fn renumbered_masks_are_those_of_a_table(
+        stretches in vec((-1..4_i32, 1..90_usize), 60),
+        width_px in 1..200_usize,
+        numbers in vec(-1..9_i32, 4),
+    ) {
+        let stretch = |&(mask, length): &(i32, usize)| std::iter::repeat_n(mask, length);
+        let mut image: Vec<i32> = stretches.iter().flat_map(stretch).collect();
+        image.truncate(image.len() / width_px * width_px);
+        let number = |&mask: &i32| usize::try_from(mask).map_or(-1, |mask| numbers[mask]);
+        let expected: Vec<i32> = image.iter().map(number).collect();
+        prop_assert_eq!(renumber_masks(&image, width_px, &numbers).unwrap(), expected);
+        let fits = image.iter().all(|&mask| mask < 3);
+        prop_assert_eq!(renumber_masks(&image, width_px, &numbers[..3]).is_ok(), fits);
     }
 
     #[test]
@@ -83,5 +99,7 @@ fn images_that_do_not_fit_are_named() {
     }
     names("instances", number_instances(&[0, 0, 0], 2, &[], filter).unwrap_err().to_string());
     names("masks", mask_extents(&[0, 1], 2, 1).unwrap_err().to_string());
+    names("masks", renumber_masks(&[0, 1], 2, &[0]).unwrap_err().to_string());
+    names("masks", renumber_masks(&[0, 0, 0], 2, &[0]).unwrap_err().to_string());
     names("masks", mask_extents(&[0, 0, 0], 2, 1).unwrap_err().to_string());
 }
