@@ -1,4 +1,4 @@
-"""Define the spaces of observations and actions, and the meaning of their numbers."""
+"""Define the spaces of observations and actions, the meaning of their numbers, and the form of infos."""
 
 import math
 import string
@@ -88,6 +88,14 @@ def action_space(config: NavConfig) -> spaces.Space[Any]:
     return spaces.Box(-1.0, 1.0, (3 if has_stop else 2,), np.float32)
 
 
+def with_masks(infos: Infos, num_envs: int) -> Infos:
+    """Return infos that every one of B environments has, with the masks that Gymnasium puts beside them."""
+    masked: Infos = {}
+    for name, values in infos.items():
+        masked[name], masked[f"_{name}"] = values, np.ones(num_envs, np.bool_)
+    return masked
+
+
 def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return poses relative to the start of the task.
 
@@ -101,8 +109,10 @@ def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> 
     dx_m, dz_m = poses[:, 0] - origins[:, 0], poses[:, 2] - origins[:, 2]
     sin, cos = np.sin(origins[:, 3]), np.cos(origins[:, 3])
     turn_rad = poses[:, 3] - origins[:, 3]
-    columns = (dx_m * cos - dz_m * sin, dx_m * sin + dz_m * cos, np.sin(turn_rad), np.cos(turn_rad))
-    return np.stack(columns, axis=1).astype(np.float32)
+    relative = np.empty((len(poses), 4), np.float32)
+    relative[:, 0], relative[:, 1] = dx_m * cos - dz_m * sin, dx_m * sin + dz_m * cos
+    relative[:, 2], relative[:, 3] = np.sin(turn_rad), np.cos(turn_rad)
+    return relative
 
 
 def rgbd(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -24,11 +24,15 @@ from evonav.gym.config import STOP, NavConfig
 from evonav.gym.map_view import MapView
 from evonav.gym.sources import task_source
 from evonav.gym.spaces import Infos, Observations
-from evonav.gym.stage import RewardedStage, task_result
+from evonav.gym.stage import Stages
 from evonav.gym.worlds import StageWorld, WorldLoader
 from evonav.parallel.local import num_cores
+from evonav.tasks.public import Goal
 from evonav.world.appearance import Change
 from evonav.world.pose import Pose
+
+_Moved = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+"""Path lengths, remaining distances, and who stopped."""
 
 
 @dataclass(slots=True)
@@ -40,10 +44,7 @@ class _Episode:
     """Number of the task in the source."""
     next_number: int
     at: StageWorld
-    rewarded: RewardedStage
-    results: list[Infos]
     look: tuple[Change, ...]
-    is_over: bool = False
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
@@ -132,6 +133,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         self._origins = np.zeros((num_envs, 5))
         self._has_succeeded = np.ones(num_envs, np.int64)
         self._has_arrived = np.zeros(num_envs, np.int64)
+        self._is_over = np.zeros(num_envs, np.bool_)
+        self._stages = Stages(self.config, num_envs)
+        kinds = {"task_id": object, "stage": np.int64, "num_stages": np.int64}
+        self._shared_infos = {name: np.zeros(num_envs, kind) for name, kind in kinds.items()}
+        """Infos of all agents."""
+        self._categories = np.zeros(num_envs, np.int64)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -164,7 +171,6 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         for number in numbers:
             self.loader.prefetch(number, 1)
         self._episodes = []
-        self._has_succeeded[:], self._has_arrived[:] = 1, 0
         for index, (number, random) in enumerate(zip(numbers, self._randoms, strict=True)):
             self._episodes.append(self._begin_task(index, number, random))
         self._poses = self._batch.poses()
@@ -190,9 +196,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         for index in indices:
             final_obs = {name: deepcopy(values[index]) for name, values in last.items()}
             ended[index] = {"final_obs": final_obs, "final_info": self.info(index) | ended[index]}
-            episode = self._episodes[index]
-            self._episodes[index] = self._begin_task(index, episode.next_number, episode.random)
-            self._has_succeeded[index], self._has_arrived[index] = 1, 0
+            self._begin_next(index)
         self._poses = self._batch.poses()
 
     def advance(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], dict[int, Infos]]:
@@ -205,32 +209,28 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             raise ResetNeeded("no task was begun: call reset first")
         if len(actions) != self.num_envs:
             raise InvalidArgumentError(f"argument `actions` has {len(actions)} elements, expected {self.num_envs}")
-        is_reset = np.array([episode.is_over for episode in self._episodes])
+        is_reset = self._is_over.copy()
         move = self._move if self.config.action_mode == "actions" else self._navigate
         lengths_m, distances_m, is_stop = move(actions, is_reset)
-        is_automatic = self.config.stop == "automatic"
-        rewards = np.zeros(self.num_envs)
-        terminations = np.zeros(self.num_envs, np.bool_)
+        ends_m = self._poses[:, [0, 2]]
+        for index, view in self._maps.items():
+            if not is_reset[index]:
+                view.walk([tuple(ends_m[index].tolist())])
+        rewards, has_ended = self._stages.advance(ends_m, lengths_m, distances_m, is_stop=is_stop, is_running=~is_reset)
+        changed = np.flatnonzero(has_ended | is_reset).tolist()
         ended: dict[int, Infos] = {}
-        for index, episode in enumerate(self._episodes):
+        for index in changed:
             if is_reset[index]:
-                self._episodes[index] = self._begin_task(index, episode.next_number, episode.random)
-                self._has_succeeded[index], self._has_arrived[index] = 1, 0
-                continue
-            end = self._pose(index)
-            self._walk(index, [(end.x_m, end.z_m)])
-            stops = is_stop[index] or (is_automatic and episode.rewarded.is_within_radius(end))
-            rewards[index] = episode.rewarded.advance(end, lengths_m[index], distances_m[index], is_stop=stops)
-            if episode.rewarded.progress.is_over:
-                ended[index] = self._end_stage(index, episode, end)
-                terminations[index] = episode.is_over
-        if ended or is_reset.any():
+                self._begin_next(index)
+            else:
+                ended[index] = self._end_stage(index, self._pose(index))
+        if changed:
             self._poses = self._batch.poses()
-        return rewards, terminations, ended
+        return rewards, has_ended & self._is_over, ended
 
     def is_over(self, index: int) -> bool:
         """Return whether an environment's task is over, or was not begun."""
-        return not self._episodes or self._episodes[index].is_over
+        return not self._episodes or bool(self._is_over[index])
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Return a picture of each agent in mode `rgb_array`: its camera's `(H, W, 3)`, or a map `(S, S, 3)`.
@@ -252,19 +252,23 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """End the background thread."""
         self.loader.close()
 
+    def _begin_next(self, index: int) -> None:
+        episode = self._episodes[index]
+        self._episodes[index] = self._begin_task(index, episode.next_number, episode.random)
+
     def _begin_task(self, index: int, number: int, random: np.random.Generator) -> _Episode:
         at = self.loader.get(number, 1)
         # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
         look = self.config.draw_appearance(random)
-        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start_pose, look)
+        start = self._begin_stage(index, (number, next_number), at, at.task.start_pose, look)
         self._origins[index] = (*start.position_m, start.yaw_rad, start.horizon_rad)
-        return _Episode(random, number, next_number, at, rewarded, [], look)
+        return _Episode(random, number, next_number, at, look)
 
     def _begin_stage(
         self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose, look: tuple[Change, ...]
-    ) -> tuple[RewardedStage, Pose]:
-        """Put an agent into a stage; `numbers` are those of this task and the next."""
+    ) -> Pose:
+        """Put an agent into a stage, and return its pose; `numbers` are those of this task and the next."""
         simulator = at.world.entered(look)
         start = simulator.enter(pose)
         self._batch.place(index, simulator.core, start, at.world.labels)
@@ -275,24 +279,24 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         is_last = at.stage == at.task.num_stages
         self.loader.prefetch(numbers[is_last], 1 if is_last else at.stage + 1)
         length_m = motion.polyline_length_m(path_m) if path_m else None
-        rewarded = RewardedStage.begin(self.config, at.target_m, start, length_m, self._batch.distance_m(index))
-        return rewarded, start
+        self._stages.begin(index, at.stage, at.target_m, start, length_m, self._batch.distance_m(index))
+        self._shared_infos["task_id"][index] = at.task.task_id
+        self._shared_infos["stage"][index], self._shared_infos["num_stages"][index] = at.stage, at.task.num_stages
+        self._categories[index] = spaces.category_index(at.task.public(at.stage).category)
+        self._has_succeeded[index], self._has_arrived[index], self._is_over[index] = 1, 0, False
+        return start
 
-    def _end_stage(self, index: int, episode: _Episode, end: Pose) -> Infos:
+    def _end_stage(self, index: int, end: Pose) -> Infos:
         """Measure a stage and begin the next one, if there is one."""
-        at = episode.at
-        episode.results.append(episode.rewarded.result(at.stage, end))
-        ended: Infos = {"stage_result": dict(episode.results[-1])}
-        if at.stage == at.task.num_stages:
-            episode.is_over = True
-            return ended | {"task_result": task_result(episode.results)}
-        episode.at = self.loader.get(episode.number, at.stage + 1)
-        numbers = (episode.number, episode.next_number)
-        episode.rewarded, _ = self._begin_stage(index, numbers, episode.at, end, episode.look)
-        self._has_succeeded[index], self._has_arrived[index] = 1, 0
+        episode, at = self._episodes[index], self._episodes[index].at
+        self._is_over[index] = is_last = at.stage == at.task.num_stages
+        ended = self._stages.end(index, at.stage, end, is_last=is_last)
+        if not is_last:
+            episode.at = self.loader.get(episode.number, at.stage + 1)
+            self._begin_stage(index, (episode.number, episode.next_number), episode.at, end, episode.look)
         return ended
 
-    def _move(self, actions: NDArray[Any], is_reset: NDArray[np.bool_]) -> tuple[list[float], list[float], list[bool]]:
+    def _move(self, actions: NDArray[Any], is_reset: NDArray[np.bool_]) -> _Moved:
         """Execute discrete actions; return path lengths, remaining distances, and who stopped."""
         largest = STOP if self.config.stop == "explicit" else STOP - 1
         if not (is_reset | (actions >= 0) & (actions <= largest)).all():
@@ -304,11 +308,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         self._has_succeeded[:] = is_success
         after = self._poses[:, [0, 2]].tolist()
         lengths_m = [0.0 if a == b else math.dist(a, b) for a, b in zip(before, after, strict=True)]
-        return lengths_m, distances_m.tolist(), (numbers == STOP).tolist()
+        return np.array(lengths_m), distances_m, numbers == STOP
 
-    def _navigate(
-        self, actions: NDArray[Any], is_reset: NDArray[np.bool_]
-    ) -> tuple[list[float], list[float], list[bool]]:
+    def _navigate(self, actions: NDArray[Any], is_reset: NDArray[np.bool_]) -> _Moved:
         """Execute waypoint actions: Rust finds the paths, which agents follow as in an evaluation."""
         targets_m = [
             None if skips else spaces.waypoint_m(self.config, action, pose, origin)
@@ -321,7 +323,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 lengths_m[index] = self._follow(index, corners)
         self._poses = self._batch.poses()
         _, distances_m = self._batch.step(np.full(self.num_envs, STOP, np.uint8))
-        return lengths_m, distances_m.tolist(), [target is None for target in targets_m]
+        return np.array(lengths_m), distances_m, np.array([target is None for target in targets_m])
 
     def _follow(self, index: int, corners: list[tuple[float, float]]) -> float:
         here: tuple[float, float] = (float(self._poses[index, 0]), float(self._poses[index, 2]))
@@ -338,12 +340,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         num_passed = self._batch.follow(index, stops)
         self._has_succeeded[index] = num_passed == len(points)
         self._has_arrived[index] = is_end and num_passed == len(points)
-        self._walk(index, points[:num_passed])
-        return motion.polyline_length_m(way[: num_passed + 1])
-
-    def _walk(self, index: int, points_m: list[tuple[float, float]]) -> None:
         if index in self._maps:
-            self._maps[index].walk(points_m)
+            self._maps[index].walk(points[:num_passed])
+        return motion.polyline_length_m(way[: num_passed + 1])
 
     def _pose(self, index: int) -> Pose:
         return Pose(*self._poses[index].tolist())
@@ -352,23 +351,22 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """Return the observations of all environments."""
         config, seen = self.config, self._drawn()
         seen["pose"] = spaces.relative_poses(self._poses, self._origins)
-        goals = [episode.at.task.public(episode.at.stage) for episode in self._episodes]
-        seen["category"] = np.array([spaces.category_index(goal.category) for goal in goals], np.int64)
-        seen["stage"] = np.array([episode.at.stage for episode in self._episodes], np.int64)
-        steps = [config.budget - episode.rewarded.progress.num_steps for episode in self._episodes]
-        seen["steps_left"] = np.array(steps, np.int64)
-        seen["is_action_success"] = self._has_succeeded.copy()
+        seen["category"], seen["stage"] = self._categories.copy(), self._shared_infos["stage"].copy()
+        seen["steps_left"] = config.budget - self._stages.num_steps
+        seen["is_action_success"], seen["has_arrived"] = self._has_succeeded.copy(), self._has_arrived.copy()
         if config.has("image"):
             seen["image"] = spaces.rgbd(seen["rgb"], seen["depth"])
         if config.has("state"):
             seen["state"] = spaces.states(seen["pose"], seen["steps_left"] / config.budget, self._has_succeeded)
-        seen["has_arrived"] = self._has_arrived.copy()
         if config.has("instruction"):
-            seen["instruction"] = tuple(spaces.instruction_text(goal) for goal in goals)
+            seen["instruction"] = tuple(spaces.instruction_text(goal) for goal in self._goals())
         if config.has("reference_image"):
             side_px = config.reference_image_px
-            seen["reference_image"] = np.stack([spaces.reference_image(goal, side_px) for goal in goals])
+            seen["reference_image"] = np.stack([spaces.reference_image(goal, side_px) for goal in self._goals()])
         return {name: seen[name] for name in config.observations}
+
+    def _goals(self) -> list[Goal]:
+        return [episode.at.task.public(episode.at.stage) for episode in self._episodes]
 
     def _drawn(self) -> Observations:
         """Render the images of all agents directly into the returned arrays."""
@@ -385,16 +383,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return dict(images)
 
     def _infos(self, ended: dict[int, Infos]) -> Infos:
-        infos: Infos = {}
-        for index in range(self.num_envs):
-            infos = self._add_info(infos, self.info(index) | ended.get(index, {}), index)
+        """Return the infos of all environments, as Gymnasium puts those of single ones together."""
+        infos = spaces.with_masks({name: values.copy() for name, values in self._shared_infos.items()}, self.num_envs)
+        if self.config.oracle_info:
+            oracles = spaces.with_masks(self._stages.oracles(), self.num_envs)
+            infos |= spaces.with_masks({"oracle": oracles}, self.num_envs)
+        for index, info in ended.items():
+            infos = self._add_info(infos, info, index)
         return infos
 
     def info(self, index: int) -> Infos:
         """Return the info of one environment, without what the end of a stage adds."""
-        episode = self._episodes[index]
-        at = episode.at
-        info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": at.task.num_stages}
+        info: Infos = {name: values[index : index + 1].tolist()[0] for name, values in self._shared_infos.items()}
         if self.config.oracle_info:
-            info["oracle"] = episode.rewarded.oracle()
+            info["oracle"] = self._stages.oracle(index)
         return info
