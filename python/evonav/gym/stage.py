@@ -92,10 +92,10 @@ class Stages:
         has_ended = is_running & (is_stop | (self.num_steps >= self._budget))
         rewards = np.zeros(len(ends_m))
         if self._config.reward == "progress":
-            with np.errstate(invalid="ignore"):  # without a path both are infinite
-                gains_m = self._distance_m - distances_m
-            rewards = np.where(is_running, np.where(np.isfinite(gains_m), gains_m, 0.0) - STEP_COST, 0.0)
-        for index in np.flatnonzero(has_ended).tolist():
+            has_path = is_running & np.isfinite(self._distance_m) & np.isfinite(distances_m)
+            np.subtract(self._distance_m, distances_m, out=rewards, where=has_path)
+            np.subtract(rewards, STEP_COST, out=rewards, where=is_running)
+        for index in has_ended.nonzero()[0].tolist():
             rewards[index] += self._end_reward(self._at(index).score(tuple(ends_m[index].tolist())))
         self._distance_m = distances_m
         return rewards, has_ended

@@ -212,12 +212,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         is_reset = self._is_over.copy()
         move = self._move if self.config.action_mode == "actions" else self._navigate
         lengths_m, distances_m, is_stop = move(actions, is_reset)
-        ends_m = self._poses[:, [0, 2]]
+        ends_m = self._poses[:, 0:3:2]
         for index, view in self._maps.items():
             if not is_reset[index]:
                 view.walk([tuple(ends_m[index].tolist())])
         rewards, has_ended = self._stages.advance(ends_m, lengths_m, distances_m, is_stop=is_stop, is_running=~is_reset)
-        changed = np.flatnonzero(has_ended | is_reset).tolist()
+        changed = (has_ended | is_reset).nonzero()[0].tolist()
         ended: dict[int, Infos] = {}
         for index in changed:
             if is_reset[index]:
@@ -302,11 +302,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         if not (is_reset | (actions >= 0) & (actions <= largest)).all():
             raise InvalidArgumentError(f"argument `actions` holds {actions.tolist()}, expected 0 to {largest}")
         numbers = np.where(is_reset, STOP, actions)
-        before = self._poses[:, [0, 2]].tolist()
+        before = self._poses[:, 0:3:2].tolist()
         is_success, distances_m = self._batch.step(numbers.astype(np.uint8))
         self._poses = self._batch.poses()
         self._has_succeeded[:] = is_success
-        after = self._poses[:, [0, 2]].tolist()
+        after = self._poses[:, 0:3:2].tolist()
         lengths_m = [0.0 if a == b else math.dist(a, b) for a, b in zip(before, after, strict=True)]
         return np.array(lengths_m), distances_m, numbers == STOP
 
