@@ -5,7 +5,8 @@ They come from the renderer's shape of the target, its reference image and ProcT
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -71,10 +72,10 @@ def adjectives_of(category: str, size_m: Point3, appearance: Appearance) -> list
 
 def size_word(category: str, size_m: Point3) -> str | None:
     """Return `small` or `large`, relative to the catalogue's assets of the category; `None` in between."""
-    edges_m = [_edge_m(asset_m) for asset_m in _sizes_m().get(category, ())]
-    if len(edges_m) < 3:
+    usual = _usual_of(category)
+    if usual is None or usual.num_assets < 3:
         return None
-    ratio = _edge_m(size_m) / float(np.median(edges_m))
+    ratio = _edge_m(size_m) / usual.edge_m
     return "small" if ratio < SMALL_RATIO else "large" if ratio > LARGE_RATIO else None
 
 
@@ -87,13 +88,13 @@ def shape_word(category: str, size_m: Point3, form: str | None) -> str | None:
     if category in _TOPS:
         ratio = short_m / long_m
         return "square" if ratio > SQUARE_RATIO else "long" if ratio < LONG_RATIO else "rectangular"
-    ratios = [asset_m[1] / max(asset_m[0], asset_m[2]) for asset_m in _sizes_m().get(category, ())]
-    if category in _UPRIGHT and ratios:
+    usual = _usual_of(category)
+    if category in _UPRIGHT and usual is not None:
         # Both the object itself and its ratio to its category must be extreme.
-        ratio, usual = height_m / long_m, float(np.median(ratios))
-        if ratio > 1.3 and ratio > 1.3 * usual:
+        ratio = height_m / long_m
+        if ratio > 1.3 and ratio > 1.3 * usual.ratio:
             return "tall"
-        if category in _BROAD and ratio < 0.9 and ratio < usual / 1.3:
+        if category in _BROAD and ratio < 0.9 and ratio < usual.ratio / 1.3:
             return "wide"
     return None
 
@@ -135,6 +136,26 @@ def details_of(category: str, appearance: Appearance) -> list[str]:
 def _edge_m(size_m: Point3) -> float:
     """Return the edge of the cube with the same volume: a size that does not depend on the form."""
     return float(np.cbrt(np.prod(size_m)))
+
+
+class _Usual(NamedTuple):
+    """The usual size of a category's assets: medians over the catalogue."""
+
+    num_assets: int
+    edge_m: float
+    ratio: float
+    """Height over the longer side."""
+
+
+@cache
+def _usual_of(category: str) -> _Usual | None:
+    """Return the usual size of a category; `None` if the catalogue has no asset of it."""
+    sizes_m = _sizes_m().get(category)
+    if sizes_m is None:
+        return None
+    edges_m = [_edge_m(size_m) for size_m in sizes_m]
+    ratios = [height_m / max(width_m, depth_m) for width_m, height_m, depth_m in sizes_m]
+    return _Usual(len(sizes_m), float(np.median(edges_m)), float(np.median(ratios)))
 
 
 @lru_cache(maxsize=1)
