@@ -6,11 +6,13 @@ use crate::textures::{
 };
 
 /// Return a texel that makes a surface darker or lighter, whatever its colour.
+#[inline(always)]
 pub fn grey(factor: f32) -> Texel {
     [factor, factor, factor, 1.0]
 }
 
 /// Return the lightness of wood whose grain runs along u; `[u, v]` repeat every 1.
+#[inline(always)]
 pub fn grain(u: f32, v: f32, seed: u32) -> f32 {
     let bend = fractal(u, v, [2, 3], 3, seed);
     let rings = wave(7.0 * v + 2.2 * bend);
@@ -19,12 +21,14 @@ pub fn grain(u: f32, v: f32, seed: u32) -> f32 {
     1.0 + 0.016 * rings + 0.13 * (streaks - 0.5) + 0.04 * (pores - 0.5)
 }
 
+#[inline(always)]
 pub fn wood(u: f32, v: f32, seed: u32) -> Texel {
     let g = grain(u, v, seed);
     // Dark grain is redder than light grain.
     [1.0 + 0.85 * (g - 1.0), g, 1.0 + 1.15 * (g - 1.0), 1.0]
 }
 
+#[inline(always)]
 pub fn planks(u: f32, v: f32, seed: u32) -> Texel {
     let rows = 8.0;
     let row = (v * rows) as u32;
@@ -41,6 +45,7 @@ pub fn planks(u: f32, v: f32, seed: u32) -> Texel {
     [light * (1.0 + 0.03 * tone), light, light * (1.0 - 0.04 * tone), 1.0 - 0.5 * joint]
 }
 
+#[inline(always)]
 pub fn parquet(u: f32, v: f32, seed: u32) -> Texel {
     let [x, y] = [(u * 4.0) as u32, (v * 4.0) as u32];
     let is_turned = (x + y) % 2 == 1;
@@ -55,6 +60,7 @@ pub fn parquet(u: f32, v: f32, seed: u32) -> Texel {
 
 /// Return tiles in a grid of `columns` x `rows`, with joints of a share of a tile's height;
 /// neighbouring rows are shifted by a share of a tile.
+#[inline(always)]
 fn grid(u: f32, v: f32, [columns, rows]: [u32; 2], joint: f32, shift: f32, seed: u32) -> Tile {
     let row = (v * rows as f32) as u32;
     let x = fract(u + shift * (row % 2) as f32 / columns as f32) * columns as f32;
@@ -76,6 +82,7 @@ struct Tile {
 }
 
 /// Return a tile of a colour that varies by `spread`, with grout of another lightness.
+#[inline(always)]
 fn tile(tile: &Tile, spread: f32, grout: f32) -> Texel {
     let [_, v] = tile.at;
     let bevel = 0.05 * (ramp(0.88, 0.95, 1.0 - v) - ramp(0.88, 0.95, v));
@@ -83,6 +90,7 @@ fn tile(tile: &Tile, spread: f32, grout: f32) -> Texel {
     [light, light, light, 1.0 - 0.8 * tile.joint]
 }
 
+#[inline(always)]
 pub fn slabs(u: f32, v: f32, seed: u32) -> Texel {
     let place = grid(u, v, [4, 4], 0.022, 0.0, seed);
     let stone = marble(fract(u + place.tone), fract(v - place.tone), seed);
@@ -90,20 +98,24 @@ pub fn slabs(u: f32, v: f32, seed: u32) -> Texel {
     std::array::from_fn(|i| drawn[i] * mix(stone[i], 1.0, 0.4 + 0.6 * place.joint))
 }
 
+#[inline(always)]
 pub fn tiles(u: f32, v: f32, seed: u32) -> Texel {
     let mottled = 1.0 + 0.05 * (fractal(u, v, [8, 8], 3, seed) - 0.5);
     let drawn = tile(&grid(u, v, [4, 4], 0.05, 0.0, seed), 0.05, 0.91);
     drawn.map(|channel| channel * mottled)
 }
 
+#[inline(always)]
 pub fn mosaic(u: f32, v: f32, seed: u32) -> Texel {
     tile(&grid(u, v, [8, 8], 0.11, 0.0, seed), 0.1, 0.9)
 }
 
+#[inline(always)]
 pub fn subway(u: f32, v: f32, seed: u32) -> Texel {
     tile(&grid(u, v, [4, 8], 0.08, 0.5, seed), 0.03, 0.87)
 }
 
+#[inline(always)]
 pub fn checkerboard(u: f32, v: f32, seed: u32) -> Texel {
     let place = grid(u, v, [4, 4], 0.03, 0.0, seed);
     let is_dark = ((u * 4.0) as u32 + (v * 4.0) as u32) % 2 == 1;
@@ -111,6 +123,7 @@ pub fn checkerboard(u: f32, v: f32, seed: u32) -> Texel {
     tile(&place, 0.05, 0.9).map(|channel| channel * light)
 }
 
+#[inline(always)]
 pub fn hexagons(u: f32, v: f32, seed: u32) -> Texel {
     // Two interleaved grids of centres; the nearest one counts. Tiles are 8 cm wide.
     let [x, y] = [u * 6.0, v * 6.0 * 0.866_025_4];
@@ -130,6 +143,7 @@ pub fn hexagons(u: f32, v: f32, seed: u32) -> Texel {
 
 /// Return the distances to the nearest and second nearest of random points, and the number of the
 /// nearest one.
+#[inline(always)]
 fn cells(u: f32, v: f32, count: u32, seed: u32) -> [f32; 3] {
     let [x, y] = [u * count as f32, v * count as f32];
     let (mut first, mut second, mut nearest) = (9.0_f32, 9.0_f32, 0.0);
@@ -150,11 +164,13 @@ fn cells(u: f32, v: f32, count: u32, seed: u32) -> [f32; 3] {
     [first.sqrt(), second.sqrt(), nearest]
 }
 
+#[inline(always)]
 pub fn shards(u: f32, v: f32, seed: u32) -> Texel {
     let [first, second, tone] = cells(u, v, 8, seed);
     grey(mix(0.94 + 0.12 * tone, 0.8, line(second - first, 0.16)))
 }
 
+#[inline(always)]
 pub fn brick(u: f32, v: f32, seed: u32) -> Texel {
     let place = grid(u, v, [4, 8], 0.16, 0.5, seed);
     let rough = fractal(u, v, [24, 16], 3, seed) - 0.5;
@@ -166,32 +182,36 @@ pub fn brick(u: f32, v: f32, seed: u32) -> Texel {
     [rgb[0], rgb[1], rgb[2], 1.0]
 }
 
+#[inline(always)]
 pub fn concrete(u: f32, v: f32, seed: u32) -> Texel {
     let clouds = fractal(u, v, [3, 3], 5, seed) - 0.5;
     let pores = noise(u, v, [90, 90], seed + 9);
     grey(1.0 + 0.14 * clouds - 0.06 * ramp(0.88, 0.97, pores))
 }
 
+#[inline(always)]
 pub fn plaster(u: f32, v: f32, seed: u32) -> Texel {
     let clouds = fractal(u, v, [3, 3], 3, seed) - 0.5;
     let rough = fractal(u, v, [48, 48], 2, seed + 4) - 0.5;
     grey(1.0 + 0.015 * clouds + 0.014 * rough)
 }
 
+#[inline(always)]
 pub fn marble(u: f32, v: f32, seed: u32) -> Texel {
     let clouds = fractal(u, v, [3, 3], 4, seed) - 0.5;
     // Veins run where noise crosses its middle, along a slant, and are seen in places only.
-    let [bend_u, bend_v] = [5, 6].map(|k| fractal(u, v, [4, 4], 5, seed + k) - 0.5);
+    let bend_u = fractal(u, v, [4, 4], 5, seed + 5) - 0.5;
+    let bend_v = fractal(u, v, [4, 4], 5, seed + 6) - 0.5;
     let [x, y] = [fract(u + 0.16 * bend_u), fract(v + 0.16 * bend_v)];
-    let vein = |cells: [u32; 2], width: f32, seed: u32| {
-        line(noise(fract(x + y), y, cells, seed) - 0.5, width)
-    };
     let seen = ramp(0.4, 0.75, fractal(u, v, [3, 3], 2, seed + 9));
-    let veins = 0.55 * vein([2, 3], 0.03, seed + 3) + 0.35 * vein([3, 5], 0.02, seed + 4);
+    let strong = line(noise(fract(x + y), y, [2, 3], seed + 3) - 0.5, 0.03);
+    let fine = line(noise(fract(x + y), y, [3, 5], seed + 4) - 0.5, 0.02);
+    let veins = 0.55 * strong + 0.35 * fine;
     let light = 1.0 + 0.08 * clouds - 0.13 * seen * veins - 0.05 * veins;
     [light, light, light + 0.01 * seen * veins, 1.0]
 }
 
+#[inline(always)]
 pub fn granite(u: f32, v: f32, seed: u32) -> Texel {
     let grains = random((u * 64.0) as u32, (v * 64.0) as u32, seed) - 0.5;
     let clusters = fractal(u, v, [12, 12], 3, seed + 2) - 0.5;

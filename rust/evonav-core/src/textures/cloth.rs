@@ -6,12 +6,14 @@ use crate::textures::{
     texture::Texel,
 };
 
+#[inline(always)]
 pub fn carpet(u: f32, v: f32, seed: u32) -> Texel {
     let tufts = random((u * 96.0) as u32, (v * 96.0) as u32, seed) - 0.5;
     let worn = fractal(u, v, [4, 4], 4, seed + 3) - 0.5;
     grey(1.0 + 0.1 * tufts + 0.08 * worn)
 }
 
+#[inline(always)]
 pub fn fabric(u: f32, v: f32, seed: u32) -> Texel {
     let threads = 24.0;
     let weave = wave(threads * u) * wave(threads * v);
@@ -19,6 +21,7 @@ pub fn fabric(u: f32, v: f32, seed: u32) -> Texel {
     grey(1.0 + 0.04 * weave + 0.1 * slubs)
 }
 
+#[inline(always)]
 pub fn leather(u: f32, v: f32, seed: u32) -> Texel {
     let pores = fractal(u, v, [40, 40], 2, seed) - 0.5;
     let folds = fractal(u, v, [4, 3], 4, seed + 1) - 0.5;
@@ -26,20 +29,24 @@ pub fn leather(u: f32, v: f32, seed: u32) -> Texel {
     [light, light, light, 1.0 + 0.5 * folds]
 }
 
+#[inline(always)]
 pub fn metal(u: f32, v: f32, seed: u32) -> Texel {
     let brush = fractal(u, v, [2, 64], 2, seed) - 0.5;
     let clouds = noise(u, v, [3, 2], seed + 3) - 0.5;
     grey(1.0 + 0.07 * brush + 0.05 * clouds)
 }
 
+#[inline(always)]
 pub fn paper(u: f32, v: f32, seed: u32) -> Texel {
     grey(1.0 + 0.06 * (fractal(u, v, [8, 8], 4, seed) - 0.5))
 }
 
+#[inline(always)]
 pub fn soil(u: f32, v: f32, seed: u32) -> Texel {
     grey(1.0 + 0.9 * (fractal(u, v, [16, 16], 3, seed) - 0.5))
 }
 
+#[inline(always)]
 pub fn wicker(u: f32, v: f32, seed: u32) -> Texel {
     let [x, y] = [(u * 12.0) as u32, (v * 12.0) as u32];
     let is_over = (x + y) % 2 == 0;
@@ -49,6 +56,7 @@ pub fn wicker(u: f32, v: f32, seed: u32) -> Texel {
 }
 
 /// Return leaves that lie over each other.
+#[inline(always)]
 pub fn leaves(u: f32, v: f32, seed: u32) -> Texel {
     let (mut light, mut top) = (0.62, -1.0);
     let count = 5_u32;
@@ -78,6 +86,7 @@ pub fn leaves(u: f32, v: f32, seed: u32) -> Texel {
 }
 
 /// Return one of six printed patterns: stripes, checks, dots, flowers, diamonds and plain linen.
+#[inline(always)]
 pub fn bedding(u: f32, v: f32, seed: u32) -> Texel {
     let linen = 1.0 + 0.06 * (fractal(u, v, [12, 12], 3, seed) - 0.5);
     let edge = |t: f32| ramp(0.45, 0.5, t) - ramp(0.95, 1.0, t);
@@ -102,6 +111,7 @@ pub fn bedding(u: f32, v: f32, seed: u32) -> Texel {
 
 /// Return the light on something soft that bulges: lighter in the middle and above, dark at its
 /// edges.
+#[inline(always)]
 fn bulge(u: f32, v: f32) -> f32 {
     let [x, y] = [u, v].map(|t| (4.0 * t * (1.0 - t)).clamp(0.0, 1.0));
     let edge = ramp(0.0, 0.5, x.min(y));
@@ -109,6 +119,7 @@ fn bulge(u: f32, v: f32) -> f32 {
 }
 
 /// Return folds: soft creases in the directions that `seed` chooses.
+#[inline(always)]
 fn folds(u: f32, v: f32, seed: u32) -> f32 {
     let bend = fractal(u, v, [3, 3], 3, seed);
     let slant = random(seed, 1, 9) - 0.5;
@@ -118,6 +129,7 @@ fn folds(u: f32, v: f32, seed: u32) -> f32 {
     0.6 * crease * strength + 0.4 * fine * (1.0 - strength)
 }
 
+#[inline(always)]
 pub fn cushion(u: f32, v: f32, seed: u32) -> Texel {
     let border = u.min(1.0 - u).min(v).min(1.0 - v);
     let seam = line(border - 0.045, 0.02);
@@ -125,10 +137,12 @@ pub fn cushion(u: f32, v: f32, seed: u32) -> Texel {
     grey(bulge(u, v) * threads * (1.0 - 0.22 * seam) * (1.0 + 0.035 * folds(u, v, seed)))
 }
 
+#[inline(always)]
 pub fn pillow(u: f32, v: f32, seed: u32) -> Texel {
     grey(bulge(u, v) * (1.0 + 0.05 * folds(u, v, seed)))
 }
 
+#[inline(always)]
 pub fn duvet(u: f32, v: f32, seed: u32) -> Texel {
     let turned = 0.15;
     let shade = 1.0 + 0.05 * folds(u, v, seed) + 0.03 * folds(v, u, seed + 3);
@@ -146,6 +160,7 @@ pub fn duvet(u: f32, v: f32, seed: u32) -> Texel {
     [0, 1, 2, 3].map(|i| printed[i] * light * shadow * quilt)
 }
 
+#[inline(always)]
 pub fn rug(u: f32, v: f32, seed: u32) -> Texel {
     let border = u.min(1.0 - u).min(v).min(1.0 - v);
     let tufts = carpet(fract(4.0 * u), fract(4.0 * v), seed);

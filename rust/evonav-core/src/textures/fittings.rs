@@ -9,17 +9,20 @@ use crate::textures::{
 };
 
 /// Return the distance from the nearest border, as a share of the side.
+#[inline(always)]
 fn border(u: f32, v: f32) -> f32 {
     u.min(1.0 - u).min(v).min(1.0 - v)
 }
 
 /// Return a colour of a picture, with its gloss.
+#[inline(always)]
 fn pixel([red, green, blue]: [f32; 3]) -> Texel {
     [red, green, blue, 1.0]
 }
 
 /// Return the light on a slanted rim `width` wide: dark above and left, light below and right if
 /// the middle lies deeper, the other way round if `depth` is negative; 1 in the middle.
+#[inline(always)]
 fn rim(u: f32, v: f32, width: f32, depth: f32) -> f32 {
     if border(u, v) > width {
         return 1.0;
@@ -38,6 +41,7 @@ fn rim(u: f32, v: f32, width: f32, depth: f32) -> f32 {
     1.0 + depth * slope
 }
 
+#[inline(always)]
 pub fn panel(u: f32, v: f32, seed: u32) -> Texel {
     let fibres = 1.0 + 0.45 * (grain(v, u, seed) - 1.0);
     let gap = line(border(u, v), 0.018);
@@ -48,12 +52,14 @@ pub fn panel(u: f32, v: f32, seed: u32) -> Texel {
     grey(fibres * outer * inner * (1.0 - 0.45 * gap))
 }
 
+#[inline(always)]
 pub fn drawer(u: f32, v: f32, seed: u32) -> Texel {
     let fibres = 1.0 + 0.45 * (grain(u, v, seed) - 1.0);
     let gap = line(border(u, v), 0.03);
     grey(fibres * rim(u, v, 0.055, -0.13) * (1.0 - 0.5 * gap) * (1.03 - 0.06 * v))
 }
 
+#[inline(always)]
 pub fn appliance(u: f32, v: f32, seed: u32) -> Texel {
     let sheen = noise(u, 0.0, [3, 1], seed) - 0.5;
     let gap = line(border(u, v), 0.02);
@@ -61,6 +67,7 @@ pub fn appliance(u: f32, v: f32, seed: u32) -> Texel {
     brushed.map(|c| c * (1.0 + 0.16 * sheen) * (1.04 - 0.08 * v) * (1.0 - 0.4 * gap))
 }
 
+#[inline(always)]
 pub fn oven_door(u: f32, v: f32, _seed: u32) -> Texel {
     let frame = ramp(0.05, 0.07, border(u, v));
     let reflection = 0.10 * ramp(0.0, 0.5, 1.0 - (u + v)) + 0.03 * (1.0 - v);
@@ -69,6 +76,7 @@ pub fn oven_door(u: f32, v: f32, _seed: u32) -> Texel {
     pixel(blend(rgb(52, 52, 56), [glass, glass, 1.06 * glass], frame))
 }
 
+#[inline(always)]
 pub fn hob(u: f32, v: f32, seed: u32) -> Texel {
     let [x, y] = [fract(2.0 * u) - 0.5, fract(2.0 * v) - 0.5];
     let quarter = (2.0 * u) as u32 + 2 * (2.0 * v) as u32;
@@ -79,6 +87,7 @@ pub fn hob(u: f32, v: f32, seed: u32) -> Texel {
     pixel(blend(rgb(30, 30, 33), rgb(165, 165, 170), (0.55 * ring + plate).min(1.0)))
 }
 
+#[inline(always)]
 pub fn dark_screen(u: f32, v: f32, _seed: u32) -> Texel {
     let inner = ramp(0.016, 0.022, border(u, v));
     let sheen = 0.14 * ramp(0.0, 0.9, 1.05 - u - 0.8 * v) + 0.035 * (1.0 - v);
@@ -86,6 +95,7 @@ pub fn dark_screen(u: f32, v: f32, _seed: u32) -> Texel {
     pixel(blend(rgb(38, 38, 41), glass, inner))
 }
 
+#[inline(always)]
 pub fn lit_screen(u: f32, v: f32, seed: u32) -> Texel {
     let shown = painting(u, v, 3 * (seed % 8) + 1);
     let inner = ramp(0.016, 0.022, border(u, v));
@@ -93,6 +103,7 @@ pub fn lit_screen(u: f32, v: f32, seed: u32) -> Texel {
     pixel(blend(rgb(38, 38, 41), bright, inner))
 }
 
+#[inline(always)]
 pub fn keyboard(u: f32, v: f32, _seed: u32) -> Texel {
     let row = (5.0 * v) as u32;
     let x = fract(14.0 * u + 0.35 * row as f32);
@@ -105,6 +116,7 @@ pub fn keyboard(u: f32, v: f32, _seed: u32) -> Texel {
 }
 
 /// Return the cover of a book: a title, a name and a block or bands, lighter or darker than it.
+#[inline(always)]
 pub fn cover(u: f32, v: f32, seed: u32) -> Texel {
     let spine = 1.0 - 0.25 * line(u - 0.06, 0.03);
     let is_light = hash(seed, 2, 2).is_multiple_of(2);
@@ -127,11 +139,13 @@ pub fn cover(u: f32, v: f32, seed: u32) -> Texel {
     [r, g, b, 1.0]
 }
 
+#[inline(always)]
 pub fn pages(u: f32, v: f32, seed: u32) -> Texel {
     grey(1.0 + 0.12 * (noise(u, v, [1, 48], seed) - 0.5))
 }
 
 /// Return a printed page: headlines, columns of text and pictures.
+#[inline(always)]
 pub fn print(u: f32, v: f32, seed: u32) -> Texel {
     let paper = rgb(232, 229, 219);
     let column = (3.0 * u) as u32;
@@ -153,6 +167,7 @@ pub fn print(u: f32, v: f32, seed: u32) -> Texel {
     pixel(blend(paper, rgb(60, 58, 58), ink))
 }
 
+#[inline(always)]
 pub fn clock_face(u: f32, v: f32, seed: u32) -> Texel {
     let [x, y] = [u - 0.5, v - 0.5];
     let radius = (x * x + y * y).sqrt();

@@ -11,7 +11,7 @@ mod texture;
 
 use std::sync::OnceLock;
 
-pub use texture::{Level, MOST_PLACES, NEUTRAL, Sums, Texel, Texture};
+pub use texture::{Level, MOST_PLACES, NEUTRAL, Pattern, Sums, Texel, Texture};
 
 use crate::assets::material::{Layout, Material, MaterialKind};
 
@@ -41,57 +41,70 @@ fn drawn(
     has_texture.then(|| slot.get_or_init(|| draw(kind, variant as u32)))
 }
 
-/// A function that gives a texture's colours at `[u, v]`, for a seed.
-type Pattern = fn(f32, f32, u32) -> Texel;
-
 /// Draw one of the textures of a kind.
 fn draw(kind: MaterialKind, variant: u32) -> Texture {
     use MaterialKind as Kind;
-    let flat: Pattern = |_, _, _| [1.0; 4];
-    let (log2_size, pattern): (u32, Pattern) = match kind {
-        Kind::Smooth | Kind::Ceramic | Kind::Glass | Kind::Pane => (0, flat),
-        Kind::Plaster => (7, building::plaster),
-        Kind::Planks => (8, building::planks),
-        Kind::Parquet => (8, building::parquet),
-        Kind::Wood => (7, building::wood),
-        Kind::Slabs => (7, building::slabs),
-        Kind::Tiles => (7, building::tiles),
-        Kind::Mosaic => (7, building::mosaic),
-        Kind::Subway => (7, building::subway),
-        Kind::Hexagons => (7, building::hexagons),
-        Kind::Checkerboard => (7, building::checkerboard),
-        Kind::Shards => (7, building::shards),
-        Kind::Brick => (7, building::brick),
-        Kind::Concrete => (7, building::concrete),
-        Kind::Marble => (7, building::marble),
-        Kind::Granite => (6, building::granite),
-        Kind::Carpet => (7, cloth::carpet),
-        Kind::Fabric => (6, cloth::fabric),
-        Kind::Bedding => (7, cloth::bedding),
-        Kind::Leather => (6, cloth::leather),
-        Kind::Metal => (6, cloth::metal),
-        Kind::Paper => (5, cloth::paper),
-        Kind::Leaves => (7, cloth::leaves),
-        Kind::Soil => (6, cloth::soil),
-        Kind::Wicker => (6, cloth::wicker),
-        Kind::Cushion => (7, cloth::cushion),
-        Kind::Pillow => (6, cloth::pillow),
-        Kind::Duvet => (7, cloth::duvet),
-        Kind::Rug => (7, cloth::rug),
-        Kind::Panel => (7, fittings::panel),
-        Kind::Drawer => (7, fittings::drawer),
-        Kind::Appliance => (7, fittings::appliance),
-        Kind::OvenDoor => (7, fittings::oven_door),
-        Kind::Hob => (7, fittings::hob),
-        Kind::Painting | Kind::PaintingTop | Kind::PaintingBottom => (7, pictures::painting),
-        Kind::DarkScreen => (6, fittings::dark_screen),
-        Kind::LitScreen => (7, fittings::lit_screen),
-        Kind::Keyboard => (7, fittings::keyboard),
-        Kind::Cover => (6, fittings::cover),
-        Kind::Pages => (6, fittings::pages),
-        Kind::Print => (7, fittings::print),
-        Kind::Outdoors => (7, pictures::outdoors),
-        Kind::ClockFace => (6, fittings::clock_face),
-    };
-    Texture::draw(log2_size, kind.is_picture(), |u, v| pattern(u, v, variant))
+    /// Draws a texture with a size and a pattern.
+    macro_rules! drawn {
+        ($log2_size:literal, $pattern:path) => {{
+            struct Drawn(u32);
+            impl Pattern for Drawn {
+                #[inline(always)]
+                fn at(&self, u: f32, v: f32) -> Texel {
+                    $pattern(u, v, self.0)
+                }
+            }
+            Texture::draw($log2_size, kind.is_picture(), &Drawn(variant))
+        }};
+    }
+    match kind {
+        Kind::Smooth | Kind::Ceramic | Kind::Glass | Kind::Pane => drawn!(0, flat),
+        Kind::Plaster => drawn!(7, building::plaster),
+        Kind::Planks => drawn!(8, building::planks),
+        Kind::Parquet => drawn!(8, building::parquet),
+        Kind::Wood => drawn!(7, building::wood),
+        Kind::Slabs => drawn!(7, building::slabs),
+        Kind::Tiles => drawn!(7, building::tiles),
+        Kind::Mosaic => drawn!(7, building::mosaic),
+        Kind::Subway => drawn!(7, building::subway),
+        Kind::Hexagons => drawn!(7, building::hexagons),
+        Kind::Checkerboard => drawn!(7, building::checkerboard),
+        Kind::Shards => drawn!(7, building::shards),
+        Kind::Brick => drawn!(7, building::brick),
+        Kind::Concrete => drawn!(7, building::concrete),
+        Kind::Marble => drawn!(7, building::marble),
+        Kind::Granite => drawn!(6, building::granite),
+        Kind::Carpet => drawn!(7, cloth::carpet),
+        Kind::Fabric => drawn!(6, cloth::fabric),
+        Kind::Bedding => drawn!(7, cloth::bedding),
+        Kind::Leather => drawn!(6, cloth::leather),
+        Kind::Metal => drawn!(6, cloth::metal),
+        Kind::Paper => drawn!(5, cloth::paper),
+        Kind::Leaves => drawn!(7, cloth::leaves),
+        Kind::Soil => drawn!(6, cloth::soil),
+        Kind::Wicker => drawn!(6, cloth::wicker),
+        Kind::Cushion => drawn!(7, cloth::cushion),
+        Kind::Pillow => drawn!(6, cloth::pillow),
+        Kind::Duvet => drawn!(7, cloth::duvet),
+        Kind::Rug => drawn!(7, cloth::rug),
+        Kind::Panel => drawn!(7, fittings::panel),
+        Kind::Drawer => drawn!(7, fittings::drawer),
+        Kind::Appliance => drawn!(7, fittings::appliance),
+        Kind::OvenDoor => drawn!(7, fittings::oven_door),
+        Kind::Hob => drawn!(7, fittings::hob),
+        Kind::Painting | Kind::PaintingTop | Kind::PaintingBottom => drawn!(7, pictures::painting),
+        Kind::DarkScreen => drawn!(6, fittings::dark_screen),
+        Kind::LitScreen => drawn!(7, fittings::lit_screen),
+        Kind::Keyboard => drawn!(7, fittings::keyboard),
+        Kind::Cover => drawn!(6, fittings::cover),
+        Kind::Pages => drawn!(6, fittings::pages),
+        Kind::Print => drawn!(7, fittings::print),
+        Kind::Outdoors => drawn!(7, pictures::outdoors),
+        Kind::ClockFace => drawn!(6, fittings::clock_face),
+    }
+}
+
+/// Return the texel of surfaces without a texture.
+fn flat(_: f32, _: f32, _: u32) -> Texel {
+    [1.0; 4]
 }

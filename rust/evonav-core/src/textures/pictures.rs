@@ -8,11 +8,13 @@ use crate::textures::{
 type Colour = [f32; 3];
 
 /// Return a colour from 0 to 1.
+#[inline(always)]
 pub fn rgb(red: u8, green: u8, blue: u8) -> Colour {
     [red, green, blue].map(|channel| f32::from(channel) / 255.0)
 }
 
 /// Return a painting or photograph; every third one lies on a pale mount.
+#[inline(always)]
 pub fn painting(u: f32, v: f32, seed: u32) -> Texel {
     let (mut u, mut v) = (u, v);
     if seed % 3 == 2 {
@@ -36,6 +38,7 @@ pub fn painting(u: f32, v: f32, seed: u32) -> Texel {
 }
 
 /// Return the colour of a sky, at a height from 0 (the horizon) to 1.
+#[inline(always)]
 fn sky(u: f32, height: f32, seed: u32) -> Colour {
     let skies = [
         (rgb(228, 224, 205), rgb(120, 165, 210)),
@@ -48,31 +51,40 @@ fn sky(u: f32, height: f32, seed: u32) -> Colour {
     blend(blend(low, high, height), blend(low, [1.0; 3], 0.5), 0.6 * clouds)
 }
 
+#[inline(always)]
 fn landscape(u: f32, v: f32, seed: u32) -> Colour {
     let horizon = 0.4 + 0.15 * random(seed, 1, 1);
-    let mut colour = sky(u, (1.0 - v / horizon).clamp(0.0, 1.0), seed);
-    let sun = [u - 0.2 - 0.6 * random(seed, 2, 1), v - 0.2];
-    let glow = 1.0 - ramp(0.002, 0.006, sun[0] * sun[0] + sun[1] * sun[1]);
-    colour = blend(colour, rgb(255, 240, 190), 0.9 * glow);
+    let trunk = 0.2 + 0.6 * random(seed, 3, 1);
+    let [x, y] = [(u - trunk) / 0.16, (v - 0.5) / 0.2];
+    let has_tree = hash(seed, 4, 8).is_multiple_of(2);
+    if has_tree && x * x + y * y - 0.4 < 0.8 {
+        let crown = x * x + y * y + 0.8 * (fractal(u, v, [9, 9], 3, seed) - 0.5);
+        if crown < 0.8 {
+            return rgb(62, 84, 42).map(|c| c * (1.35 - 0.5 * (x + y)));
+        }
+    }
+    // The nearest layer of hills that is as high hides the others.
     let greens = [rgb(126, 142, 160), rgb(92, 120, 100), rgb(88, 112, 58), rgb(128, 120, 62)];
-    for layer in 0..4_u32 {
-        let rough = fractal(fract(u), 0.1, [3 + layer, 1], 4, seed + 20 + layer) - 0.5;
-        let top = horizon + 0.13 * layer as f32 + 0.22 * rough / (1.0 + 0.6 * layer as f32);
+    for layer in (0..4_u32).rev() {
+        let top_of =
+            |rough: f32| horizon + 0.13 * layer as f32 + 0.22 * rough / (1.0 + 0.6 * layer as f32);
+        if v <= top_of(-0.5) {
+            continue;
+        }
+        let top = top_of(fractal(fract(u), 0.1, [3 + layer, 1], 4, seed + 20 + layer) - 0.5);
         if v > top {
             let shade = mix(1.1, 0.62, ((v - top) * 2.2).min(1.0));
             let tufts = fractal(u, v, [10 + 6 * layer, 12], 3, seed + 30) - 0.5;
-            colour = greens[layer as usize].map(|c| c * (shade + 0.3 * tufts));
+            return greens[layer as usize].map(|c| c * (shade + 0.3 * tufts));
         }
     }
-    let trunk = 0.2 + 0.6 * random(seed, 3, 1);
-    let [x, y] = [(u - trunk) / 0.16, (v - 0.5) / 0.2];
-    let crown = x * x + y * y + 0.8 * (fractal(u, v, [9, 9], 3, seed) - 0.5);
-    if crown < 0.8 && hash(seed, 4, 8).is_multiple_of(2) {
-        return rgb(62, 84, 42).map(|c| c * (1.35 - 0.5 * (x + y)));
-    }
-    colour
+    let colour = sky(u, (1.0 - v / horizon).clamp(0.0, 1.0), seed);
+    let sun = [u - 0.2 - 0.6 * random(seed, 2, 1), v - 0.2];
+    let glow = 1.0 - ramp(0.002, 0.006, sun[0] * sun[0] + sun[1] * sun[1]);
+    blend(colour, rgb(255, 240, 190), 0.9 * glow)
 }
 
+#[inline(always)]
 fn seascape(u: f32, v: f32, seed: u32) -> Colour {
     let horizon = 0.45;
     if v < horizon {
@@ -91,6 +103,7 @@ fn seascape(u: f32, v: f32, seed: u32) -> Colour {
     blend(rgb(120, 160, 180), rgb(38, 84, 112), depth).map(|c| c * (1.0 + 0.3 * waves))
 }
 
+#[inline(always)]
 fn portrait(u: f32, v: f32, seed: u32) -> Colour {
     let pick = |k: u32| random(seed, k, 7);
     let ground = blend(rgb(70, 82, 72), rgb(160, 138, 110), pick(1));
@@ -124,6 +137,7 @@ fn portrait(u: f32, v: f32, seed: u32) -> Colour {
     }
 }
 
+#[inline(always)]
 fn flowers(u: f32, v: f32, seed: u32) -> Colour {
     let ground = if v > 0.78 { rgb(128, 92, 62) } else { rgb(205, 196, 172) };
     let light = 1.1 - 0.35 * v;
@@ -138,6 +152,9 @@ fn flowers(u: f32, v: f32, seed: u32) -> Colour {
         let [x, y] = [u - cx, v - cy];
         let radius = 0.05 + 0.045 * at(3);
         let distance = (x * x + y * y).sqrt() / radius;
+        if distance >= 1.0 {
+            continue; // beyond the longest petals
+        }
         let petals = 1.0 - 0.3 * noise(fract(0.5 + x / radius), fract(0.5 + y / radius), [4, 4], k);
         if distance < petals {
             let hues = [rgb(214, 90, 96), rgb(238, 196, 92), rgb(236, 226, 220), rgb(76, 110, 62)];
@@ -148,6 +165,7 @@ fn flowers(u: f32, v: f32, seed: u32) -> Colour {
     colour
 }
 
+#[inline(always)]
 fn abstraction(u: f32, v: f32, seed: u32) -> Colour {
     let palettes = [
         [rgb(232, 222, 200), rgb(196, 74, 52), rgb(40, 66, 92), rgb(226, 174, 74)],
@@ -168,7 +186,12 @@ fn abstraction(u: f32, v: f32, seed: u32) -> Colour {
 }
 
 /// Return the world outside a window: sky, hills or houses far away, trees and a lawn.
+#[inline(always)]
 pub fn outdoors(u: f32, v: f32, seed: u32) -> Texel {
+    if v > 0.84 {
+        let lawn = blend(rgb(142, 172, 98), rgb(116, 150, 84), (v - 0.84) * 6.0);
+        return [lawn[0], lawn[1], lawn[2], 1.0];
+    }
     let clouds = ramp(0.5, 0.75, fractal(u, v, [2, 5], 4, seed));
     let mut colour = blend(rgb(150, 192, 228), rgb(222, 232, 238), (1.2 * v).min(1.0));
     colour = blend(colour, rgb(244, 246, 248), 0.75 * clouds);
@@ -187,9 +210,6 @@ pub fn outdoors(u: f32, v: f32, seed: u32) -> Texel {
     if v > tree {
         let leafy = fractal(u, v, [14, 14], 3, seed + 3);
         colour = blend(rgb(74, 104, 62), rgb(150, 176, 110), leafy);
-    }
-    if v > 0.84 {
-        colour = blend(rgb(142, 172, 98), rgb(116, 150, 84), (v - 0.84) * 6.0);
     }
     [colour[0], colour[1], colour[2], 1.0]
 }

@@ -1,5 +1,7 @@
 //! A texture, with smaller and smaller copies of itself, and how it is looked up.
 
+use evonav_simd::Kernel;
+
 /// Value of a channel that leaves a surface's colour as it is.
 pub const NEUTRAL: f32 = 128.0;
 
@@ -43,6 +45,33 @@ const BLUR: [f32; 5] = [1.0, 4.0, 6.0, 4.0, 1.0];
 /// A texel's channels apart, as factors times [`NEUTRAL`].
 pub type Texel = [f32; 4];
 
+/// The colours of a texture.
+pub trait Pattern {
+    /// Return the factors (or colours from 0 to 1) at `[u, v]`, from 0 to 1.
+    fn at(&self, u: f32, v: f32) -> Texel;
+}
+
+/// The samples of a row, by channel.
+struct Samples<'a, P> {
+    pattern: &'a P,
+    u: &'a [f32],
+    v: f32,
+    out: &'a mut [Vec<f32>; 4],
+}
+
+impl<P: Pattern> Kernel for Samples<'_, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let [red, green, blue, gloss] = self.out;
+        let rgb = red.iter_mut().zip(green).zip(blue);
+        for ((&u, ((red, green), blue)), gloss) in self.u.iter().zip(rgb).zip(gloss) {
+            [*red, *green, *blue, *gloss] = self.pattern.at(u, self.v);
+        }
+    }
+}
+
 impl Texture {
     /// Make a texture from its colours.
     ///
@@ -50,21 +79,27 @@ impl Texture {
     /// * `log2_size` - the logarithm of the number of texels a side.
     /// * `is_picture` - whether the colours are those of a picture; otherwise they are scaled so
     ///   that their mean is [`NEUTRAL`].
-    /// * `at` - the factors (or colours from 0 to 1) at `[u, v]`, from 0 to 1.
-    pub fn draw(log2_size: u32, is_picture: bool, at: impl Fn(f32, f32) -> Texel) -> Self {
+    /// * `pattern` - the factors (or colours from 0 to 1).
+    pub fn draw(log2_size: u32, is_picture: bool, pattern: &impl Pattern) -> Self {
         let size = 1_usize << log2_size;
         let step = 1.0 / size as f32;
         // Four samples a texel soften edges.
-        let texel = |index: usize| {
-            let (x, y) = (index % size, index / size);
-            let mut sum = [0.0; 4];
-            for [du, dv] in [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]] {
-                let sample = at((x as f32 + du) * step, (y as f32 + dv) * step);
-                sum = std::array::from_fn(|i| sum[i] + 0.25 * sample[i]);
+        let places = (0..size).flat_map(|x| [0.25, 0.75].map(|du| (x as f32 + du) * step));
+        let u: Vec<f32> = places.collect();
+        let mut samples = [const { Vec::new() }; 4].map(|_: Vec<f32>| vec![0.0; u.len()]);
+        let mut texels = vec![[0.0; 4]; size * size];
+        for (y, texels) in texels.chunks_exact_mut(size).enumerate() {
+            for dv in [0.25, 0.75] {
+                let v = (y as f32 + dv) * step;
+                evonav_simd::compute(Samples { pattern, u: &u, v, out: &mut samples });
+                for (channel, samples) in samples.iter().enumerate() {
+                    for (texel, pair) in texels.iter_mut().zip(samples.chunks_exact(2)) {
+                        let sum: f32 = texel[channel];
+                        texel[channel] = sum + 0.25 * pair[0] + 0.25 * pair[1];
+                    }
+                }
             }
-            sum
-        };
-        let mut texels: Vec<Texel> = (0..size * size).map(texel).collect();
+        }
         let mean = mean_of(&texels);
         for texel in &mut texels {
             *texel = std::array::from_fn(|i| match (is_picture, i) {
@@ -136,19 +171,25 @@ impl Texture {
 
 /// Blur a square of texels that repeats in both directions.
 fn blurred(texels: &[Texel], size: usize) -> Vec<Texel> {
-    let along = |texels: &[Texel], step: usize| -> Vec<Texel> {
-        let place = |index: usize, shift: usize| {
-            let at = index / step % size;
-            index - at * step + (at + size * 2 + shift - 2) % size * step
-        };
-        let mean = |index: usize| {
-            let sum =
-                |i: usize| (0..5).map(|k| BLUR[k] * texels[place(index, k)][i]).sum::<f32>() / 16.0;
-            std::array::from_fn(sum)
-        };
-        (0..texels.len()).map(mean).collect()
-    };
-    along(&along(texels, 1), size)
+    let at = |i: usize| (i + 2 * size - 2) % size;
+    let mut across = Vec::with_capacity(texels.len());
+    for row in texels.chunks_exact(size) {
+        let wide: Vec<Texel> = (0..size + 4).map(|x| row[at(x)]).collect();
+        across.extend(wide.windows(5).map(|near| weighted(std::array::from_fn(|k| &near[k]))));
+    }
+    let mut blurred = Vec::with_capacity(texels.len());
+    for y in 0..size {
+        let [a, b, c, d, e] = std::array::from_fn(|k| &across[at(y + k) * size..][..size]);
+        let columns = a.iter().zip(b).zip(c).zip(d).zip(e);
+        blurred.extend(columns.map(|((((a, b), c), d), e)| weighted([a, b, c, d, e])));
+    }
+    blurred
+}
+
+fn weighted(near: [&Texel; 5]) -> Texel {
+    let [a, b, c, d, e] = near;
+    let [wa, wb, wc, wd, we] = BLUR;
+    std::array::from_fn(|i| (wa * a[i] + wb * b[i] + wc * c[i] + wd * d[i] + we * e[i]) / 16.0)
 }
 
 impl Level {

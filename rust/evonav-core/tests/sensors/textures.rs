@@ -33,6 +33,20 @@ fn texels(level: &Level) -> impl Iterator<Item = Texel> + '_ {
     (0..size * size).map(move |i| level.texel(i % size, i / size))
 }
 
+/// Patterns are drawn in rows, which compilers turn into SIMD; images depend on every byte.
+#[test]
+fn textures_are_the_same_on_every_processor() {
+    let variants = |&kind: &MaterialKind| {
+        (0..kind.num_variants().min(2)).map(move |v| Material { kind, variant: v as u8 })
+    };
+    let drawn = MaterialKind::ALL.iter().flat_map(variants).filter_map(texture_of);
+    let digest = drawn.fold(0x811c_9dc5, |digest, texture| {
+        let hash = |h: u32, byte: u8| (h ^ u32::from(byte)).wrapping_mul(0x0100_0193);
+        format!("{texture:?}").bytes().fold(digest, hash)
+    });
+    assert_eq!(digest, 0x62b9_55c3);
+}
+
 #[test]
 fn textures_keep_the_colour_of_their_surface_on_average() {
     for (kind, texture) in textures().filter(|(kind, _)| !kind.is_picture()) {
