@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::{
     Error,
@@ -24,6 +24,9 @@ use crate::{
 /// Largest number of agents of a batch, and of threads.
 const MAX_SLOTS: usize = 1 << 16;
 
+/// Number of agents from which on their steps are shared between threads.
+const MIN_SHARED_STEPS: usize = 32;
+
 /// The settings of all agents of a batch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchConfig {
@@ -38,7 +41,7 @@ pub struct BatchConfig {
     pub grid_m: f64,
     /// Masks that count in images of labels.
     pub mask_filter: MaskFilter,
-    /// Number of threads that step and render; 1 for the caller's own.
+    /// Number of threads that step and render, the caller's among them.
     pub num_threads: usize,
 }
 
@@ -67,9 +70,9 @@ pub struct Images<'a> {
 pub struct Batch {
     config: BatchConfig,
     slots: Vec<Option<Slot>>,
-    /// Threads; `None` for the caller's thread alone.
+    /// Threads beside the caller's; `None` if there are none.
     pool: Option<ThreadPool>,
-    /// Working memory, one per thread.
+    /// Working memory, one per thread; the caller's is the first.
     frames: Vec<Mutex<FrameBuffer>>,
 }
 
@@ -91,7 +94,7 @@ impl Batch {
             message: format!("cannot start {} threads", config.num_threads),
         };
         let pool = (config.num_threads > 1)
-            .then(|| ThreadPoolBuilder::new().num_threads(config.num_threads).build())
+            .then(|| ThreadPoolBuilder::new().num_threads(config.num_threads - 1).build())
             .transpose()
             .map_err(started)?;
         let frames = (0..config.num_threads).map(|_| Mutex::default()).collect();
@@ -170,7 +173,8 @@ impl Batch {
             slot.known_m = Some(distance_m);
             Stepped { is_success: moved.is_some(), distance_m }
         };
-        let pool = self.pool.as_ref();
+        // Waking a thread takes as long as some steps.
+        let pool = self.pool.as_ref().filter(|_| self.slots.len() >= MIN_SHARED_STEPS);
         let slots = placed(&mut self.slots)?;
         Ok(each(pool, slots.into_iter().zip(actions).collect(), one))
     }
@@ -253,8 +257,9 @@ impl Batch {
     }
 
     fn draw(&self, slot: &Slot, images: Images<'_>) -> Result<(), Error> {
-        // The index may be that of another pool's thread, if a single agent is rendered in one.
-        let thread = rayon::current_thread_index().unwrap_or(0) % self.frames.len();
+        // The index may be that of another pool's thread, if the caller is in one.
+        let thread = rayon::current_thread_index().map_or(0, |index| index + 1);
+        let thread = thread % self.frames.len();
         // The content is overwritten, so a thread that panicked has left nothing that matters.
         let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
         let want = slot.world.want(images.rgb.is_some(), images.labels.is_some());
@@ -318,18 +323,34 @@ fn parts<'a, T>(
     Ok(array.chunks_exact_mut(num_elements).map(Some).collect())
 }
 
-/// Run every job, in the pool's threads if there is a pool; results are in the jobs' order.
+/// Run every job, in this thread and the pool's if there is a pool; results are in the jobs' order.
+///
+/// This thread begins at once, so that the others may take their time to wake up.
 fn each<T: Send, U: Send>(
     pool: Option<&ThreadPool>,
     jobs: Vec<T>,
-    one: impl Fn(T) -> U + Sync + Send,
+    one: impl Fn(T) -> U + Sync,
 ) -> Vec<U> {
-    match pool {
-        Some(pool) if jobs.len() > 1 => {
-            pool.install(|| jobs.into_par_iter().with_max_len(1).map(one).collect())
+    let num_helpers = pool.map_or(0, ThreadPool::current_num_threads).min(jobs.len() / 2);
+    let Some(pool) = pool.filter(|_| num_helpers > 0) else {
+        return jobs.into_iter().map(one).collect();
+    };
+    let (jobs, done) = (Mutex::new(jobs.into_iter().enumerate()), Mutex::new(Vec::new()));
+    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        let mut mine = Vec::new();
+        while let Some((index, job)) = next() {
+            mine.push((index, one(job)));
         }
-        _ => jobs.into_iter().map(one).collect(),
-    }
+        done.lock().unwrap_or_else(PoisonError::into_inner).append(&mut mine);
+    };
+    pool.in_place_scope(|scope| {
+        (0..num_helpers).for_each(|_| scope.spawn(|_| work()));
+        work();
+    });
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_unstable_by_key(|&(index, _)| index);
+    done.into_iter().map(|(_, result)| result).collect()
 }
 
 fn no_slot(index: usize, num_slots: usize) -> Error {
