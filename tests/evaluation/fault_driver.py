@@ -20,6 +20,7 @@ from evonav.evaluation.run import run as engine
 from evonav.evaluation.run.run import evaluate
 from evonav.evaluation.run.worker import EpisodeWork
 from evonav.parallel import folders
+from evonav.parallel.local import Program
 from evonav.tasks.listing import task_files
 
 AGENT = "random-walk"
@@ -46,7 +47,7 @@ class Canned(EpisodeWork):
         return "null"
 
 
-engine.WORK = "fault_driver:Canned"
+engine.PROGRAM = Program("fault_driver:Canned")
 
 
 def arm(folder, mode=0, number=0, error=0):

@@ -1,6 +1,7 @@
 """Parse and show commands as evonav does: `-h`, plain flags, panels in order, and old names that still work."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import typer
@@ -75,7 +76,10 @@ class Command(_Shown, TyperCommand):
 
 
 class Group(_Shown, TyperGroup):
-    """A group of commands in which the called one gets the options of its settings (`evonav.cli.options.settings`)."""
+    """A group of commands in which the called one gets the options of its settings (`evonav.cli.options.settings`).
+
+    A command's `beginning` is a context in which it runs, and which is entered before those options are made.
+    """
 
     order: tuple[str, ...] = ()
     """Names of commands in the order of the help; default: as they were added."""
@@ -85,6 +89,14 @@ class Group(_Shown, TyperGroup):
         places = {name: place for place, name in enumerate(self.order)}
         return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(places)))
 
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's
+        """Run the called command, in its `beginning` if it has one."""
+        args: list[str] = [*ctx._protected_args, *ctx.args]
+        command = self.commands.get(args[0]) if args else None
+        beginning = getattr(getattr(command, "callback", None), "beginning", None)
+        with nullcontext() if beginning is None or _asks_for_help(args) else beginning():
+            return super().invoke(ctx)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - click's
         """Return the called command's name, the command with all its options, and its arguments."""
         args = in_new_names(str(self.name), args, is_quiet=ctx.resilient_parsing)
@@ -92,9 +104,15 @@ class Group(_Shown, TyperGroup):
         expand = getattr(getattr(command, "callback", None), "expand", None)
         if command is not None and expand is not None:
             app = new_app()
-            app.command(name, help=command.help, epilog=command.epilog, cls=Command)(expand())
+            app.command(name, help=command.help, epilog=command.epilog, cls=Command)(
+                expand(has_help=ctx.resilient_parsing or _asks_for_help(rest))
+            )
             command = typer.main.get_command(app)
         return name, command, rest
+
+
+def _asks_for_help(args: list[str]) -> bool:
+    return any(name in args for name in HELP_NAMES["help_option_names"])
 
 
 def new_app(name: str | None = None, *, help: str | None = None, cls: type[Group] = Group) -> typer.Typer:

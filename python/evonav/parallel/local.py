@@ -1,8 +1,11 @@
 """Run workers of `evonav.parallel.pool` as processes of this machine."""
 
+import gc
+import json
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +13,9 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
+from evonav.component import import_callable
 from evonav.parallel.work import serve
 from evonav.parallel.worker import Message, Worker, WorkerLostError
 
@@ -20,8 +25,15 @@ THREAD_VARIABLES = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREAD
 """Environment variables that limit the threads of a process."""
 SPARING = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "262144", "MALLOC_TRIM_THRESHOLD_": "1048576"}
 """Environment variables by which glibc gives memory back at once, where many jobs share the machine's memory."""
+_HARMLESS = ("GLIBC_", "LANG", "LC_", "LD_", "MALLOC_", "NPY_", "OMP_", "OPENBLAS_", "PATH", "PYTHON", "RAYON_", "TZ")
+"""Beginnings of the names of variables that tell libraries how to start, and hold no secrets."""
 PROCESS_NAME = "evonav-worker"
 """Name of a worker's process in `ps` and `top`, on Linux."""
+
+
+def search_path() -> list[str]:
+    """Return this process's `sys.path` in absolute paths."""
+    return [str(Path(entry).absolute()) for entry in sys.path]
 
 
 def num_cores() -> int:
@@ -29,22 +41,37 @@ def num_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+class Program(NamedTuple):
+    """The code that a worker runs."""
+
+    work: str
+    """`module:factory`."""
+    prelude: str = ""
+    """`module:function` that a process on Linux calls before it imports the work, or nothing.
+
+    The process has no threads yet, and nothing of its parent but `sys.path` and harmless variables of the environment.
+    If the function returns true, the process ends: it is a fork that has done its part.
+    """
+
+
 class ProcessHost:
     """Starts processes on this machine."""
 
-    def __init__(self, work: str, settings: str, *, has_threads: bool = False) -> None:
-        """Remember the work and its settings; no process is started.
+    def __init__(self, program: Program, settings: str, *, has_threads: bool = False) -> None:
+        """Remember the program and its settings; no process is started.
 
         Args:
-            work: `module:factory`.
+            program: The code of a worker.
             settings: Text with which the factory is called.
             has_threads: Run each job on a thread of its own.
         """
-        self._arguments = (work, settings, has_threads)
+        self._program, self._settings, self._has_threads = program, settings, has_threads
 
     def start(self) -> "WorkerProcess":
-        """Start another process."""
-        return WorkerProcess(*self._arguments)
+        """Start another process, or take the one that was started early."""
+        worker = _taken_early(self._program, self._has_threads) or WorkerProcess(self._program, self._has_threads)
+        worker.begin(self._settings, self._has_threads)
+        return worker
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
         """Wait until a worker has a message, and return all that have one."""
@@ -56,21 +83,55 @@ class ProcessHost:
         """Do nothing: all processes have ended."""
 
 
+_START = "import sys; sys.path[:] = sys.argv[5:]; from evonav.parallel.local import main; main(*sys.argv[1:5])"
+
+
 class WorkerProcess:
     """A process that runs jobs until its parent closes the connection or dies."""
 
-    def __init__(self, work: str, settings: str, has_threads: bool) -> None:
-        """Start the process with the arguments of `ProcessHost`."""
-        context = multiprocessing.get_context("spawn")
-        self.connection, far_end = context.Pipe()
-        with one_thread_each(), _variables(SPARING if has_threads else {}), _without_main():
-            self._process = context.Process(target=_serve, args=(far_end, work, settings, has_threads), daemon=True)
-            self._process.start()
-        far_end.close()
+    def __init__(self, program: Program, has_threads: bool = False) -> None:
+        """Start the process, which imports its work and waits for `begin`.
+
+        Args:
+            program: The code that it runs.
+            has_threads: It will run many jobs at once, and must spare memory.
+        """
+        self.connection, far_end = multiprocessing.Pipe()
+        self._life: int | None = None
+        self._process: subprocess.Popen[bytes] | multiprocessing.process.BaseProcess
+        with one_thread_each(), _variables(SPARING if has_threads else {}), far_end:
+            if sys.platform == "linux":
+                self._process = self._started(program, far_end.fileno())
+            else:
+                with _without_main():
+                    context = multiprocessing.get_context("spawn")
+                    self._process = context.Process(target=_spawned, args=(far_end, program.work), daemon=True)
+                    self._process.start()
+
+    def _started(self, program: Program, connection: int) -> "subprocess.Popen[bytes]":
+        life, self._life = os.pipe()
+        try:
+            return subprocess.Popen(  # noqa: S603 - ourselves
+                [sys.executable, "-c", _START, str(connection), str(life), *program, *search_path()],
+                pass_fds=(connection, life),
+                env={name: value for name, value in os.environ.items() if name.startswith(_HARMLESS)},
+                stdin=subprocess.DEVNULL,
+            )
+        finally:
+            os.close(life)
+            self._tell(dict(os.environ))
+
+    def begin(self, settings: str, has_threads: bool) -> None:
+        """Let it make its work; then it is ready for jobs."""
+        self._tell([settings, has_threads])
+
+    def _tell(self, content: object) -> None:
+        with suppress(ConnectionError):  # `receive` will raise
+            self.connection.send_bytes(json.dumps(content).encode())
 
     def send(self, key: int, text: str) -> None:
         """Send a job."""
-        with suppress(BrokenPipeError):
+        with suppress(ConnectionError):
             self.connection.send_bytes(f"{key} {text}".encode())
 
     def receive(self) -> Message:
@@ -78,15 +139,105 @@ class WorkerProcess:
         try:
             kind, key, text = self.connection.recv_bytes().decode().split(" ", 2)
         except (EOFError, OSError):
-            raise WorkerLostError(f"the worker process died ({cause_of_death(self._process)})") from None
+            code = _exit_code(self._process, END_TIMEOUT_S)
+            how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+            raise WorkerLostError(f"the worker process died ({how})") from None
         return Message(kind, int(key), text)
 
     def close(self) -> None:
-        """End the process at once."""
-        end_process(self._process, self.connection)
+        """End the process at once; safe to call twice."""
+        self.connection.close()
+        if _exit_code(self._process, 0.0) is None:
+            self._process.terminate()
+            if _exit_code(self._process, END_TIMEOUT_S) is None:
+                self._process.kill()
+        _exit_code(self._process, END_TIMEOUT_S)
+        if self._life is not None:
+            os.close(self._life)
+            self._life = None
 
 
-def _serve(connection: Connection, name: str, settings: str, has_threads: bool) -> None:
+def _exit_code(
+    process: "subprocess.Popen[bytes] | multiprocessing.process.BaseProcess", timeout_s: float
+) -> int | None:
+    """Return the exit code of a process, negative for a signal; `None` if it has not ended in time."""
+    if isinstance(process, subprocess.Popen):
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout_s)
+        return process.returncode
+    process.join(timeout_s)
+    return process.exitcode
+
+
+class _Early(NamedTuple):
+    worker: WorkerProcess
+    program: Program
+    surroundings: tuple[Mapping[str, str], Sequence[str]]
+
+
+_early: _Early | None = None
+
+
+@contextmanager
+def started_early(program: Program) -> Iterator[None]:
+    """Start a process now, for the first `ProcessHost` that needs one while the block runs.
+
+    The process imports its work while this one still imports what decides the settings.
+    """
+    global _early
+    if sys.platform == "linux" and _early is None:
+        _early = _Early(WorkerProcess(program), program, _surroundings())
+    try:
+        yield
+    finally:
+        if _early is not None:
+            _early.worker.close()
+        _early = None
+
+
+def _taken_early(program: Program, has_threads: bool) -> WorkerProcess | None:
+    """Return the process that was started early, unless a process that starts now would be another one."""
+    global _early
+    if _early is None or has_threads or (_early.program, _early.surroundings) != (program, _surroundings()):
+        return None
+    worker, _early = _early.worker, None
+    return worker
+
+
+def _surroundings() -> tuple[Mapping[str, str], Sequence[str]]:
+    return dict(os.environ), list(sys.path)
+
+
+def main(connection: str, life: str, work: str, prelude: str) -> None:
+    """Be a worker.
+
+    Args:
+        connection: Descriptor of the connection to the parent.
+        life: Descriptor of a pipe that is closed when the parent ends, however it ends.
+        work: See `Program`.
+        prelude: See `Program`.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.disable()  # imports leave hardly any garbage, and looking for it takes a tenth of their time
+    if prelude and import_callable(prelude)():
+        return
+    for descriptor in (connection, life):
+        os.set_inheritable(int(descriptor), False)
+    with suppress(OSError):
+        Path("/proc/self/comm").write_text(PROCESS_NAME)
+    parent = Connection(int(connection))
+    with suppress(EOFError, OSError):  # the parent has ended
+        environment = json.loads(parent.recv_bytes())
+        os.environ.clear()
+        os.environ.update(environment)
+        _serve(parent, work, int(life))
+
+
+def _spawned(connection: Connection, work: str) -> None:
+    _serve(connection, work)
+
+
+def _serve(connection: Connection, work: str, life: int | None = None) -> None:
     """Run the jobs that arrive, until the parent closes the connection."""
 
     def job() -> tuple[int, str]:
@@ -96,13 +247,14 @@ def _serve(connection: Connection, name: str, settings: str, has_threads: bool) 
     def send(message: Message) -> None:
         connection.send_bytes(f"{message.kind} {message.key} {message.text}".encode())
 
-    with suppress(OSError):
-        Path("/proc/self/comm").write_text(PROCESS_NAME)
-    end_with_parent()
-    if has_threads:
-        _raise_open_files()
-    with suppress(EOFError, OSError):  # the parent closed the connection
-        serve(name, settings, iter(job, None), send, has_threads=has_threads)
+    end_with_parent(life)
+    with suppress(Exception):  # which making the work will raise again
+        import_callable(work)
+    with suppress(EOFError, OSError):  # the parent has closed the connection
+        settings, has_threads = json.loads(connection.recv_bytes())
+        if has_threads:
+            _raise_open_files()
+        serve(work, settings, iter(job, None), send, has_threads=has_threads)
 
 
 def _raise_open_files() -> None:
@@ -132,39 +284,26 @@ class EndedError(SystemExit):
     """The end of this process, which was asked for by its parent: nothing may take it for an error of an agent."""
 
 
-def end_with_parent() -> None:
-    """Make a child ignore interrupts and end with its parent, running every `finally`."""
+def end_with_parent(life: int | None) -> None:
+    """Make a child ignore interrupts and end with its parent, running every `finally`.
+
+    Args:
+        life: A pipe that is closed when the parent ends; default: the parent is that of `multiprocessing`.
+    """
 
     def end(number: int, _: object) -> None:
         raise EndedError(128 + number)
 
     def watch() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
+        if life is not None:
+            os.read(life, 1)
+        elif (parent := multiprocessing.parent_process()) is not None:
             parent.join()
-            os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGTERM)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, end)
     threading.Thread(target=watch, daemon=True).start()
-
-
-def cause_of_death(process: multiprocessing.process.BaseProcess) -> str:
-    """Return how a process ended: its signal or its exit code."""
-    process.join(timeout=5.0)
-    code = process.exitcode
-    return f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-
-
-def end_process(process: multiprocessing.process.BaseProcess, connection: Connection) -> None:
-    """Close the connection to a child and end it; safe to call twice."""
-    connection.close()
-    if process.is_alive():
-        process.terminate()
-        process.join(timeout=END_TIMEOUT_S)
-        if process.is_alive():
-            process.kill()
-    process.join(timeout=5.0)
 
 
 @contextmanager

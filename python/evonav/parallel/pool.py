@@ -92,6 +92,7 @@ def open_pool(
     *,
     timeout_s: float,
     max_losses: int = MAX_LOSSES,
+    prelude: str = "",
 ) -> Pool:
     """Open a pool of workers, to be used in a `with` statement.
 
@@ -101,6 +102,7 @@ def open_pool(
         workforce: The workers.
         timeout_s: Longest silence of a job before it is abandoned.
         max_losses: Number of workers that a job may lose before it fails.
+        prelude: See `evonav.parallel.local.Program`.
 
     Raises:
         EngineError: Ray is not installed or cannot be reached.
@@ -113,9 +115,9 @@ def open_pool(
         return WorkerPool(host, num_workers, timeout_s, max_losses, workforce.jobs_at_once)
     if workforce.num_workers == 0:
         return InlinePool(work, settings)
-    from evonav.parallel.local import ProcessHost
+    from evonav.parallel.local import ProcessHost, Program
 
-    local_host = ProcessHost(work, settings, has_threads=workforce.jobs_at_once > 1)
+    local_host = ProcessHost(Program(work, prelude), settings, has_threads=workforce.jobs_at_once > 1)
     return WorkerPool(local_host, workforce.num_workers, timeout_s, max_losses, workforce.jobs_at_once)
 
 

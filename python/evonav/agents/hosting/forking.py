@@ -34,9 +34,49 @@ class Child(NamedTuple):
     """A child that is to be started."""
 
     request: Mapping[str, Any]
-    """`folder` and `environment` in which it runs, its import `path`, and whether it `is_sandboxed`."""
+    """Its `agent`, `folder` and `environment`, its import `path`, and whether it `is_sandboxed`."""
     descriptors: Sequence[int]
     """The socket for its state, standard output and error, then those from `SOCKET` on."""
+
+
+class Beside(NamedTuple):
+    """The server that is a fork of this process."""
+
+    pid: int
+    control: socket.socket
+
+
+_beside: Beside | None = None
+
+
+def fork_beside() -> bool:
+    """Fork the server from this process, which has no threads yet and has run nobody's code but evonav's.
+
+    Returns:
+        True in the server and in its children, at their ends; false in this process, which goes on.
+    """
+    global _beside
+    _import()
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    pid = os.fork()
+    if pid == 0:
+        os.setsid()
+        os.dup2(2, 1)
+        control = os.dup2(far.detach(), SOCKET, inheritable=False)
+        near.detach()
+        os.closerange(control + 1, os.sysconf("SC_OPEN_MAX"))
+        main(control)
+        return True
+    far.close()
+    _beside = Beside(pid, near)
+    return False
+
+
+def take_beside() -> Beside | None:
+    """Return the server that is a fork of this process, once."""
+    global _beside
+    found, _beside = _beside, None
+    return found
 
 
 def main(control: int) -> None:
@@ -45,13 +85,10 @@ def main(control: int) -> None:
     Args:
         control: Socket that brings requests and ends with the evaluator.
     """
-    from evonav.agents.hosting import serving
-
+    gc.disable()  # imports leave hardly any garbage, and looking for it takes a tenth of their time
+    _import()
     _call_oneself(SERVER_NAME)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    serving.preload()
-    gc.collect()
-    gc.freeze()  # a collection would write to all objects, and so copy the memory that is shared
     child = _requested(control)
     if child is None:
         return
@@ -60,6 +97,8 @@ def main(control: int) -> None:
         from evonav.agents.hosting.sandbox import begin
 
         begin(SOCKET)
+    from evonav.agents.hosting import serving
+
     serving.main(SOCKET, LIFE, BLOCK)
 
 
@@ -82,9 +121,11 @@ def _serve(requests: socket.socket) -> Child | None:
                     for pid in set(pids.values()):
                         _end(pid)
                     return None
+                request = json.loads(data)
+                _preload(request["agent"])
                 pid = os.fork()
                 if pid == 0:
-                    return Child(json.loads(data), descriptors)
+                    return Child(request, descriptors)
                 for inherited in descriptors[1:]:
                     os.close(inherited)
                 for watched in (descriptors[0], os.pidfd_open(pid)):
@@ -105,6 +146,22 @@ def _serve(requests: socket.socket) -> Child | None:
                 for watched in (state, end):
                     os.close(watched)
                     del pids[watched]
+
+
+def _import() -> None:
+    """Import what all agents' processes need."""
+    from evonav.agents.hosting import serving  # noqa: F401
+    from evonav.decision import backends  # noqa: F401
+
+
+def _preload(agent: str) -> None:
+    """Import a built-in agent, so that children share its memory."""
+    from evonav.agents.registry import BUILT_IN, RULE_MARK, agent_factory
+
+    if (name := agent.partition(RULE_MARK)[0]) in BUILT_IN:
+        with suppress(Exception):  # which the child will say
+            agent_factory(name)
+    gc.freeze()  # a collection would write to all objects, and so copy the memory that is shared
 
 
 def _call_oneself(name: str) -> None:
@@ -147,5 +204,5 @@ def _become(child: Child) -> None:
     if child.request["folder"] is not None:
         os.chdir(child.request["folder"])
     sys.path[:] = child.request["path"]
-    if (numpy := sys.modules.get("numpy")) is not None:
-        numpy.random.seed()  # or all children would draw the same numbers
+    if (random := sys.modules.get("numpy.random")) is not None:
+        random.seed()  # or all children would draw the same numbers

@@ -25,9 +25,8 @@ from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import sandbox, wire
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
-from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
+from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
-from evonav.decision.backends import VLM
 from evonav.decision.metered import Metered
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.parallel import profiling
@@ -75,13 +74,6 @@ def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], S
     closed = suppress(BrokenPipeError, ConnectionResetError)
     with socket.socket(fileno=socket_fd) as connection, closed, profiling.sampled("agents"):
         _serve(connection, _Block(block_fd), (new_server or _Server)())
-
-
-def preload() -> None:
-    """Import what agents' processes need, for a process that is forked for them."""
-    for name in BUILT_IN:
-        agent_factory(name)
-    import_callable(VLM, "decision model")
 
 
 def _end_with_parent(life_fd: int) -> None:

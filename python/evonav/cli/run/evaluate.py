@@ -142,6 +142,17 @@ def evaluate(
     exit_if_incomplete(summaries)
 
 
+def early_worker() -> "AbstractContextManager[None]":
+    """Start a worker while the command still imports what decides its settings."""
+    from evonav.evaluation.run.program import PROGRAM
+    from evonav.parallel.local import started_early
+
+    return started_early(PROGRAM)
+
+
+evaluate.beginning = early_worker  # type: ignore[attr-defined]
+
+
 @contextmanager
 def run_tasks(
     out: Path,
@@ -154,15 +165,15 @@ def run_tasks(
     num_workers: int = 0,
 ) -> "Iterator[list[TaskFile]]":
     """Yield the tasks of a run: of a folder, generated from houses into the run's folder, or bundled."""
+    if houses is None:
+        with chosen_tasks(tasks, limit, subset) as found:
+            yield found
+        return
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.parallel.worker import Workforce
     from evonav.tasks.listing import task_file
 
-    if houses is None:
-        with chosen_tasks(tasks, limit, subset) as found:
-            yield found
-        return
     dataset, split = inherited_names(houses)
     options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
     with interruptible(out / "tasks"), generation_progress() as show:

@@ -3,6 +3,7 @@
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
+from evonav.agents.hosting import forking
 from evonav.agents.hosting.forking import STATE
 from evonav.parallel.local import one_thread_each
 
@@ -89,6 +91,37 @@ class ForkedProcess:
         self._state.close()
 
 
+class _OwnFork:
+    """A fork of this process, which has the methods of `subprocess.Popen` that are needed."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        self._code: int | None = None
+
+    def poll(self) -> int | None:
+        if self._code is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self._code = os.waitstatus_to_exitcode(status) if pid else None
+        return self._code
+
+    def wait(self, timeout: float | None = None) -> int:
+        if self._code is None:
+            end = os.pidfd_open(self.pid)
+            try:
+                has_ended = select.select([end], [], [], timeout)[0]
+            finally:
+                os.close(end)
+            if not has_ended:
+                raise subprocess.TimeoutExpired("fork server", timeout or 0.0)
+        code = self.poll()
+        assert code is not None  # it has ended
+        return code
+
+    def kill(self) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, signal.SIGKILL)
+
+
 class ForkServer:
     """Forks processes for the agents of a worker. Any number of threads may use it."""
 
@@ -102,13 +135,14 @@ class ForkServer:
         self._environment = environment
         self._path = path
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | _OwnFork | None = None
         self._control: socket.socket | None = None
 
     def fork(
         self,
         descriptors: Sequence[int],
         *,
+        agent: str,
         folder: Path | None,
         environment: Mapping[str, str],
         path: Sequence[str],
@@ -118,6 +152,7 @@ class ForkServer:
 
         Args:
             descriptors: Its standard output and error, then those that `forking` numbers.
+            agent: Name of its agent: the server imports built-in ones.
             folder: Its working folder; default: this process's.
             environment: Its environment.
             path: Its import path.
@@ -127,6 +162,7 @@ class ForkServer:
             OSError: It does not start.
         """
         request = {
+            "agent": agent,
             "folder": None if folder is None else str(folder),
             "environment": dict(environment),
             "path": list(path),
@@ -151,6 +187,9 @@ class ForkServer:
             socket.send_fds(self._control, [request], descriptors)
 
     def _start(self) -> None:
+        if (beside := forking.take_beside()) is not None:
+            self._process, self._control = _OwnFork(beside.pid), beside.control
+            return
         near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with far, one_thread_each():
             self._process = subprocess.Popen(  # noqa: S603 - ourselves

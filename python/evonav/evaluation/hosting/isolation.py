@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from evonav.agents.hosting.sandbox import Policy, landlock_abi, why_not
-from evonav.parallel.local import SPARING, THREAD_VARIABLES
+from evonav.parallel.local import SPARING, THREAD_VARIABLES, search_path
 from evonav.perception.weights import MODELS_VARIABLE
 
 Isolation = Literal["none", "process", "sandbox"]
@@ -91,11 +91,6 @@ def with_absolute_file(name: str) -> str:
     """Return an agent's name; the file of `./my_agent.py:MyAgent` becomes absolute."""
     file, colon, kind = name.rpartition(":")
     return f"{Path(file).absolute()}:{kind}" if colon and file.endswith(".py") else name
-
-
-def search_path() -> list[str]:
-    """Return this process's `sys.path` in absolute paths."""
-    return [str(Path(entry).absolute()) for entry in sys.path]
 
 
 def policy_of(name: str, scratch: Path, hidden: Sequence[str], memory_mb: int | None) -> Policy:

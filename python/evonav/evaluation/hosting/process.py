@@ -35,10 +35,10 @@ from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
-from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, search_path, with_absolute_file
+from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, with_absolute_file
 from evonav.evaluation.hosting.model_relay import ModelRelay, why_not_shut_in
 from evonav.evaluation.records.schema import ErrorKind
-from evonav.parallel.local import one_thread_each
+from evonav.parallel.local import one_thread_each, search_path
 
 LOG_NAME = "agents.log"
 """File in a run's folder with all output of agents."""
@@ -203,6 +203,7 @@ class AgentProcess:
                 self.relay.agents_descriptor = forking.RELAY
             return fork_server.fork(
                 (stderr, stderr, *inherited),
+                agent=self.name,
                 folder=self._scratch,
                 environment=dict(os.environ) if own_environment is None else own_environment,
                 path=path,

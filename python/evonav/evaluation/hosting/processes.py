@@ -9,9 +9,9 @@ from pathlib import Path
 
 from evonav.evaluation.hosting import fork_server
 from evonav.evaluation.hosting.fork_server import ForkServer
-from evonav.evaluation.hosting.isolation import environment, search_path
+from evonav.evaluation.hosting.isolation import environment
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcess
-from evonav.parallel.local import one_thread_each
+from evonav.parallel.local import one_thread_each, search_path
 
 MAX_PROCESSES = 8
 """Largest number of processes that a worker keeps; the one that was idle for longest is ended."""

@@ -22,12 +22,13 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_names
+from evonav.evaluation.run.program import PROGRAM
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress as Progress  # also for those who import it from here
 from evonav.evaluation.run.scheduler import RunJobs, Schedule
 from evonav.evaluation.run.settings_model import NUM_RETRIES
 from evonav.evaluation.run.summary import MODELS_KEY
-from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
+from evonav.evaluation.run.worker import EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import open_pool
 from evonav.parallel.worker import Workforce
@@ -156,11 +157,12 @@ def evaluate_all(
         if num_jobs := sum(len(run.jobs) for run in runs):
             schedule = Schedule(runs, num_retries)
             with open_pool(
-                WORK,
+                PROGRAM.work,
                 str(workforce.jobs_at_once),
                 replace(workforce, num_workers=min(num_workers, num_jobs)),
                 timeout_s=max(run.limit_s for run in runs),
                 max_losses=0,  # the schedule counts them
+                prelude=PROGRAM.prelude,
             ) as pool:
                 while schedule.fill(pool):
                     for index, stage in schedule.take(pool.next_answer()):

@@ -28,8 +28,8 @@ from pydantic import TypeAdapter
 from evonav.agents.agent import Agent, SensorConfig
 from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
+from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
@@ -43,7 +43,6 @@ from evonav.parallel.local import EndedError
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
-WORK = "evonav.evaluation.run.worker:EpisodeWork"
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, ErrorKind.CRASH, ErrorKind.TIMEOUT)
 """Failures that a retry may avoid; an exception of an agent or simulator would be the same again."""
 MAX_CONTEXTS = 2
@@ -186,10 +185,10 @@ class WorkerContext:
 
     def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
-        if self._processes is not None and job.agent not in ORACLE_BASELINES:
+        if self._processes is not None and job.agent not in ORACLE_BASELINE_NAMES:
             return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed, job.task_id)
         try:
-            if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINES:
+            if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINE_NAMES:
                 return self._debugged_agent(job)
             return make_agent(job.agent, self.config.backend.decision.create(job.seed))
         except (KeyboardInterrupt, EndedError):
