@@ -153,7 +153,7 @@ def test_every_help_is_short_plain_and_complete():
         parent = GROUP
         for group in groups:
             parent = parent.commands[group]
-        _, command, _ = parent.resolve_command(group_context, [last])
+        _, command, _ = parent.resolve_command(group_context, [last, "--help"])
         help_ = CliRunner().invoke(app, [*name.split(), "-h"], env={"COLUMNS": "120"}).stdout
         assert not re.search(r"<bool>|<path>|list\[", help_), name
         purpose = parent.commands[last].get_short_help_str(200)
@@ -187,7 +187,7 @@ def test_options_that_mean_the_same_are_declared_once():
         parent = GROUP
         for group in groups:
             parent = parent.commands[group]
-        _, command, _ = parent.resolve_command(GROUP.make_context("evonav", ["agents"]), [last])
+        _, command, _ = parent.resolve_command(GROUP.make_context("evonav", ["agents"]), [last, "--help"])
         for param in command.params:
             if param.param_type_name == "option" and not param.hidden and param.name not in own:
                 texts.setdefault(param.opts[0], {}).setdefault((param.help, str(param.default)), []).append(name)

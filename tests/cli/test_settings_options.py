@@ -11,6 +11,7 @@ from evonav.cli import app
 from evonav.cli.options.settings import settings_options
 from evonav.errors import InvalidArgumentError
 from evonav.sweeps.file import read_sweep
+from evonav.tasks.records import descriptions
 
 GROUPS = ("simulation", "perception", "decisions", "spending", "run")
 
@@ -18,13 +19,12 @@ GROUPS = ("simulation", "perception", "decisions", "spending", "run")
 @pytest.mark.parametrize("name", GROUPS)
 def test_every_field_is_an_option_with_its_description(name):
     group = get_command(app)
-    _, command, _ = group.resolve_command(group.make_context("evonav", ["evaluate"]), ["evaluate"])
+    _, command, _ = group.resolve_command(group.make_context("evonav", ["evaluate"]), ["evaluate", "--help"])
     found = {parameter.name: parameter for parameter in command.params}
     options = settings_options(name)
     assert options.chosen
     for field in options.chosen:
-        description = options.model.model_fields[field].description
-        assert description, field
+        description = descriptions(options.model)[field]
         assert found[options.option(field)].help == " ".join(description.split())
 
 

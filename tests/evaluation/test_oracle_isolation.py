@@ -13,7 +13,7 @@ from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_spec, write_tas
 from evonav.agents.agent import NavigateTo, SensorConfig
 from evonav.component import Component
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.oracle_baselines import OracleBaseline
+from evonav.evaluation.episode.oracle_baseline import OracleBaseline
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend

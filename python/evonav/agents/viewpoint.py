@@ -91,7 +91,7 @@ def places_around(
     bearings_rad = bearings_rad[_angles_between(bearings_rad, first_rad) >= min_turn_rad]
     wanted_x_m, wanted_z_m = distance_m * np.sin(bearings_rad), distance_m * np.cos(bearings_rad)
     gaps_m = np.hypot(x_m[:, None] - wanted_x_m, z_m[:, None] - wanted_z_m)
-    chosen = np.unique(gaps_m.argmin(axis=0))
+    chosen = np.flatnonzero(np.bincount(gaps_m.argmin(axis=0)))  # `np.unique` imports 15 ms of masked arrays
     return np.stack([x_m[chosen] + object_m[0], z_m[chosen] + object_m[1]], axis=1), turns_rad[chosen]
 
 

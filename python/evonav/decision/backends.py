@@ -23,8 +23,6 @@ from evonav.decision.vlm.relay import RelayedClient
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
 
-VLM = "evonav.decision.backends:vlm"
-"""Import path of `vlm`."""
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
     "top_p": 0.95,

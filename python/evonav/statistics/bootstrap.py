@@ -7,6 +7,7 @@ independent, so every resample takes a house whole.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,12 +81,10 @@ class ClusterBootstrap:
         Raises:
             ValueError: A house lies in two strata.
         """
-        names, cluster_of = np.unique(np.asarray(clusters), return_inverse=True)
-        self.num_clusters = len(names)
-        self.cluster_of = cluster_of.astype(np.int64)
+        self.cluster_of, self.num_clusters = _places(clusters)
         self._strata = np.zeros(self.num_clusters, np.int64)
         if strata is not None:
-            _, stratum_of = np.unique(np.asarray(strata), return_inverse=True)
+            stratum_of, _ = _places(strata)
             self._strata[self.cluster_of] = stratum_of
             if not np.array_equal(self._strata[self.cluster_of], stratum_of):
                 raise ValueError("a house lies in two strata")
@@ -196,6 +195,15 @@ class ClusterBootstrap:
         return _counts(self._strata.tobytes(), self._num_resamples, self._seed)
 
 
+def _places(values: Sequence[Any] | NDArray[Any]) -> tuple[NDArray[np.int64], int]:
+    """Return the place of each value among the different ones in order, and their number.
+
+    `np.unique` would do so, too, and first import 15 ms of NumPy's masked arrays.
+    """
+    place_of = {value: place for place, value in enumerate(sorted(set(values)))}
+    return np.array([place_of[value] for value in values], np.int64), len(place_of)
+
+
 # The same houses are resampled for every agent and every measure: drawing takes ten times as long as summing.
 @lru_cache(maxsize=8)
 def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.uint16], ...]:
@@ -206,7 +214,7 @@ def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.ui
     """
     stratum_of = np.frombuffer(strata, dtype=np.int64)
     generator = np.random.Generator(np.random.PCG64(seed))
-    members = [np.flatnonzero(stratum_of == stratum) for stratum in np.unique(stratum_of)]
+    members = [np.flatnonzero(stratum_of == stratum) for stratum in np.flatnonzero(np.bincount(stratum_of))]
     block = max(1, MAX_RESAMPLE_CELLS // max(1, len(stratum_of)))
     blocks = []
     for start in range(0, num_resamples, block):

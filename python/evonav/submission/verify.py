@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import EvonavError, InvalidArgumentError
-from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
+from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.convert import pose_record
@@ -115,7 +115,7 @@ class _Records:
         for part in file.header.records:
             if part.agent in self.brief:
                 self.complete.add([f"{part.agent} is there twice"])
-            if part.agent in ORACLE_BASELINES:
+            if part.agent in ORACLE_BASELINE_NAMES:
                 self.complete.add([f"{part.agent} is an oracle baseline: it knows what agents do not"])
             self.brief[part.agent] = self._of_agent(file, part)
 

@@ -20,6 +20,7 @@ from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
+from evonav.tasks.records import described_schema
 from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import read_toml
 
@@ -135,7 +136,7 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
 
 def sweep_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of sweep files, short forms included, for editors."""
-    schema = SweepFile.model_json_schema()
+    schema = described_schema(SweepFile)
     text_schema: dict[str, Any] = {"type": "string"}
     short: dict[str, Any] = {"anyOf": [text_schema, {"type": "array", "items": text_schema}]}
     for axis in SHORT_FORMS:

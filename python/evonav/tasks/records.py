@@ -1,11 +1,16 @@
 """Parse and write task files as strict records, with errors that name file, field and value."""
 
+import ast
 import gzip
 import hashlib
+import inspect
 import math
 import zlib
+from collections.abc import Iterator
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -28,9 +33,7 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 class Record(BaseModel):
     """A part of a task file: frozen, without coercion, unknown keys, infinity or NaN."""
 
-    model_config = ConfigDict(
-        frozen=True, strict=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 class PoseRecord(Record):
@@ -44,6 +47,40 @@ class PoseRecord(Record):
         """Return the pose, in radians."""
         x_m, y_m, z_m = self.position_m
         return Pose(x_m, y_m, z_m, math.radians(self.yaw_deg), math.radians(self.horizon_deg))
+
+
+def descriptions(model: type[Record]) -> dict[str, str]:
+    """Return the strings below a record's fields in the source.
+
+    Pydantic can read them, too, but whenever records are imported, which takes as long as all else of the import.
+    """
+    found = {}
+    for kind in reversed(model.__mro__):
+        if issubclass(kind, Record):
+            (source,) = ast.parse(dedent(inspect.getsource(kind))).body
+            assert isinstance(source, ast.ClassDef)
+            for field, below in pairwise(source.body):
+                match field, below:
+                    case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text))):
+                        found[name] = inspect.cleandoc(text)
+    return found
+
+
+def described_schema(model: type[Record]) -> dict[str, Any]:
+    """Return the JSON Schema of a record, in which fields have their descriptions."""
+    schema = model.model_json_schema(mode="validation")
+    models = {one.__name__: one for one in _kinds(Record)}
+    for title, part in {model.__name__: schema, **schema.get("$defs", {})}.items():
+        for field, text in descriptions(models[title]).items():
+            known = part["properties"][field]
+            part["properties"][field] = dict(sorted({**known, "description": text}.items()))
+    return schema
+
+
+def _kinds(model: type[Record]) -> Iterator[type[Record]]:
+    for one in model.__subclasses__():
+        yield one
+        yield from _kinds(one)
 
 
 RecordT = TypeVar("RecordT", bound=Record)

@@ -15,7 +15,7 @@ from evonav.errors import TaskError
 from evonav.tasks.dataset import DatasetRecord
 from evonav.tasks.manifest import PublicStage, TaskHeader
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.records import Record
+from evonav.tasks.records import Record, described_schema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -37,7 +37,7 @@ def schema_of(name: str) -> dict[str, Any]:
     if name not in MODELS:
         raise TaskError(f"schema {name!r}: expected one of {', '.join(MODELS)}")
     model = MODELS[name]
-    schema = model.model_json_schema(mode="validation")
+    schema = described_schema(model)
     for part in (schema, *schema.get("$defs", {}).values()):
         for field in part["properties"].values():
             if "description" in field:

@@ -9,7 +9,8 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Generic, Literal, TypeVar
+from functools import cached_property
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -69,17 +70,22 @@ T = TypeVar("T")
 class Part(Generic[T]):
     """A kind of value that an answer can have, and its JSON."""
 
-    def __init__(self, name: str, adapter: TypeAdapter[T], max_bytes: int) -> None:
+    def __init__(self, name: str, kind: Any, max_bytes: int) -> None:  # noqa: ANN401 - a type hint
         """Name the part.
 
         Args:
             name: Name in errors.
-            adapter: Type of the value.
+            kind: Type of the value.
             max_bytes: Limit of the JSON that is written or read.
         """
         self._name = name
-        self._adapter = adapter
+        self._kind = kind
         self._max_bytes = max_bytes
+
+    @cached_property
+    def _adapter(self) -> TypeAdapter[T]:
+        """Reads the value; an agent's process only writes, and never makes it."""
+        return TypeAdapter(self._kind)
 
     def write(self, value: object) -> bytes:
         """Return a value as JSON in one line; numbers and arrays of NumPy are written as Python's.
@@ -162,7 +168,7 @@ _Action = Annotated[
     | Annotated[Stop, AfterValidator(_short_reason), Tag("stop")],
     Discriminator(lambda value: value.get("kind") if isinstance(value, dict) else None),
 ]
-_ACTION: Part[AgentAction] = Part("action", TypeAdapter(_Action), MAX_DIAGNOSTICS_BYTES)
+_ACTION: Part[AgentAction] = Part("action", _Action, MAX_DIAGNOSTICS_BYTES)
 
 
 def write_action(action: object) -> bytes:
@@ -262,7 +268,7 @@ def _check_depth(value: object, depth: int) -> None:
 for _kind in (SensorConfig, ViewSchedule, EntryBelief, PlaceBelief, RoundDiagnostics):
     with_config(ConfigDict(allow_inf_nan=False))(_kind)
 
-SENSORS = Part("sensors", TypeAdapter(SensorConfig), MAX_DIAGNOSTICS_BYTES)
+SENSORS: Part[SensorConfig] = Part("sensors", SensorConfig, MAX_DIAGNOSTICS_BYTES)
 """The sensors that an agent needs; the limits of the protocol are not checked here."""
 
 
@@ -281,14 +287,10 @@ def write_sensors(agent: Agent) -> bytes:
 
 
 DIAGNOSTICS: Part[RoundDiagnostics] = Part(
-    "diagnostics",
-    TypeAdapter(Annotated[RoundDiagnostics, AfterValidator(_possible_diagnostics)]),
-    MAX_DIAGNOSTICS_BYTES,
+    "diagnostics", Annotated[RoundDiagnostics, AfterValidator(_possible_diagnostics)], MAX_DIAGNOSTICS_BYTES
 )
 ENTRIES: Part[list[EntryBelief]] = Part(
-    "entries",
-    TypeAdapter(Annotated[list[Annotated[EntryBelief, AfterValidator(_possible_entry)]], FailFast()]),
-    MAX_ENTRIES_BYTES,
+    "entries", Annotated[list[Annotated[EntryBelief, AfterValidator(_possible_entry)]], FailFast()], MAX_ENTRIES_BYTES
 )
 """An object memory."""
 
@@ -306,7 +308,7 @@ _CostName = Literal[
     "agent_peak_rss_mb",
 ]
 _Amount = Annotated[int, Field(ge=0, le=MAX_COUNT)] | Annotated[float, Field(ge=0, le=MAX_COUNT, allow_inf_nan=False)]
-COSTS = Part("costs", TypeAdapter(dict[_CostName, _Amount]), MAX_DIAGNOSTICS_BYTES)
+COSTS: Part[dict[_CostName, int | float]] = Part("costs", dict[_CostName, _Amount], MAX_DIAGNOSTICS_BYTES)
 """Costs of an agent's decision model and process."""
 
 
@@ -321,7 +323,7 @@ class Failure:
 
 MAX_FAILURE = 2 * MAX_MESSAGE
 """Longest description of an exception, with the places where it was raised."""
-FAILURE = Part("failure", TypeAdapter(Failure), MAX_DIAGNOSTICS_BYTES)
+FAILURE: Part[Failure] = Part("failure", Failure, MAX_DIAGNOSTICS_BYTES)
 
 
 # Answers
@@ -334,7 +336,7 @@ class _Head:
     parts: tuple[str, ...]
 
 
-_HEAD = TypeAdapter(_Head)
+_HEAD: Part[_Head] = Part("", _Head, MAX_DIAGNOSTICS_BYTES)
 
 
 def write_answer(number: int, cpu_s: float, parts: Mapping[str, bytes]) -> bytes:
@@ -359,10 +361,7 @@ def read_answer(message: bytes, number: int) -> tuple[float, dict[str, bytes]]:
         InvalidArgumentError: It is no answer to the request.
     """
     first, *texts = message.split(b"\n")
-    try:
-        head = _HEAD.validate_json(first, strict=True)
-    except ValidationError as error:
-        raise InvalidArgumentError(_first_problem(error)) from None
+    head = _HEAD.read(first)
     if head.number != number:
         raise InvalidArgumentError(f"number = {head.number}: expected {number}")
     if len(head.parts) != len(texts):

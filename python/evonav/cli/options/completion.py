@@ -10,11 +10,13 @@ MAX_FOLDERS = 1000
 def agents(incomplete: str) -> list[str]:
     """Names of agents; after a comma, further ones."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
+    from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 
     before, comma, last = incomplete.rpartition(",")
     taken = before.split(",")
-    names = [name for name in (*agent_descriptions(), *ORACLE_BASELINES) if name.startswith(last) and name not in taken]
+    names = [
+        name for name in (*agent_descriptions(), *ORACLE_BASELINE_NAMES) if name.startswith(last) and name not in taken
+    ]
     return [f"{before}{comma}{name}" for name in names]
 
 

@@ -66,14 +66,19 @@ class Options:
         """Return the flag of a field's option."""
         return f"--{self.option(name).replace('_', '-')}"
 
-    def parameters(self) -> list[inspect.Parameter]:
-        """Return a keyword parameter for each option, as typer reads them."""
+    def parameters(self, *, has_help: bool) -> list[inspect.Parameter]:
+        """Return a keyword parameter for each option, as typer reads them.
+
+        Args:
+            has_help: With help, which takes time to read.
+        """
+        texts = _descriptions(self.model) if has_help else {}
         return [
             inspect.Parameter(
                 self.option(name),
                 inspect.Parameter.KEYWORD_ONLY,
                 default=self._default(name),
-                annotation=Annotated[self._type(name), self._hint(name)],
+                annotation=Annotated[self._type(name), self._hint(name, texts.get(name, ""))],
             )
             for name in self.chosen
         ]
@@ -87,9 +92,9 @@ class Options:
         kind = str if name in self.parse else _option_type(self.model.model_fields[name].annotation)
         return kind | None if self.overrides else kind
 
-    def _hint(self, name: str) -> Any:  # noqa: ANN401 - typer's
+    def _hint(self, name: str, description: str) -> Any:  # noqa: ANN401 - typer's
         found = self.model.model_fields[name]
-        text = " ".join((found.description or "").split())
+        text = " ".join(description.split())
         if self.overrides:
             what, _, default = text.partition(" Default: ")
             text = f"{what} Default: the file's{', else ' + default if default else '.'}"
@@ -196,7 +201,7 @@ def with_settings(*names: str, hidden: tuple[str, ...] = ()) -> Callable[[Callab
         own = inspect.signature(command)
         plain = [parameter for name, parameter in own.parameters.items() if name not in names]
 
-        def expand() -> Callable[..., None]:
+        def expand(*, has_help: bool) -> Callable[..., None]:
             """Return the command with all its options."""
             groups = {name: replace(settings_options(name), hidden=name in hidden) for name in names}
 
@@ -211,7 +216,7 @@ def with_settings(*names: str, hidden: tuple[str, ...] = ()) -> Callable[[Callab
                         raise
                     raise typer.BadParameter(f"{found[0].flag(error.key)} {error.problem}") from None
 
-            added = [parameter for options in groups.values() for parameter in options.parameters()]
+            added = [parameter for options in groups.values() for parameter in options.parameters(has_help=has_help)]
             return _signed(run, command, [*plain, *added])
 
         @wraps(command)
@@ -237,6 +242,12 @@ def _signed(
     function.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
     function.__annotations__ = {parameter.name: parameter.annotation for parameter in keywords}
     return function
+
+
+def _descriptions(model: "type[Settings]") -> Mapping[str, str]:
+    from evonav.tasks.records import descriptions
+
+    return descriptions(model)
 
 
 def _option_type(annotation: Any) -> Any:  # noqa: ANN401 - a type hint

@@ -7,8 +7,9 @@ in place of the client; the evaluator's side is `evonav.evaluation.hosting.model
 import os
 import struct
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import accumulate
 from typing import Annotated, Any, Literal
 
@@ -20,6 +21,8 @@ from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
 
+RELAYED = "evonav.decision.backends:vlm"
+"""Import path of the decision model that can be asked so."""
 LENGTH = struct.Struct("<Q")
 """Format of the size of the message that follows."""
 MAX_MESSAGE_BYTES = 64 << 20
@@ -67,8 +70,8 @@ class Response:
     """The message of a failure, or of another `DecisionError` if there is no kind."""
 
 
-_REQUEST = TypeAdapter(_Request)
-RESPONSE = TypeAdapter(Response)
+_request: Callable[[], TypeAdapter[_Request]] = cache(lambda: TypeAdapter(_Request))
+response_type: Callable[[], TypeAdapter[Response]] = cache(lambda: TypeAdapter(Response))
 _lock = threading.Lock()
 
 
@@ -120,7 +123,7 @@ class RelayedClient:
             except OSError as error:
                 raise DecisionError(f"the connection to the model is lost: {error}") from error
         try:
-            return RESPONSE.validate_json(text)
+            return response_type().validate_json(text)
         except ValidationError as error:
             raise DecisionError("the connection to the model is lost: no answer to the question") from error
 
@@ -140,7 +143,7 @@ def request_bytes(prompts: Sequence[Prompt], attempt: int, otherwise: int) -> by
         for prompt in prompts
     ]
     request = _Request(forms, attempt, otherwise, [image.shape[:2] for image in pixels.values()])
-    return b"".join((_REQUEST.dump_json(request), b"\n", *(image.data for image in pixels.values())))
+    return b"".join((_request().dump_json(request), b"\n", *(image.data for image in pixels.values())))
 
 
 def read_request(message: bytes) -> tuple[list[Prompt], int, int]:
@@ -151,7 +154,7 @@ def read_request(message: bytes) -> tuple[list[Prompt], int, int]:
     """
     text, _, rest = message.partition(b"\n")  # JSON has no line ends
     try:
-        request = _REQUEST.validate_json(text, strict=True)
+        request = _request().validate_json(text, strict=True)
     except ValidationError as error:
         problem = error.errors(include_url=False, include_input=False)[0]
         raise InvalidArgumentError(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}") from error

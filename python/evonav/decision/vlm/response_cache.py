@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+from PIL import Image, WebPImagePlugin  # noqa: F401 - or Pillow imports all its plug-ins for the first WebP
 
 from evonav.decision.prompts import Picture
 from evonav.decision.vlm.shared_file import SharedFile

@@ -16,11 +16,11 @@ from evonav.agents.agent import Agent
 from evonav.agents.hosting.error_text import describe
 from evonav.agents.hosting.serving import refuse_in_agent_process
 from evonav.agents.registry import agent_factory, import_name, needed_arguments, new_agent
+from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.contract.situations import check_situations
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, RemoteAgent
 from evonav.evaluation.hosting.process import AgentHosting
@@ -113,7 +113,7 @@ class _Examination:
         self._hosting = AgentHosting(timeout_s=timeout_s)
 
     def checks(self) -> Iterator[Check]:
-        if self._name in ORACLE_BASELINES:
+        if self._name in ORACLE_BASELINE_NAMES:
             yield Check("importable", "fail", "an oracle baseline: it knows the target, and is no agent")
             return
         with bundled_tasks() as directory, closing(AgentProcesses(self._hosting)) as processes:

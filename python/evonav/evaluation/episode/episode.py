@@ -10,7 +10,7 @@ from time import process_time
 
 from evonav.agents.agent import Agent
 from evonav.evaluation.episode.observer import EpisodeObserver
-from evonav.evaluation.episode.oracle_baselines import OracleBaseline, as_oracle_baseline
+from evonav.evaluation.episode.oracle_baseline import OracleBaseline
 from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, Stage
@@ -124,7 +124,14 @@ class Episode:
 def _hosted(agent: Agent | HostedAgent, spec: EpisodeSpec) -> tuple[HostedAgent, OracleBaseline | None]:
     """Return the agent as a stage asks it, and itself if it is an oracle baseline, which is told true places."""
     hosted = agent if isinstance(agent, HostedAgent) else LocalAgent(agent)
-    baseline = None if isinstance(agent, HostedAgent) else as_oracle_baseline(agent)
+    baseline = agent if isinstance(agent, OracleBaseline) and _is_own(agent) else None
     if spec.shift_m is None or baseline is not None:
         return hosted, baseline
     return ShiftedAgent(hosted, Shift(*spec.shift_m)), None
+
+
+def _is_own(baseline: OracleBaseline) -> bool:
+    """Return whether an oracle baseline is one of evonav's own."""
+    from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES  # which imports agents
+
+    return type(baseline) in ORACLE_BASELINES.values()

@@ -8,7 +8,7 @@ from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConf
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.observer import EpisodeObserver, StageFailedError, attribute_errors, traceback_of
-from evonav.evaluation.episode.oracle_baselines import OracleBaseline, Sighting
+from evonav.evaluation.episode.oracle_baseline import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame

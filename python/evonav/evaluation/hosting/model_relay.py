@@ -10,12 +10,11 @@ import time
 from contextlib import suppress
 
 from evonav.component import Component
-from evonav.decision.backends import VLM, vlm_client
 from evonav.decision.metered import account_costs
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.relay import RESPONSE, Response, read_message, read_request, write_message
+from evonav.decision.vlm.relay import RELAYED, Response, read_message, read_request, response_type, write_message
 from evonav.errors import EvonavError, InvalidArgumentError
 
 MAX_ERROR = 2000
@@ -24,7 +23,7 @@ MAX_ERROR = 2000
 
 def is_relayed(decision: Component[DecisionModel]) -> bool:
     """Return whether a decision model can be asked for an agent's process."""
-    return decision.path == VLM
+    return decision.path == RELAYED
 
 
 def why_not_shut_in(decision: Component[DecisionModel]) -> str:
@@ -56,6 +55,8 @@ class ModelRelay:
             DecisionError: The model cannot be asked.
             InvalidArgumentError: An option makes no sense.
         """
+        from evonav.decision.backends import vlm_client
+
         self._client = vlm_client(**decision.keywords)
         if self._thread is None:
             self._thread = threading.Thread(target=self._serve, daemon=True)
@@ -87,7 +88,7 @@ class ModelRelay:
         # An end of the agent's process, or a message of an impossible size, after which no next one can be found.
         with self._near, suppress(OSError, InvalidArgumentError):
             while True:
-                answer = RESPONSE.dump_json(self._answer(read_message(descriptor)))
+                answer = response_type().dump_json(self._answer(read_message(descriptor)))
                 self.cpu_s = time.thread_time()
                 write_message(descriptor, answer)
 

@@ -19,7 +19,12 @@ class Record(BaseModel):
 
     # Parts of a record are validated again with the whole: `model_copy` does not validate.
     model_config = ConfigDict(
-        frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always", allow_inf_nan=False
+        frozen=True,
+        extra="forbid",
+        ser_json_inf_nan="null",
+        revalidate_instances="always",
+        allow_inf_nan=False,
+        defer_build=True,
     )
 
 

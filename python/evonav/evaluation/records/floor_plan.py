@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, WebPImagePlugin  # noqa: F401 - or Pillow imports all its plug-ins for the first WebP
 
 from evonav.drawing.plan import HouseFootprint, HouseHole, HousePlan, HouseRoom, plan_of
 from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Opening, RoomFootprint

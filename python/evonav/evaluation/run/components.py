@@ -12,7 +12,7 @@ from evonav.agents.registry import BUILT_IN, RULE_MARK, agent_descriptions, agen
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
+from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.fork_server import ForkServer
 from evonav.evaluation.hosting.process import AgentHosting, check_importable
@@ -143,7 +143,11 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     Raises:
         InvalidArgumentError: No agent has this name.
     """
-    return new_oracle_baseline(name, decision) if name in ORACLE_BASELINES else new_agent(agent_factory(name), decision)
+    if name in ORACLE_BASELINE_NAMES:
+        from evonav.evaluation.episode.oracle_baselines import new_oracle_baseline
+
+        return new_oracle_baseline(name, decision)
+    return new_agent(agent_factory(name), decision)
 
 
 def check_agent_names(names: Sequence[str], hosting: AgentHosting) -> None:
@@ -169,7 +173,7 @@ def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server
     Raises:
         InvalidArgumentError: No agent has this name, or it cannot be imported.
     """
-    if name in ORACLE_BASELINES:
+    if name in ORACLE_BASELINE_NAMES or name in BUILT_IN:
         return
     try:
         if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
@@ -179,8 +183,8 @@ def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server
     except InvalidArgumentError as error:
         if ":" in name or name.endswith(".py") or RULE_MARK in name:
             raise
-        near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINES), 1)
-        known = ", ".join(sorted(ORACLE_BASELINES))
+        near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINE_NAMES), 1)
+        known = ", ".join(sorted(ORACLE_BASELINE_NAMES))
         hint = f"; did you mean `{near[0]}`?" if near else f"; oracle baselines are {known}"
         raise InvalidArgumentError(f"{error}{hint}") from error
 

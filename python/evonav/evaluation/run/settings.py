@@ -228,7 +228,6 @@ class DecisionSettings(Settings):
             SettingError: A setting is invalid or does not apply.
             InvalidArgumentError: A rate of mistakes or a sampling parameter is out of range.
         """
-        from evonav.decision.backends import vlm_config
         from evonav.decision.noisy import NoiseRates
 
         if NoiseRates.read(self.noise).confused and not self.asks_rules:
@@ -243,6 +242,8 @@ class DecisionSettings(Settings):
             self._refuse_all_but("model", "eagerness", "mistakes", "goal_input")
             AppearanceMatch(eagerness=self.eagerness, mistakes=self.mistakes)
         elif self.kind == "vlm":
+            from evonav.decision.backends import vlm_config
+
             self._refuse_all_but(*type(self).model_fields.keys() - {"eagerness", "mistakes"})
             identity = self.identity(0)
             vlm_config(identity["model"], identity["request"], self._server(1))

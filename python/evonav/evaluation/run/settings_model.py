@@ -1,7 +1,5 @@
 """Define the base of all settings, apart from the settings so that small commands start without what those import."""
 
-from pydantic import ConfigDict
-
 from evonav.errors import InvalidArgumentError
 from evonav.tasks.records import Record
 
@@ -31,5 +29,3 @@ class Settings(Record):
 
     The string below a field is its description in the JSON Schema of sweep files and in the command's help.
     """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
