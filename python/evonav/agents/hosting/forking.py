@@ -87,6 +87,7 @@ def main(control: int) -> None:
     """
     gc.disable()  # imports leave hardly any garbage, and looking for it takes a tenth of their time
     _import()
+    gc.freeze()
     _call_oneself(SERVER_NAME)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     child = _requested(control)
