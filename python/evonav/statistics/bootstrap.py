@@ -191,7 +191,7 @@ class ClusterBootstrap:
                 medians.append(ordered[np.searchsorted(cumulated, cumulated[-1] / 2)] if is_drawn else np.nan)
         return self.estimate(float(weighted_quantiles(values, weights, [0.5])[0]), np.array(medians), len(values))
 
-    def _blocks(self) -> tuple[NDArray[np.uint16], ...]:
+    def _blocks(self) -> tuple[NDArray[np.uint8], ...]:
         return _counts(self._strata.tobytes(), self._num_resamples, self._seed)
 
 
@@ -206,11 +206,11 @@ def _places(values: Sequence[Any] | NDArray[Any]) -> tuple[NDArray[np.int64], in
 
 # The same houses are resampled for every agent and every measure: drawing takes ten times as long as summing.
 @lru_cache(maxsize=8)
-def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.uint16], ...]:
+def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.uint8], ...]:
     """Draw how often each cluster is in each resample, with replacement and each stratum by itself.
 
     Returns:
-        `(r, C)` blocks, R rows in all.
+        `(r, C)` blocks, R rows in all. That a cluster is drawn more than 255 times is less likely than 1e-500.
     """
     stratum_of = np.frombuffer(strata, dtype=np.int64)
     generator = np.random.Generator(np.random.PCG64(seed))
@@ -218,7 +218,7 @@ def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.ui
     block = max(1, MAX_RESAMPLE_CELLS // max(1, len(stratum_of)))
     blocks = []
     for start in range(0, num_resamples, block):
-        counts = np.zeros((min(block, num_resamples - start), len(stratum_of)), np.uint16)
+        counts = np.zeros((min(block, num_resamples - start), len(stratum_of)), np.uint8)
         for indices in members:
             shares = np.full(len(indices), 1 / len(indices))
             counts[:, indices] = generator.multinomial(len(indices), shares, size=len(counts))

@@ -62,20 +62,28 @@ def report(
     if (run / SWEEP_NAME).is_file():
         typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
         return
-    from evonav.evaluation.run.summary import write_summary
+    from evonav.evaluation.run.summary import save_summary
+    from evonav.report import load_run
 
     num_replays = _count(replays or str(NUM_REPLAYS))
-    print_table(write_summary(run))
-    typer.echo(f"report: {_report(run, out, num_replays, tasks, exchanges, maps)}")
+    recorded = load_run(run)
+    save_summary(run, recorded.summaries, recorded.pairs)
+    print_table(sorted(recorded.summaries, key=lambda summary: summary.agent))
+    typer.echo(f"report: {_report(recorded, out, num_replays, tasks, exchanges, maps)}")
 
 
 def _report(
-    run: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
+    run: "RecordedRun",
+    out: Path | None,
+    num_replays: int | None,
+    tasks: Path | None,
+    exchanges: Path | None,
+    has_maps: bool,
 ) -> Path:
-    from evonav.report import load_run, write_report
+    from evonav.report import write_report
 
     if num_replays != 0:
-        _replay(load_run(run), num_replays, tasks, exchanges)
+        _replay(run, num_replays, tasks, exchanges)
     return write_report(run, out, has_maps=has_maps)
 
 
@@ -84,6 +92,7 @@ def _report_sweep(
 ) -> Path:
     """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
+    from evonav.report import load_run
     from evonav.sweeps.page import write_sweep_page
     from evonav.sweeps.run import RUNS_NAME
     from evonav.sweeps.summary import sweep_title
@@ -92,7 +101,7 @@ def _report_sweep(
     reports = []
     for cell in sorted(path.parent for path in (sweep / RUNS_NAME).glob(f"*/{FILE_NAME}")):
         to = None if out is None else out / RUNS_NAME / cell.name
-        reports.append((cell.name, _report(cell, to, num_replays, tasks, exchanges, has_maps)))
+        reports.append((cell.name, _report(load_run(cell), to, num_replays, tasks, exchanges, has_maps)))
         typer.echo(f"cell: {reports[-1][1]}")
     return write_sweep_page(out or sweep, sweep_title(sweep), rows, reports)
 

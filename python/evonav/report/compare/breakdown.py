@@ -91,7 +91,9 @@ def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = 
         measure=measure,
         groups=tuple(group for group in known if group in sizes),
         agents=tuple(compared.name for compared in compared_agents),
-        cells={key: _cell(part, [float(getattr(row, measure)) for row in part]) for key, part in rows.items()},
+        cells={  # group by group: agents with the same houses share resamples
+            key: _cell(part, [float(getattr(row, measure)) for row in part]) for key, part in sorted(rows.items())
+        },
         note=grouping.note,
     )
 

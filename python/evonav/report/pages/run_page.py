@@ -36,7 +36,11 @@ MAP_DIR = "maps"
 
 
 def write_report(
-    run_dir: Path, out_dir: Path | None = None, *, has_maps: bool = False, max_replay_bytes: int = MAX_REPLAY_BYTES
+    run_dir: Path | RecordedRun,
+    out_dir: Path | None = None,
+    *,
+    has_maps: bool = False,
+    max_replay_bytes: int = MAX_REPLAY_BYTES,
 ) -> Path:
     """Write `report.html`, which needs no other file, and `table.md`, `.tex`, `.csv`.
 
@@ -44,7 +48,7 @@ def write_report(
     `evonav view` left in the run's folder become part of the report, as long as they show the records of now.
 
     Args:
-        run_dir: A run.
+        run_dir: A run, or what was read of it.
         out_dir: Folder to write to; default the run's own folder.
         has_maps: Write every stage's map as a file of its own too, `maps/*.svg`.
         max_replay_bytes: Limit for the pages of `evonav view` in the report; it links to those that do not fit.
@@ -55,8 +59,8 @@ def write_report(
     Raises:
         StoreError: There is no run, or a file cannot be read or written.
     """
-    out_dir = out_dir or run_dir
-    run = load_run(run_dir)
+    run = run_dir if isinstance(run_dir, RecordedRun) else load_run(run_dir)
+    out_dir = out_dir or run.run_dir
     found = run_tables(run)
     with_rows = [table for table in found if table.rows]
     write_atomically(out_dir / "table.md", tables.markdown_tables(with_rows))
