@@ -9,7 +9,7 @@ from evonav.cli.options.decisions import HiddenDryRun, decision_component, print
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Agents, Limit, Seed, names_of
 from evonav.cli.results.view import make_pages
-from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_tasks, running
+from evonav.cli.run.evaluate import early_worker, exit_if_incomplete, print_results, run_tasks, running
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.decision_resources import SpendingSettings
@@ -60,3 +60,6 @@ def demo(
     typer.echo(f"report: {write_report(out)}")
     typer.echo(f"replays: {index}")
     exit_if_incomplete(summaries)
+
+
+demo.beginning = early_worker  # type: ignore[attr-defined]
