@@ -70,7 +70,7 @@ class Options:
         """Return a keyword parameter for each option, as typer reads them.
 
         Args:
-            has_help: With help, which takes time to read.
+            has_help: True to give them their help, which takes time to read.
         """
         texts = _descriptions(self.model) if has_help else {}
         return [
