@@ -50,6 +50,7 @@ fn batch(world: &Arc<EmbeddedSimulator>, num_threads: usize) -> Batch {
         grid_m: 0.25,
         mask_filter: MaskFilter { min_area_px: 25, max_box_fraction: 1.0 },
         num_threads,
+        min_shared_px: 0,
     };
     let mut batch = Batch::new(NUM_SLOTS, config).expect("a valid batch");
     let [x, _, z] = world.start().position_m;

@@ -43,6 +43,9 @@ pub struct BatchConfig {
     pub mask_filter: MaskFilter,
     /// Number of threads that step and render, the caller's among them.
     pub num_threads: usize,
+    /// Number of pixels of a batch from which on the threads share its images: to wake a thread up
+    /// takes as long as to draw some, and much longer on a busy machine.
+    pub min_shared_px: usize,
 }
 
 /// The result of a step of one agent.
@@ -253,7 +256,9 @@ impl Batch {
         let one = |(((slot, depth_m), rgb), labels): (((&Slot, _), _), _)| {
             self.draw(slot, Images { depth_m, rgb, labels })
         };
-        each(self.pool.as_ref(), jobs, one).into_iter().collect()
+        let num_shared_px = jobs.len() * num_pixels;
+        let pool = self.pool.as_ref().filter(|_| num_shared_px >= self.config.min_shared_px);
+        each(pool, jobs, one).into_iter().collect()
     }
 
     fn draw(&self, slot: &Slot, images: Images<'_>) -> Result<(), Error> {

@@ -55,6 +55,7 @@ fn batch_of(num_slots: usize, num_threads: usize) -> Batch {
         grid_m: GRID_M,
         mask_filter: FILTER,
         num_threads,
+        min_shared_px: 0,
     };
     Batch::new(num_slots, config).expect("a valid batch")
 }

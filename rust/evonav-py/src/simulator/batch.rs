@@ -19,6 +19,9 @@ use pyo3::prelude::*;
 
 use crate::{arrays, camera::PyPose, error, simulator::embedded::PyEmbeddedSimulator};
 
+/// Number of pixels from which on threads share a batch's images: four of 128 x 128.
+const MIN_SHARED_PX: usize = 1 << 16;
+
 /// Whether each agent's action was carried out, and its distance.
 type Stepped<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
 
@@ -70,8 +73,15 @@ impl PyBatchSimulator {
     ) -> PyResult<Self> {
         let mask_filter = MaskFilter { min_area_px, max_box_fraction: 1.0 };
         let strides = Strides { move_m, turn_rad };
-        let config =
-            BatchConfig { image_px, empty_depth_m, strides, grid_m, mask_filter, num_threads };
+        let config = BatchConfig {
+            image_px,
+            empty_depth_m,
+            strides,
+            grid_m,
+            mask_filter,
+            num_threads,
+            min_shared_px: MIN_SHARED_PX,
+        };
         Ok(Self { core: Batch::new(num_slots, config).map_err(error::to_py)? })
     }
 
