@@ -279,6 +279,11 @@ def digests(observation):
     ]
 
 
+def acted(agent, observation):
+    agent.look(observation)
+    return agent.act()
+
+
 @pytest.fixture
 def echo():
     processes = AgentProcesses(AgentHosting(timeout_s=30.0))
@@ -299,7 +304,7 @@ def test_arrays_cross_the_border_whatever_their_layout_and_size(echo):
             True,
             3,
         )
-        assert echo.act(seen).reason == f"{len(sides)} views"
+        assert acted(echo, seen).reason == f"{len(sides)} views"
         assert json.loads(json.dumps(echo.diagnostics().details["seen"])) == digests(seen)
     assert echo.cpu_s > 0.0
 
@@ -312,7 +317,7 @@ def test_processes_are_reused_and_agents_are_not():
     )
     first.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
     nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
-    assert first.act(nothing).reason == "nothing left to explore"
+    assert acted(first, nothing).reason == "nothing left to explore"
     first.close()
     first.close()
     process = processes.lend("toy_agents:Explorer")
@@ -320,7 +325,7 @@ def test_processes_are_reused_and_agents_are_not():
     assert second.sensors == first.sensors
     assert processes.lend("toy_agents:Explorer") is not process  # which `second` has
     with pytest.raises(AgentFailedError, match="begin_task comes first"):
-        second.act(nothing)
+        acted(second, nothing)
     processes.close()
     processes.close()
     assert not process.is_usable

@@ -216,7 +216,9 @@ class Stage:
                     num_rounds_left=progress.budget - number,
                     is_guided=is_guided,
                 )
-            action = self._answer(observation)
+            self._show(observation)
+            del observation  # an agent in a process of its own has a copy, and may think for long
+            action = self._answer()
             with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = carry_out(action)
             is_stop = isinstance(action, Stop) and not is_guided
@@ -268,13 +270,8 @@ class Stage:
 
     def _scene(self) -> StageScene:
         """Return the stage as the perception may know it."""
-        return StageScene(
-            self._spec.task_id,
-            self._stage.public,
-            self._record.agent,
-            self._perception_seed,
-            self._simulator.objects,
-        )
+        task_id, agent = self._spec.task_id, self._record.agent
+        return StageScene(task_id, self._stage.public, agent, self._perception_seed, self._simulator.objects)
 
     def _sensors(self) -> Sensors:
         with attribute_errors(ErrorKind.SIMULATION):
@@ -282,8 +279,8 @@ class Stage:
                 self._simulator, self._perception, self._sensor_config, self._scene(), self._staleness, self._stopwatch
             )
 
-    def _answer(self, observation: Observation) -> AgentAction:
-        """Return the agent's action for an observation."""
+    def _show(self, observation: Observation) -> None:
+        """Give the agent the observation of a round."""
         if self._observer is not None:
             self._observer.round_begins(observation)
         with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
@@ -291,7 +288,12 @@ class Stage:
                 self._baseline.reveal_sighting(
                     Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
                 )
-            action = self._agent.act(observation)
+            self._agent.look(observation)
+
+    def _answer(self) -> AgentAction:
+        """Return the agent's action for what it was shown."""
+        with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+            action = self._agent.act()
             if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
                 message = "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
                 raise InvalidArgumentError(message)

@@ -1,7 +1,8 @@
 """Agents as the evaluator sees them, in its own process or another; every answer has been checked."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
 from evonav.agents.explanation import explaining
@@ -41,8 +42,12 @@ class HostedAgent(ABC):
         """Start the search for a new goal."""
 
     @abstractmethod
-    def act(self, observation: Observation) -> AgentAction:
-        """Decide what to do in one decision round."""
+    def look(self, observation: Observation) -> None:
+        """Take the observation of a decision round. It may be dropped then: an agent may think for long."""
+
+    @abstractmethod
+    def act(self) -> AgentAction:
+        """Decide what to do in the round."""
 
     @abstractmethod
     def diagnostics(self) -> RoundDiagnostics:
@@ -72,6 +77,7 @@ class LocalAgent(HostedAgent):
         """Host an agent."""
         self._agent = agent
         self._explaining = explaining(agent)
+        self._observations: list[Observation] = []
 
     @property
     def sensors(self) -> SensorConfig:
@@ -87,9 +93,13 @@ class LocalAgent(HostedAgent):
         self._num_bytes = 0
         self._agent.begin_stage(goal)
 
-    def act(self, observation: Observation) -> AgentAction:
-        """Decide what to do in one decision round."""
-        return wire.read_action(wire.write_action(self._agent.act(observation)))
+    def look(self, observation: Observation) -> None:
+        """Take the observation of a decision round."""
+        self._observations = [observation]
+
+    def act(self) -> AgentAction:
+        """Decide what to do in the round."""
+        return wire.read_action(wire.write_action(self._agent.act(self._observations.pop())))
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return what the agent said of the last round, right after it."""
@@ -171,9 +181,13 @@ class RemoteAgent(HostedAgent):
         self._describe(f"{self._label} stage {goal.stage}")
         self._sense(self._ask("begin_stage", goal))
 
-    def act(self, observation: Observation) -> AgentAction:
-        """Decide what to do in one decision round."""
-        self._last_parts = self._ask("act", observation)
+    def look(self, observation: Observation) -> None:
+        """Take the observation of a decision round; its process has a copy then."""
+        self._send("act", observation)
+
+    def act(self) -> AgentAction:
+        """Decide what to do in the round."""
+        self._last_parts = self._answer("act")
         return wire.read_action(_part(self._last_parts, "action"))
 
     def diagnostics(self) -> RoundDiagnostics:
@@ -231,14 +245,28 @@ class RemoteAgent(HostedAgent):
             self._process.describe(label)
 
     def _ask(self, operation: str, *arguments: object) -> dict[str, bytes]:
+        self._send(operation, *arguments)
+        return self._answer(operation)
+
+    def _send(self, operation: str, *arguments: object) -> None:
         if self._process is None:
             self._make()
+        with self._used(operation) as process:
+            process.send(operation, *arguments)
+
+    def _answer(self, operation: str) -> dict[str, bytes]:
+        with self._used(operation) as process:
+            return process.answer()
+
+    @contextmanager
+    def _used(self, operation: str) -> Iterator[AgentProcess]:
+        """Let other episodes compute while the block uses the process, and add up its CPU time."""
         process = self._process
         assert process is not None
         before_s = process.cpu_s
         try:
             with self._processes.waiting():
-                return process.ask(operation, *arguments)
+                yield process
         except AgentFailedError as error:
             if error.kind.loses_memory or operation == "make":
                 self.close()

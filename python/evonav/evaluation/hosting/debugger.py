@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from evonav.agents.agent import AgentAction
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import LocalAgent
-from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
 
@@ -50,7 +49,7 @@ class DebuggedAgent(LocalAgent):
         with post_mortem():
             super().begin_stage(goal)
 
-    def act(self, observation: Observation) -> AgentAction:
+    def act(self) -> AgentAction:
         """Decide what to do in one decision round."""
         with post_mortem():
-            return super().act(observation)
+            return super().act()

@@ -21,22 +21,20 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from evonav.agents.hosting import forking, wire
 from evonav.agents.hosting.error_text import clean
-from evonav.agents.hosting.sandbox import Policy, why_not
+from evonav.agents.hosting.sandbox import Policy
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
-from evonav.component import Component
-from evonav.decision.question import DecisionModel
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, with_absolute_file
-from evonav.evaluation.hosting.model_relay import ModelRelay, why_not_shut_in
+from evonav.evaluation.hosting.model_relay import ModelRelay
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each, search_path
 
@@ -176,6 +174,8 @@ class AgentProcess:
             if descriptor is not None:
                 self._poll.register(descriptor, select.POLLIN)
         self._num_asked = 0
+        self._asked = ("", 0.0, 0.0)
+        """The request that was sent last: its operation, its time limit, and when that has passed."""
         self._is_waiting = False
         try:
             if self._scratch is not None:
@@ -254,12 +254,37 @@ class AgentProcess:
             AgentFailedError: The agent raised (`agent`, `decision`), or it died or hung (`crash`, `timeout`) and its
                 process was ended.
         """
+        self.send(operation, *arguments, timeout_s=timeout_s)
+        return self.answer()
+
+    def send(self, operation: str, *arguments: object, timeout_s: float | None = None) -> None:
+        """Send a request; `answer` waits for its answer.
+
+        Raises:
+            AgentFailedError: The agent died or hung (`crash`, `timeout`), and its process was ended.
+        """
         timeout_s = timeout_s or self._hosting.timeout_s
-        deadline_s = time.monotonic() + timeout_s
+        self._asked = (operation, timeout_s, time.monotonic() + timeout_s)
         self._is_waiting = True
+        with self._ended_if_lost():
+            self._send(operation, arguments, self._asked[2])
+
+    def answer(self) -> dict[str, bytes]:
+        """Return the parts of the answer to the request that was sent; see `ask`."""
+        with self._ended_if_lost():
+            cpu_s, parts = wire.read_answer(self._message(self._asked[2]), self._num_asked)
+        self._is_waiting = False
+        self._own_cpu_s = cpu_s
+        if (failure := parts.get("failure")) is not None:
+            raise failure_of(failure, is_sandboxed=self._scratch is not None)
+        return parts
+
+    @contextmanager
+    def _ended_if_lost(self) -> Iterator[None]:
+        """End the process if it does not answer in time, or as it should."""
+        operation, timeout_s, _ = self._asked
         try:
-            self._send(operation, arguments, deadline_s)
-            cpu_s, parts = wire.read_answer(self._message(deadline_s), self._num_asked)
+            yield
         except TimeoutError:
             self.close(is_at_once=True)
             message = f"no answer to `{operation}` within {timeout_s:g} s"
@@ -269,11 +294,6 @@ class AgentProcess:
             self.close(is_at_once=True)
             message = died or f"malformed response: {clean(str(error))}"
             raise AgentFailedError(ErrorKind.CRASH, message) from None
-        self._is_waiting = False
-        self._own_cpu_s = cpu_s
-        if (failure := parts.get("failure")) is not None:
-            raise failure_of(failure, is_sandboxed=self._scratch is not None)
-        return parts
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
         buffers: list[pickle.PickleBuffer] = []
@@ -364,23 +384,6 @@ def check_importable(name: str, hosting: AgentHosting, fork_server: ForkServer |
         text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
         message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice
         raise InvalidArgumentError(message) from None
-
-
-def check_sandbox(hosting: AgentHosting, decision: Component[DecisionModel]) -> None:
-    """Check that agents can be shut in.
-
-    Args:
-        hosting: Settings of the processes.
-        decision: The run's decision model.
-
-    Raises:
-        InvalidArgumentError: They cannot, and why.
-    """
-    reason = why_not()
-    if hosting.is_in_process:
-        reason = reason or "agents run in the evaluator's own process: use one worker or more"
-    if reason := reason or why_not_shut_in(decision):
-        raise InvalidArgumentError(f"isolation = sandbox: {reason}")
 
 
 def _new_scratch(hosting: AgentHosting) -> Path:

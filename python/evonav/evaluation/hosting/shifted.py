@@ -166,9 +166,13 @@ class ShiftedAgent(HostedAgent):
         """Start the search for a new goal, which has no places."""
         self._agent.begin_stage(goal)
 
-    def act(self, observation: Observation) -> AgentAction:
+    def look(self, observation: Observation) -> None:
+        """Take the observation of a decision round."""
+        self._agent.look(self._shift.shifted_observation(observation))
+
+    def act(self) -> AgentAction:
         """Decide what to do in one decision round."""
-        return self._shift.unshifted_action(self._agent.act(self._shift.shifted_observation(observation)))
+        return self._shift.unshifted_action(self._agent.act())
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return what the agent said of the last round, right after it."""

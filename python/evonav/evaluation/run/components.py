@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
+from evonav.agents.hosting.sandbox import why_not
 from evonav.agents.registry import BUILT_IN, RULE_MARK, agent_descriptions, agent_factory, new_agent
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
@@ -15,6 +16,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.fork_server import ForkServer
+from evonav.evaluation.hosting.model_relay import why_not_shut_in
 from evonav.evaluation.hosting.process import AgentHosting, check_importable
 from evonav.evaluation.hosting.processes import new_fork_server
 from evonav.perception import Perception
@@ -234,3 +236,20 @@ def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_
 def _config(hfov_deg: float = USUAL_CAMERA["hfov_deg"], **values: Any) -> SimulatorConfig:  # noqa: ANN401 - its fields
     config = SimulatorConfig(**values)
     return replace(config, vertical_fov_deg=vertical_fov_deg(hfov_deg, config.width_px, config.height_px))
+
+
+def check_sandbox(hosting: AgentHosting, decision: Component[DecisionModel]) -> None:
+    """Check that agents can be shut in.
+
+    Args:
+        hosting: Settings of the processes.
+        decision: The run's decision model.
+
+    Raises:
+        InvalidArgumentError: They cannot, and why.
+    """
+    reason = why_not()
+    if hosting.is_in_process:
+        reason = reason or "agents run in the evaluator's own process: use one worker or more"
+    if reason := reason or why_not_shut_in(decision):
+        raise InvalidArgumentError(f"isolation = sandbox: {reason}")

@@ -14,14 +14,14 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.spec import drawn_shift_m, opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.model_relay import is_relayed
-from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting, check_sandbox
+from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
-from evonav.evaluation.run.components import Backend, check_agent_names
+from evonav.evaluation.run.components import Backend, check_agent_names, check_sandbox
 from evonav.evaluation.run.program import PROGRAM
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress as Progress  # also for those who import it from here
