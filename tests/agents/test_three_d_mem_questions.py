@@ -23,12 +23,12 @@ def goal(text, category):
 MUG_GOAL = goal("Please navigate to the mug in the kitchen on the countertop next to the sink.", "Mug")
 
 
-def pixels(shade):
-    return np.full((4, 6, 3), shade, np.uint8)
+def picture(shade):
+    return Picture(np.full((4, 6, 3), shade, np.uint8))
 
 
 def thing(entry_id, label, x, z, *, y=0.4, size=(0.5, 0.8, 0.5), seen=3):
-    return ObjectCandidate(entry_id, label, (x, y, z), size, seen, pixels(entry_id))
+    return ObjectCandidate(entry_id, label, (x, y, z), size, seen, picture(entry_id))
 
 
 COUNTER = thing(2, "CounterTop", 6.0, 2.0, y=0.45, size=(2.0, 0.9, 0.6))
@@ -39,14 +39,14 @@ FRIDGE = thing(6, "Fridge", 7.5, 2.0, y=0.9, size=(0.7, 1.8, 0.7))
 BED = thing(7, "Bed", 1.0, 6.0, size=(1.5, 0.6, 2.0))
 ALL = (COUNTER, SINK, MUG_ON_TABLE, MUG_ON_COUNTER, FRIDGE)
 FRONTIERS = (
-    FrontierCandidate(8, (0.0, 1.0), 1.0, pixels(80)),
-    FrontierCandidate(9, (6.0, 4.0), 3.5, pixels(90)),
+    FrontierCandidate(8, (0.0, 1.0), 1.0, picture(80)),
+    FrontierCandidate(9, (6.0, 4.0), 3.5, picture(90)),
 )
 
 
 def snapshot_question(*snapshots, frontiers=FRONTIERS, rounds=40, stage=MUG_GOAL):
-    views = [SnapshotCandidate(10 + i, objects, pixels(100 + i)) for i, objects in enumerate(snapshots)]
-    return SnapshotQuestion(stage, (0.0, 0.0), views, frontiers, ALL, rounds, heading_view=pixels(1))
+    views = [SnapshotCandidate(10 + i, objects, picture(100 + i)) for i, objects in enumerate(snapshots)]
+    return SnapshotQuestion(stage, (0.0, 0.0), views, frontiers, ALL, rounds, heading_view=picture(1))
 
 
 SHOWN = snapshot_question([MUG_ON_TABLE], [COUNTER, MUG_ON_COUNTER])

@@ -59,7 +59,7 @@ def test_the_image_leaves_no_more_of_the_sentence_than_the_category() -> None:
     [("image", "Goal of the robot: Please navigate to the mug."), ("both", f"Goal of the robot: {SENTENCE}")],
 )
 def test_prompts_show_the_picture_right_after_the_goal(goal_input: GoalInput, first: str) -> None:
-    prompt = goal_prompt(goal_as_given(GOAL, goal_input), "Where?", ("Ahead:", GREY))
+    prompt = goal_prompt(goal_as_given(GOAL, goal_input), "Where?", ("Ahead:", Picture(GREY)))
     assert prompt.text == f"{first}\nThis picture shows it, in the middle:\n<image>\nWhere?\nAhead:\n<image>"
     assert [picture.pixels is pixels for picture, pixels in zip(prompt.pictures, (IMAGE, GREY), strict=True)] == [
         True

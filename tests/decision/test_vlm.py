@@ -152,11 +152,26 @@ def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: 
         store.close()
         with sqlite3.connect(store.path) as db:
             dumps.append(sorted(db.iterdump()))
-            ((name, file),) = db.execute("SELECT name, webp FROM pictures").fetchall()
+            ((name, file),) = db.execute("SELECT name, file FROM pictures").fetchall()
         assert name == Picture(IMAGE).name
         assert np.array_equal(np.asarray(Image.open(BytesIO(file))), IMAGE)
         db.close()
     assert dumps[0] == dumps[1]
+
+
+def test_an_image_that_an_agent_keeps_as_a_file_is_stored_as_that_file(tmp_path: Path) -> None:
+    path = tmp_path / "exchanges.sqlite"
+    buffer = BytesIO()
+    Image.fromarray(IMAGE).save(buffer, "JPEG")
+    picture = Picture(buffer.getvalue())
+    with sqlite3.connect(path) as db:  # of an earlier version
+        db.execute("CREATE TABLE pictures (name TEXT PRIMARY KEY, webp BLOB NOT NULL) STRICT")
+    store = ResponseCache(path)
+    store.put({"n": 1}, (picture,), {})
+    store.close()
+    with sqlite3.connect(path) as db:
+        assert db.execute("SELECT * FROM pictures").fetchall() == [(picture.name, picture.source)]
+    db.close()
 
 
 def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: Path) -> None:

@@ -8,7 +8,8 @@ from scripted_model import Scripted
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
-from evonav.decision.prompts import Picture, Text
+from evonav.decision.pictures import Picture
+from evonav.decision.prompts import Text
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
@@ -86,7 +87,7 @@ def of(recorder, kind):
 def test_the_heading_view_is_the_last_one_seen(recorded):
     _, recorder = recorded
     for question, num_views, _, _ in of(recorder, ChooseQuestion):
-        shares = [difference(question.heading_view, view.rgb) for view in recorder.views[:num_views]]
+        shares = [difference(question.heading_view.pixels, view.rgb) for view in recorder.views[:num_views]]
         assert shares[-1] < SAME
 
 
@@ -96,12 +97,12 @@ def test_a_crop_shows_the_object_and_a_view_is_where_it_was_last_seen(recorded):
     for question, num_views, _, entries in of(recorder, ChooseQuestion):
         for candidate in question.objects:
             crops = [crop for view in recorder.views[:num_views] for crop in padded_boxes(view, candidate.label)]
-            assert min(difference(candidate.crop, crop) for crop in crops) < SAME, candidate.label
+            assert min(difference(candidate.crop.pixels, crop) for crop in crops) < SAME, candidate.label
             # The object memory counts views by itself, from 1; a clean-up may have merged entries since.
             entry = entries.get(candidate.entry_id)
             if entry is not None and entry.label == candidate.label:
                 last = recorder.views[entry.last_seen_view - 1]
-                assert difference(candidate.view, last.rgb) < SAME, candidate.label
+                assert difference(candidate.view.pixels, last.rgb) < SAME, candidate.label
                 num += 1
     assert num > 20
 
@@ -110,7 +111,7 @@ def test_a_frontier_is_shown_by_a_view_towards_it(recorded):
     _, recorder = recorded
     for question, num_views, _, _ in of(recorder, ChooseQuestion):
         for frontier in question.frontiers:
-            shown = [view for view in recorder.views[:num_views] if difference(frontier.image, view.rgb) < SAME]
+            shown = [view for view in recorder.views[:num_views] if difference(frontier.image.pixels, view.rgb) < SAME]
             assert shown
             off_axis = []
             for view in shown:
@@ -127,10 +128,10 @@ def test_verification_shows_the_stored_crop_and_the_views_of_the_arrival(recorde
         expected = now if views == "all" else now[-1:]
         assert len(question.views) == len(expected)
         for shown, view in zip(question.views, expected, strict=True):
-            assert difference(shown, view.rgb) < SAME
+            assert difference(shown.pixels, view.rgb) < SAME
         seen = recorder.views[:num_views]
         crops = [crop for view in seen for crop in padded_boxes(view, question.entry.label)]
-        assert min(difference(question.entry.crop, crop) for crop in crops) < SAME
+        assert min(difference(question.entry.crop.pixels, crop) for crop in crops) < SAME
 
 
 def test_prompts_put_each_picture_under_its_title(recorded):
@@ -141,7 +142,7 @@ def test_prompts_put_each_picture_under_its_title(recorded):
     for before, part in pairwise(parts):
         if isinstance(part, Picture):
             assert isinstance(before, Text)
-            titled[before.text.splitlines()[-1]] = part.pixels
+            titled[before.text.splitlines()[-1]] = part
     assert titled["What the robot sees ahead:"] is question.heading_view
     for index, candidate in enumerate(question.objects):
         assert titled[f"Object {index}: {candidate.label}"] is candidate.crop

@@ -11,13 +11,14 @@ import numpy as np
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.pictures import Picture, crop_of, picture_of
 from evonav.decision.text.language import canonical
 from evonav.memory import ObjectMap, ObjectMapConfig, forgetting
 from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry, ObjectUpdate
 from evonav.memory.occupancy import FREE, UNKNOWN
-from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
+from evonav.memory.views import StoredView, ViewStore
 from evonav.sensors.observation import MapFrame, Observation, View
 
 DAY_S = 86400.0
@@ -213,7 +214,7 @@ class Navigator:
         return replace(
             candidate,
             crop=None if best is None else crop_of(best[0], best[1].box_px),
-            view=None if latest is None else pixels_of(latest, self.config.image_px),
+            view=None if latest is None else picture_of(latest, self.config.image_px),
         )
 
     def frontier_candidates(self, here: Point2, *, with_images: bool = False) -> list[FrontierCandidate]:
@@ -237,7 +238,7 @@ class Navigator:
             for frontier, distance_m in zip(frontiers, distances_m, strict=True)
         ]
 
-    def image_towards(self, place_m: Point2) -> Pixels | None:
+    def image_towards(self, place_m: Point2) -> Picture | None:
         """Return a frontier as the agent saw it: the stored view whose axis points most nearly at it.
 
         3D-Mem renders a fresh view for each new frontier. Here one of the stored views must do, since no agent may look
@@ -253,7 +254,7 @@ class Navigator:
             cost = off_axis_rad + 0.1 * distance_m
             if best is None or cost < best[0]:
                 best = (cost, view)
-        return None if best is None else pixels_of(best[1], self.config.image_px)
+        return None if best is None else picture_of(best[1], self.config.image_px)
 
 
 def _mean(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:

@@ -17,13 +17,13 @@ from evonav.agents.agent import (
 )
 from evonav.agents.explanation import entry_belief, frontier_beliefs
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
-from evonav.decision.candidates import FrontierCandidate, Pixels, Point2
+from evonav.decision.candidates import FrontierCandidate, Point2
 from evonav.decision.goal_input import goal_as_given, goal_input_of
+from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import TextMatch
 from evonav.memory import Frontier
-from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
@@ -96,10 +96,10 @@ class NavigatorAgent(ABC):
     def act(self, observation: Observation) -> AgentAction:
         """Decide what to do in one decision round."""
 
-    def _heading_view(self) -> Pixels | None:
+    def _heading_view(self) -> Picture | None:
         """Return the heading view of the last round for a prompt, if the model looks at images."""
         view = self._navigator.round_views[-1]
-        return pixels_of(view, self._navigator.config.image_px) if self._shows_images else None
+        return picture_of(view, self._navigator.config.image_px) if self._shows_images else None
 
     def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them, with images if the model looks at them."""

@@ -3,17 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from evonav.decision.pictures import Picture
 from evonav.memory.colours import Layout
 
 Point2 = tuple[float, float]
 """`(x, z)` in metres."""
 Point3 = tuple[float, float, float]
 """`(x, y, z)` in metres."""
-Pixels = NDArray[np.uint8]
-"""`(H, W, 3)` RGB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +35,9 @@ class ObjectCandidate:
     centre_m: Point3
     size_m: Point3
     num_detections: int
-    crop: Pixels | None = field(default=None, compare=False, repr=False)
+    crop: Picture | None = field(default=None, compare=False, repr=False)
     """The object, cut out of its best view."""
-    view: Pixels | None = field(default=None, compare=False, repr=False)
+    view: Picture | None = field(default=None, compare=False, repr=False)
     """The view in which the object was last seen."""
     appearance: Appearance | None = field(default=None, compare=False, repr=False)
     """Its appearance, if the decision model asks for colours."""
@@ -60,7 +56,7 @@ class FrontierCandidate:
     position_m: Point2
     travel_m: float
     """Distance from the agent: along its map for rules that look, else straight."""
-    image: Pixels | None = field(default=None, compare=False, repr=False)
+    image: Picture | None = field(default=None, compare=False, repr=False)
     """The view towards the frontier."""
     is_current: bool = False
     """Whether the agent is on its way there."""

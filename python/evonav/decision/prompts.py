@@ -1,15 +1,11 @@
 """Build prompts: text and images in turns."""
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from evonav.decision.goal_input import PictureGoal
+from evonav.decision.pictures import Picture as Picture
 from evonav.tasks.public import Goal
 
 
@@ -18,24 +14,6 @@ class Text:
     """A text in a prompt."""
 
     text: str
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """An image in a prompt."""
-
-    pixels: NDArray[np.uint8]
-    """`(H, W, 3)` RGB."""
-
-    @cached_property
-    def name(self) -> str:
-        """Name of the image where a request is stored: `sha256:` and the hash of its shape and values.
-
-        It is not the hash of its file, whose bytes depend on the compression.
-        """
-        height, width = self.pixels.shape[:2]
-        values = f"{width}x{height} RGB\n".encode() + self.pixels.tobytes()
-        return "sha256:" + hashlib.sha256(values).hexdigest()
 
 
 Part = Text | Picture
@@ -83,7 +61,7 @@ class Prompt:
         return Prompt(turns, self.schema)
 
 
-def goal_prompt(goal: Goal, *contents: str | tuple[str, NDArray[np.uint8] | None]) -> Prompt:
+def goal_prompt(goal: Goal, *contents: str | tuple[str, Picture | None]) -> Prompt:
     """Return the prompt of a question about a goal.
 
     The goal is the unified instruction alone, as in the reported experiments (paper, Sec. C.1), unless agents go by its
@@ -96,11 +74,12 @@ def goal_prompt(goal: Goal, *contents: str | tuple[str, NDArray[np.uint8] | None
     """
     parts: list[Part] = []
     lines = [f"Goal of the robot: {goal.unified_instruction}"]
-    picture = [("This picture shows it, in the middle:", goal.reference_image)] if isinstance(goal, PictureGoal) else []
-    for content in (*picture, *contents):
-        title, image = (content, None) if isinstance(content, str) else content
+    if isinstance(goal, PictureGoal):
+        contents = (("This picture shows it, in the middle:", Picture(goal.reference_image)), *contents)
+    for content in contents:
+        title, picture = (content, None) if isinstance(content, str) else content
         lines.append(title)
-        if image is not None:
-            parts += [Text("\n".join(lines)), Picture(image)]
+        if picture is not None:
+            parts += [Text("\n".join(lines)), picture]
             lines = []
     return Prompt.of(*parts, *(["\n".join(lines)] if lines else []))

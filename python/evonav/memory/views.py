@@ -1,6 +1,7 @@
 """Store views for prompts and for a second look: a small image each, with its detections."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 
@@ -151,26 +152,40 @@ class ViewStore:
         return None if found is None else self.views[found]
 
 
-def pixels_of(view: StoredView, size_px: int | None = None) -> NDArray[np.uint8] | None:
-    """Return the `(H, W, 3)` image of a view, its longer edge at most `size_px`; `None` if it had no colours."""
-    if view.jpeg is None:
-        return None
-    with Image.open(BytesIO(view.jpeg)) as image:
-        picture = image.convert("RGB")
-    if size_px is not None and max(picture.size) > size_px:
-        picture.thumbnail((size_px, size_px))
+def pixels_of(jpeg: bytes) -> NDArray[np.uint8]:
+    """Return the `(H, W, 3)` image in a JPEG file.
+
+    Raises:
+        InvalidArgumentError: The file is no JPEG.
+    """
+    with _opened(jpeg) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def jpeg_size(jpeg: bytes) -> tuple[int, int]:
+    """Return width and height in pixels of a JPEG file.
+
+    Raises:
+        InvalidArgumentError: The file is no JPEG.
+    """
+    with _opened(jpeg) as image:
+        return image.size
+
+
+@contextmanager
+def _opened(jpeg: bytes) -> Iterator[Image.Image]:
+    try:
+        with Image.open(BytesIO(jpeg), formats=("JPEG",)) as image:
+            yield image
+    except Exception as error:  # Pillow has many kinds for files that are broken
+        raise InvalidArgumentError(f"jpeg: no image: {error}") from error
+
+
+def thumbnail(pixels: NDArray[np.uint8], size_px: int) -> NDArray[np.uint8]:
+    """Return an image of which the longer edge has `size_px` pixels."""
+    picture = Image.fromarray(pixels)
+    picture.thumbnail((size_px, size_px))
     return np.asarray(picture)
-
-
-def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> NDArray[np.uint8] | None:
-    """Return a part of a view with a margin around it (3D-Mem: 20 px)."""
-    picture = pixels_of(view)
-    if picture is None:
-        return None
-    left, top, right, bottom = box_px
-    return np.ascontiguousarray(
-        picture[max(0, top - margin_px) : bottom + margin_px, max(0, left - margin_px) : right + margin_px]
-    )
 
 
 def boxes_of(detections: Detections) -> list[tuple[int, Box]]:

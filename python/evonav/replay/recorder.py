@@ -15,7 +15,7 @@ from evonav.agents.agent import Agent, Belief
 from evonav.agents.explanation import inspectable
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.change_notice import with_notice
-from evonav.decision.prompts import Picture
+from evonav.decision.pictures import Picture
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
 from evonav.evaluation.episode.outcome import StageOutcome

@@ -10,11 +10,11 @@ from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateCo
 from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion, identity_question
 from evonav.agents.frontier_update.relook import FirstLook, RelookConfig, place_from_another_side
 from evonav.agents.navigator import Target
-from evonav.decision.candidates import Pixels, Point2, Point3
+from evonav.decision.candidates import Point2, Point3
+from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence
-from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 
@@ -173,11 +173,11 @@ class FailThenUpdate(FrontierUpdate):
         """Return the views of a round that verification looks at."""
         return observation.views if self._verification.verify_views == "all" else observation.views[-1:]
 
-    def _images_to_verify(self) -> list[Pixels]:
+    def _images_to_verify(self) -> list[Picture]:
         """Return the images of these views, if the model looks at images."""
         navigator = self._navigator
         views = navigator.round_views if self._verification.verify_views == "all" else navigator.round_views[-1:]
-        images = (pixels_of(view, navigator.config.image_px) for view in views)
+        images = (picture_of(view, navigator.config.image_px) for view in views)
         return [image for image in images if image is not None]
 
     def _look_again(self, entry: ObjectEntry, observation: Observation, why: str) -> AgentAction | None:

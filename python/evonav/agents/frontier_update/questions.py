@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from evonav.agents.navigator import Navigator
-from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.text.language import canonical
@@ -35,11 +36,11 @@ class ChooseQuestion(ClosedQuestion[Choice]):
     num_rounds_left: int
     unseen_m2: float = 0.0
     """Area that the map does not know, for rules that look. Not part of the prompt."""
-    heading_view: Pixels | None = field(default=None, compare=False, repr=False)
+    heading_view: Picture | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
         """Show the heading view, each object with its crop and last view, each frontier with its image."""
-        objects: list[tuple[str, Pixels | None]] = []
+        objects: list[tuple[str, Picture | None]] = []
         for index, candidate in enumerate(self.objects):
             objects.append((f"Object {index}: {candidate.label}", candidate.crop))
             if candidate.view is not None:
@@ -126,7 +127,7 @@ class VerifyQuestion(YesNoQuestion):
     """Objects in the present views, for models that do not look at images. Not part of the prompt."""
     evidence: DepthEvidence
     """Its points compared with the present depth. Not part of the prompt."""
-    views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
+    views: Sequence[Picture] = field(default=(), compare=False, repr=False)
     """Present views, the facing view last."""
 
     def prompt(self) -> Prompt:

@@ -7,7 +7,8 @@ import numpy as np
 
 from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import places_around
-from evonav.decision.candidates import Pixels, Point2
+from evonav.decision.candidates import Point2
+from evonav.decision.pictures import Picture
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
 from evonav.sensors.observation import View
@@ -35,7 +36,7 @@ class FirstLook:
 
     entry_id: int
     views: tuple[View, ...]
-    images: tuple[Pixels, ...]
+    images: tuple[Picture, ...]
     """The same for a prompt; empty if the model does not look at images."""
 
 

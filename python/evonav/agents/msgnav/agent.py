@@ -21,10 +21,10 @@ from evonav.agents.msgnav.viewpoint import Viewpoint, ViewpointConfig, visible_v
 from evonav.agents.navigator import NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.pictures import picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
-from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
@@ -159,7 +159,7 @@ class MsgNav(NavigatorAgent):
         navigator = self._navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
-        images = [pixels_of(view, config.navigator.image_px) for view in views] if self._shows_images else []
+        images = [picture_of(view, config.navigator.image_px) for view in views] if self._shows_images else []
         return ArrivalQuestion(
             goal=self._goal,
             target=target.candidate if entry is None else navigator.candidate(entry),

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from evonav.decision.candidates import ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.pictures import Picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +45,7 @@ class GraphImage:
     """True if the view is of this round."""
     seen: Sequence[SeenObject]
     """Detections, for models that do not look at images. Not part of the prompt."""
-    pixels: Pixels | None = field(default=None, compare=False, repr=False)
+    picture: Picture | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,11 @@ from evonav.agents.msgnav.candidates import GraphImage, GraphObject, SeenObject
 from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.navigator import Navigator
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.pictures import picture_of
 from evonav.decision.text.language import canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.clouds import ViewClouds, clouds_of
-from evonav.memory.views import StoredView, pixels_of
+from evonav.memory.views import StoredView
 from evonav.sensors.observation import Observation
 
 _MIN_SIMILARITY = 0.4
@@ -81,8 +82,8 @@ class GraphMemory:
         for one, box_m in zip(view.seen, self._clouds[view.id].boxes_m, strict=True):
             centre_m = None if box_m is None else (box_m[0][0], box_m[0][2])
             seen.append(SeenObject(one.label, self._alive(one.entry_id), one.area_px, centre_m))
-        pixels = None if image_px is None else pixels_of(view, image_px)
-        return GraphImage(view.id, is_egocentric, tuple(seen), pixels)
+        picture = None if image_px is None else picture_of(view, image_px)
+        return GraphImage(view.id, is_egocentric, tuple(seen), picture)
 
     def _alive(self, entry_id: int | None) -> int | None:
         """Return the entry that an entry was merged into, if it still exists."""

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesNoQuestion, first_line, lines_of
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
@@ -139,7 +140,7 @@ class GraphQuestion(Question[GraphChoice]):
             + ("\n".join(objects) or "none")
             + "\nPairs of objects that were seen together, one a line: id, id, [numbers of the images].\n"
             + ("\n".join(edges) or "none"),
-            *((f"Image {i}, {what[image.is_egocentric]}:", image.pixels) for i, image in enumerate(self.images)),
+            *((f"Image {i}, {what[image.is_egocentric]}:", image.picture) for i, image in enumerate(self.images)),
             "What it chose before in this search:\n" + ("\n".join(past) or "nothing") + "\n"
             f"This is round {self.round + 1} of {self.max_rounds}. Do not repeat what was not correct. Answer on "
             'the first line with exactly one of "Object id", if this object is the goal; "Image i, category", if '
@@ -328,7 +329,7 @@ class ArrivalQuestion(YesNoQuestion):
     """Number of frontiers. Not part of the prompt."""
     num_rounds_left: int
     """Number of rounds that are left. Not part of the prompt."""
-    views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
+    views: Sequence[Picture] = field(default=(), compare=False, repr=False)
     """Views, the most recent first."""
 
     def prompt(self) -> Prompt:

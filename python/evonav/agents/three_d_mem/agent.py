@@ -11,9 +11,9 @@ from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.pictures import crop_of, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import is_structure
-from evonav.memory.views import crop_of, pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 
@@ -126,7 +126,7 @@ class ThreeDMem(NavigatorAgent):
             seen = navigator.views.seen_in(view, entry_id) if self._shows_images else None
             crop = None if seen is None else crop_of(view, seen.box_px)
             objects.append(replace(remembered[entry_id], crop=crop))
-        image = pixels_of(view, navigator.config.image_px) if self._shows_images else None
+        image = picture_of(view, navigator.config.image_px) if self._shows_images else None
         return SnapshotCandidate(view.id, objects, image)
 
     def _go_to_object(self, chosen: ObjectCandidate, reason: str) -> AgentAction:

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
@@ -24,7 +25,7 @@ class SnapshotCandidate:
     view_id: int
     objects: Sequence[ObjectCandidate]
     """The objects, at least one; their crops are from this view."""
-    image: Pixels | None = field(default=None, compare=False, repr=False)
+    image: Picture | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +110,11 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
     """Number of rounds that are left. Not part of the prompt."""
     unseen_m2: float = 0.0
     """Area that the map does not know, for rules that look. Not part of the prompt."""
-    heading_view: Pixels | None = field(default=None, compare=False, repr=False)
+    heading_view: Picture | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
         """Show the heading view, each snapshot with its image and crops, each frontier with its image."""
-        snapshots: list[tuple[str, Pixels | None]] = []
+        snapshots: list[tuple[str, Picture | None]] = []
         for index, snapshot in enumerate(self.snapshots):
             snapshots.append((f"Snapshot {index}:", snapshot.image))
             for number, candidate in enumerate(snapshot.objects):

@@ -21,6 +21,7 @@ from evonav.agents.unigoal.scene_questions import (
     RoomQuestion,
 )
 from evonav.decision.candidates import Point2
+from evonav.decision.pictures import Picture
 from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
@@ -109,7 +110,7 @@ class GraphReasoner:
         text: str | None = goal.unified_instruction
         objects: tuple[str, ...]
         if self.config.goal_input == "image":
-            text = ask(DescribeQuestion(goal, goal.reference_image))
+            text = ask(DescribeQuestion(goal, Picture(goal.reference_image)))
         if self.config.goal_input == "category" or text is None:
             text, objects = goal.category, (canonical(goal.category),)
             self.goal_graph = GoalGraph(objects)

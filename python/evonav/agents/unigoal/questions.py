@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
-from evonav.decision.candidates import Pixels
-from evonav.decision.prompts import Picture, Prompt
+from evonav.decision.pictures import Picture
+from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.language import canonical, parse_goal
 from evonav.decision.text.matcher import Matcher
@@ -60,12 +60,12 @@ class DescribeQuestion(Question[str]):
 
     kind: ClassVar[str] = "describe"
     goal: Goal
-    image: Pixels = field(compare=False, repr=False)
+    image: Picture = field(compare=False, repr=False)
 
     def prompt(self) -> Prompt:
         """Show the reference image."""
         return Prompt.of(
-            Picture(self.image),
+            self.image,
             "A robot is to find the object in the middle of this image. Describe it and how it stands to the "
             "things around it, in one sentence on one line.",
         )

@@ -7,19 +7,19 @@ Retries of lost connections, of 429 and of 5xx are the SDK's, which honours `Ret
 Keys come from the caller or the environment, are sent in the header, and appear in no file, record or message.
 """
 
-import base64
 import os
 import threading
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import TYPE_CHECKING, Literal
 from urllib.parse import unquote, urlsplit
 
-import numpy as np
+from pydantic_core import to_json
 
-from evonav import _core
-from evonav.decision.prompts import Picture, Prompt, Text, Turn
+from evonav.decision.pictures import Picture
+from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
 from evonav.decision.vlm.answer import Answer, read_answer, read_response, usage_of
 from evonav.decision.vlm.caching_client import CachingClient, Mode
@@ -134,7 +134,7 @@ class VlmClient(CachingClient):
         return {**request, "attempt": attempt} if attempt and self.config.seed is None else request
 
     def request_of(
-        self, prompt: Prompt, url_of: Callable[[Picture], str] | None = None, attempt: int = 0
+        self, prompt: Prompt, url_of: Callable[[Picture], str] = attrgetter("data_url"), attempt: int = 0
     ) -> JsonObject:
         """Return the body that is posted to `/chat/completions`.
 
@@ -144,7 +144,6 @@ class VlmClient(CachingClient):
             attempt: Number that is added to the seed.
         """
         config = self.config
-        url_of = url_of or _data_url
         request: JsonObject = {
             "model": config.model,
             "messages": [_message(turn, config.image_detail, url_of) for turn in prompt.turns],
@@ -168,8 +167,7 @@ class VlmClient(CachingClient):
             if isinstance(part, Text):
                 tokens += 8 + len(part.text) / CHARACTERS_PER_TOKEN
             else:
-                height, width = part.pixels.shape[:2]
-                tokens += image_tokens((width, height), self.config.image_detail)
+                tokens += image_tokens(part.size_px, self.config.image_detail)
         return Usage(int(tokens) + 1, self.config.max_tokens)
 
     def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
@@ -196,8 +194,8 @@ class VlmClient(CachingClient):
         import openai
 
         try:
-            raw = sdk.chat.completions.with_raw_response.create(**request)
-            text = raw.text if isinstance(raw.text, str) else raw.text()
+            # Its method for chats would look through the request, which is a megabyte of images, three times.
+            text = sdk.post("/chat/completions", content=to_json(request), cast_to=str)
         except openai.APITimeoutError as error:
             raise VlmError("timeout", f"no answer in {self.config.timeout_s:g} s") from error
         except openai.APIConnectionError as error:
@@ -238,14 +236,13 @@ class VlmClient(CachingClient):
                 key = self._key()
                 if not key and base_url is None:
                     raise DecisionError(f"asking a model needs a key: set {KEY_VARIABLE}, or give a base URL")
-                http = openai.DefaultHttpxClient(follow_redirects=False)
-                weakref.finalize(self, http.close)
+                self._connections = _Connections.shared()
                 self._sdk = openai.OpenAI(
                     api_key=key or "none",
                     base_url=base_url,
                     timeout=self.config.timeout_s,
                     max_retries=self.config.max_retries,
-                    http_client=http,
+                    http_client=self._connections.http,
                 )
             return self._sdk
 
@@ -271,6 +268,29 @@ class VlmClient(CachingClient):
         return without_secrets(text, (self._key(), unquote(urlsplit(url).password or "")))
 
 
+class _Connections:
+    """The connections of all clients of this process: if each had its own, it would read all certificates again."""
+
+    _lock = threading.Lock()
+    _open: "weakref.ref[_Connections] | None" = None
+
+    def __init__(self) -> None:
+        import openai
+
+        self.http = openai.DefaultHttpxClient(follow_redirects=False)
+        weakref.finalize(self, self.http.close)
+
+    @classmethod
+    def shared(cls) -> "_Connections":
+        """Return those that are open; they are closed when the last client is gone."""
+        with cls._lock:
+            found = None if cls._open is None else cls._open()
+            if found is None:
+                found = cls()
+                cls._open = weakref.ref(found)
+            return found
+
+
 def _message(turn: Turn, detail: str, url_of: Callable[[Picture], str]) -> JsonObject:
     if turn.role != "user":
         return {"role": turn.role, "content": "".join(part.text for part in turn.parts if isinstance(part, Text))}
@@ -281,8 +301,3 @@ def _message(turn: Turn, detail: str, url_of: Callable[[Picture], str]) -> JsonO
         else:
             content.append({"type": "image_url", "image_url": {"url": url_of(part), "detail": detail}})
     return {"role": "user", "content": content}
-
-
-def _data_url(picture: Picture) -> str:
-    png = _core.encode_png(np.ascontiguousarray(picture.pixels))
-    return "data:image/png;base64," + base64.b64encode(png).decode()

@@ -16,7 +16,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
-from evonav.decision.prompts import Picture, Prompt, Text, Turn
+from evonav.decision.pictures import Picture
+from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
@@ -37,7 +38,7 @@ _Edge = Annotated[int, Field(ge=1, le=MAX_EDGE_PX)]
 class _Turn:
     role: Literal["system", "user", "assistant"]
     parts: list[str | int]
-    """Texts, and indices of images."""
+    """Texts, and numbers of images."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +49,15 @@ class _Prompt:
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """The arguments of `CachingClient.ask_first`; the images' pixels follow the message, row by row, in order."""
+    """The arguments of `CachingClient.ask_first`; the images follow the message, in order: pixels row by row, files."""
 
     prompts: Annotated[list[_Prompt], Field(min_length=1, max_length=10)]
     attempt: Annotated[int, Field(ge=0, le=1000)]
     otherwise: Annotated[int, Field(ge=0, le=9)]
     images: list[tuple[_Edge, _Edge]]
-    """Height and width of each."""
+    """Height and width of each that comes as pixels."""
+    files: list[Annotated[int, Field(ge=1)]]
+    """Size of each that comes as a JPEG file. Images are counted on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,9 @@ class Response:
     error: str | None = None
     """The message of a failure, or of another `DecisionError` if there is no kind."""
 
+
+Known = dict[tuple[int, int, bytes], Picture]
+"""Pictures by height and width, 0 for a file, and content."""
 
 _request: Callable[[], TypeAdapter[_Request]] = cache(lambda: TypeAdapter(_Request))
 response_type: Callable[[], TypeAdapter[Response]] = cache(lambda: TypeAdapter(Response))
@@ -130,8 +136,10 @@ class RelayedClient:
 
 def request_bytes(prompts: Sequence[Prompt], attempt: int, otherwise: int) -> bytes:
     """Return the message that asks for `CachingClient.ask_first`. Prompts that share an image send it once."""
-    pixels = {id(part): np.ascontiguousarray(part.pixels, np.uint8) for prompt in prompts for part in prompt.pictures}
-    places = {key: index for index, key in enumerate(pixels)}
+    shown = {id(picture): picture for prompt in prompts for picture in prompt.pictures}
+    files = {key: picture.source for key, picture in shown.items() if isinstance(picture.source, bytes)}
+    pixels = {key: np.ascontiguousarray(shown[key].source, np.uint8) for key in shown if key not in files}
+    places = {key: index for index, key in enumerate((*pixels, *files))}
     forms = [
         _Prompt(
             [
@@ -142,16 +150,22 @@ def request_bytes(prompts: Sequence[Prompt], attempt: int, otherwise: int) -> by
         )
         for prompt in prompts
     ]
-    request = _Request(forms, attempt, otherwise, [image.shape[:2] for image in pixels.values()])
-    return b"".join((_request().dump_json(request), b"\n", *(image.data for image in pixels.values())))
+    shapes = [image.shape[:2] for image in pixels.values()]
+    request = _Request(forms, attempt, otherwise, shapes, [len(file) for file in files.values()])
+    return b"".join((_request().dump_json(request), b"\n", *(image.data for image in pixels.values()), *files.values()))
 
 
-def read_request(message: bytes) -> tuple[list[Prompt], int, int]:
+def read_request(message: bytes, known: Known | None = None) -> tuple[list[Prompt], int, int]:
     """Return the prompts, the attempt and `otherwise` of a message.
+
+    Args:
+        message: Bytes that `request_bytes` returned.
+        known: The pictures of the last question, most of which come again; they become those of this one.
 
     Raises:
         InvalidArgumentError: It is no request; the error names the field.
     """
+    known = {} if known is None else known
     text, _, rest = message.partition(b"\n")  # JSON has no line ends
     try:
         request = _request().validate_json(text, strict=True)
@@ -160,14 +174,32 @@ def read_request(message: bytes) -> tuple[list[Prompt], int, int]:
         raise InvalidArgumentError(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}") from error
     if request.otherwise >= len(request.prompts):
         raise InvalidArgumentError(f"otherwise = {request.otherwise}: of {len(request.prompts)} prompts")
-    ends = list(accumulate((3 * height * width for height, width in request.images), initial=0))
+    sizes = [*((height, width, 3 * height * width) for height, width in request.images)]
+    sizes += [(0, 0, size) for size in request.files]
+    ends = list(accumulate((size for _, _, size in sizes), initial=0))
     if ends[-1] != len(rest):
         raise InvalidArgumentError(f"images: expected {ends[-1]} bytes, got {len(rest)}")
     pictures = [
-        Picture(np.frombuffer(rest, np.uint8, 3 * height * width, start).reshape(height, width, 3))
-        for (height, width), start in zip(request.images, ends, strict=False)
+        _picture((height, width, rest[start : start + size]), known)
+        for (height, width, size), start in zip(sizes, ends, strict=False)
     ]
-    return [_prompt_of(prompt, pictures) for prompt in request.prompts], request.attempt, request.otherwise
+    if pictures:
+        known.clear()
+        known.update(pictures)
+    shown = [picture for _, picture in pictures]
+    return [_prompt_of(prompt, shown) for prompt in request.prompts], request.attempt, request.otherwise
+
+
+def _picture(key: tuple[int, int, bytes], known: Known) -> tuple[tuple[int, int, bytes], Picture]:
+    if key in known:
+        return key, known[key]
+    height, width, content = key
+    if height:
+        return key, Picture(np.frombuffer(content, np.uint8).reshape(height, width, 3))
+    picture = Picture(content)
+    if max(picture.size_px) > MAX_EDGE_PX:
+        raise InvalidArgumentError(f"files: an image of {picture.size_px} px: must be at most {MAX_EDGE_PX}")
+    return key, picture
 
 
 def _prompt_of(prompt: _Prompt, pictures: Sequence[Picture]) -> Prompt:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, WebPImagePlugin  # noqa: F401 - or Pillow imports all its plug-ins for the first WebP
 
-from evonav.decision.prompts import Picture
+from evonav.decision.pictures import Picture
 from evonav.decision.vlm.shared_file import SharedFile
 from evonav.errors import StoreError
 
@@ -28,7 +28,7 @@ _SCHEMA = """
 CREATE TABLE IF NOT EXISTS exchanges (key TEXT PRIMARY KEY, request TEXT NOT NULL, response TEXT NOT NULL) STRICT;
 CREATE TABLE IF NOT EXISTS failures (key TEXT PRIMARY KEY, request TEXT NOT NULL, kind TEXT NOT NULL,
     message TEXT NOT NULL) STRICT;
-CREATE TABLE IF NOT EXISTS pictures (name TEXT PRIMARY KEY, webp BLOB NOT NULL) STRICT;
+CREATE TABLE IF NOT EXISTS pictures (name TEXT PRIMARY KEY, file BLOB NOT NULL) STRICT;
 """
 
 
@@ -37,10 +37,12 @@ def canonical_json(value: Any) -> str:  # noqa: ANN401
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
-def _webp_of(picture: Picture) -> bytes:
-    """Return the image without loss: of rendered views, three quarters of a PNG in half of the time."""
+def _file_of(picture: Picture) -> bytes:
+    """Return the JPEG that the pixels are decoded from, or, of other pixels, a WebP without loss."""
+    if isinstance(picture.source, bytes):
+        return picture.source
     buffer = BytesIO()
-    Image.fromarray(np.ascontiguousarray(picture.pixels)).save(buffer, "WEBP", lossless=True, method=0, quality=20)
+    Image.fromarray(np.ascontiguousarray(picture.source)).save(buffer, "WEBP", lossless=True, method=0, quality=20)
     return buffer.getvalue()
 
 
@@ -166,7 +168,7 @@ class ResponseCache(SharedFile):
         with self._reading():
             query = f"SELECT name FROM pictures WHERE name IN ({','.join('?' * len(by_name))})"  # noqa: S608
             stored = {name for (name,) in self._db.execute(query, tuple(by_name))}
-        return {name: _webp_of(picture) for name, picture in by_name.items() if name not in stored}
+        return {name: _file_of(picture) for name, picture in by_name.items() if name not in stored}
 
     def _insert(self, key: str, request: JsonObject, files: dict[str, bytes], outcome: JsonObject | Failure) -> None:
         self._db.executemany("INSERT OR IGNORE INTO pictures VALUES (?, ?)", files.items())

@@ -14,7 +14,15 @@ from evonav.decision.metered import account_costs
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.relay import RELAYED, Response, read_message, read_request, response_type, write_message
+from evonav.decision.vlm.relay import (
+    RELAYED,
+    Known,
+    Response,
+    read_message,
+    read_request,
+    response_type,
+    write_message,
+)
 from evonav.errors import EvonavError, InvalidArgumentError
 
 MAX_ERROR = 2000
@@ -44,6 +52,7 @@ class ModelRelay:
         self.agents_descriptor = self.far_descriptor
         """Descriptor of that end in the agent's process."""
         self._client: VlmClient | None = None
+        self._known: Known = {}
         self._thread: threading.Thread | None = None
         self.cpu_s = 0.0
         """CPU time that it has used."""
@@ -94,7 +103,7 @@ class ModelRelay:
 
     def _answer(self, message: bytes) -> Response:
         try:
-            prompts, attempt, otherwise = read_request(message)
+            prompts, attempt, otherwise = read_request(message, self._known)
         except InvalidArgumentError as error:
             return Response(error=f"malformed question: {error}"[:MAX_ERROR])
         client = self._client

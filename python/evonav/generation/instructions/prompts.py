@@ -5,7 +5,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.prompts import Picture, Prompt, Text
+from evonav.decision.pictures import Picture
+from evonav.decision.prompts import Prompt, Text
 from evonav.tasks.language import noun_of
 
 APPEARANCE_PROMPT = (
