@@ -22,7 +22,7 @@ server, a broken or truncated response or a refusal. Everything is measured for 
 have asked. CPU is that of the driver, workers and agents; the model's own comes on top. Memory is the greatest sum of
 all processes' proportional set sizes: shared pages count once. The aims, 100 episodes within 4 GB and 50 questions a
 second on two cores, are missed: a question costs the CPU time of its round, of which drawing views with colours,
-encoding images and object maps are the most.
+object maps and the way to the model are the most.
 """
 LATENCY_S = 1.0
 WINDOW_S = 30.0

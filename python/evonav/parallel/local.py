@@ -1,5 +1,6 @@
 """Run workers of `evonav.parallel.pool` as processes of this machine."""
 
+import ctypes
 import gc
 import json
 import multiprocessing
@@ -23,8 +24,15 @@ END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""
 THREAD_VARIABLES = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Environment variables that limit the threads of a process."""
-SPARING = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "262144", "MALLOC_TRIM_THRESHOLD_": "1048576"}
-"""Environment variables by which glibc gives memory back at once, where many jobs share the machine's memory."""
+SPARING = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "2097152"}
+"""Environment variables by which glibc keeps little free memory, where many jobs share the machine's.
+
+The arrays of a view are smaller than the first limit: the system takes longer to give pages than to fill them.
+"""
+KEPT_BYTES, ALONE_BYTES = 16 << 20, 4 << 20
+"""Free memory that a worker keeps, and size from which it gives back what is freed: it runs many jobs in turn."""
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+"""Names of these limits for glibc."""
 _HARMLESS = ("GLIBC_", "LANG", "LC_", "LD_", "MALLOC_", "NPY_", "OMP_", "OPENBLAS_", "PATH", "PYTHON", "RAYON_", "TZ")
 """Beginnings of the names of variables that tell libraries how to start, and hold no secrets."""
 PROCESS_NAME = "evonav-worker"
@@ -254,7 +262,17 @@ def _serve(connection: Connection, work: str, life: int | None = None) -> None:
         settings, has_threads = json.loads(connection.recv_bytes())
         if has_threads:
             _raise_open_files()
+            _keep_free_memory()
         serve(work, settings, iter(job, None), send, has_threads=has_threads)
+
+
+def _keep_free_memory() -> None:
+    """Keep more free memory than the processes that this one starts, unless the user has set how much."""
+    if all(os.environ.get(name) == value for name, value in SPARING.items()):
+        with suppress(OSError, AttributeError):  # another system, or library
+            library = ctypes.CDLL(None)
+            library.mallopt(_TRIM_THRESHOLD, KEPT_BYTES)
+            library.mallopt(_MMAP_THRESHOLD, ALONE_BYTES)
 
 
 def _raise_open_files() -> None:
