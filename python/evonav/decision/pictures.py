@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.memory.views import Box, StoredView, jpeg_size, pixels_of, thumbnail
 
-MAX_KEPT = 32
+MAX_PICTURES = 32
 """Largest number of pictures, and of crops, that a process keeps: a question has about ten."""
 
 
@@ -76,13 +76,13 @@ def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> Picture | Non
     return None if view.jpeg is None else _crop(view.jpeg, box_px, margin_px)
 
 
-@lru_cache(MAX_KEPT)
+@lru_cache(MAX_PICTURES)
 def _picture(jpeg: bytes, size_px: int) -> Picture:
     whole = Picture(jpeg)
     return whole if max(whole.size_px) <= size_px else Picture(thumbnail(whole.pixels, size_px))
 
 
-@lru_cache(MAX_KEPT)
+@lru_cache(MAX_PICTURES)
 def _crop(jpeg: bytes, box_px: Box, margin_px: int) -> Picture:
     left, top, right, bottom = box_px
     rows = slice(max(0, top - margin_px), bottom + margin_px)

@@ -29,7 +29,7 @@ SPARING = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC
 
 The arrays of a view are smaller than the first limit: the system takes longer to give pages than to fill them.
 """
-KEPT_BYTES, ALONE_BYTES = 16 << 20, 4 << 20
+MAX_FREE_BYTES, MIN_MAPPED_BYTES = 16 << 20, 4 << 20
 """Free memory that a worker keeps, and size from which it gives back what is freed: it runs many jobs in turn."""
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 """Names of these limits for glibc."""
@@ -271,8 +271,8 @@ def _keep_free_memory() -> None:
     if all(os.environ.get(name) == value for name, value in SPARING.items()):
         with suppress(OSError, AttributeError):  # another system, or library
             library = ctypes.CDLL(None)
-            library.mallopt(_TRIM_THRESHOLD, KEPT_BYTES)
-            library.mallopt(_MMAP_THRESHOLD, ALONE_BYTES)
+            library.mallopt(_TRIM_THRESHOLD, MAX_FREE_BYTES)
+            library.mallopt(_MMAP_THRESHOLD, MIN_MAPPED_BYTES)
 
 
 def _raise_open_files() -> None:

@@ -174,7 +174,7 @@ class AgentProcess:
             if descriptor is not None:
                 self._poll.register(descriptor, select.POLLIN)
         self._num_asked = 0
-        self._asked = ("", 0.0, 0.0)
+        self._request = ("", 0.0, 0.0)
         """The request that was sent last: its operation, its time limit, and when that has passed."""
         self._is_waiting = False
         try:
@@ -264,15 +264,15 @@ class AgentProcess:
             AgentFailedError: The agent died or hung (`crash`, `timeout`), and its process was ended.
         """
         timeout_s = timeout_s or self._hosting.timeout_s
-        self._asked = (operation, timeout_s, time.monotonic() + timeout_s)
+        self._request = (operation, timeout_s, time.monotonic() + timeout_s)
         self._is_waiting = True
         with self._ended_if_lost():
-            self._send(operation, arguments, self._asked[2])
+            self._send(operation, arguments, self._request[2])
 
     def answer(self) -> dict[str, bytes]:
         """Return the parts of the answer to the request that was sent; see `ask`."""
         with self._ended_if_lost():
-            cpu_s, parts = wire.read_answer(self._message(self._asked[2]), self._num_asked)
+            cpu_s, parts = wire.read_answer(self._message(self._request[2]), self._num_asked)
         self._is_waiting = False
         self._own_cpu_s = cpu_s
         if (failure := parts.get("failure")) is not None:
@@ -282,7 +282,7 @@ class AgentProcess:
     @contextmanager
     def _ended_if_lost(self) -> Iterator[None]:
         """End the process if it does not answer in time, or as it should."""
-        operation, timeout_s, _ = self._asked
+        operation, timeout_s, _ = self._request
         try:
             yield
         except TimeoutError:
