@@ -251,7 +251,7 @@ impl Navigation {
     /// Return the length of the shortest path between a field's source and a point (snapped), as
     /// [`Self::distances_m`]; infinite if there is none.
     pub fn field_distance_m(&self, field: &DistanceField, point_m: Vec2) -> f64 {
-        let to = |point_m| field.distance_m(&self.obstacles, point_m, f64::INFINITY);
+        let to = |point_m| field.distance_m(&self.obstacles, point_m);
         self.snap(point_m).map_or(f64::INFINITY, to)
     }
 

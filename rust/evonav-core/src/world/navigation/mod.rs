@@ -2,6 +2,7 @@
 
 mod agent_body;
 mod distance_field;
+mod distance_tiles;
 mod free_space;
 pub(crate) mod obstacle;
 mod obstacles;

@@ -15,6 +15,8 @@ use crate::{
 /// Largest distance of the tangents that replace an obstacle's rounded corner from the outline's
 /// corner, in radii ([`crate::world::navigation::visibility_graph`]).
 const HUG: f64 = 1.02;
+/// Part of the distance to keep by which diagonals are longer than those of the outline.
+const STRETCH: f64 = 0.99;
 /// Margin of tests by boxes, far above rounding: a metre of a move adds another.
 const HAIR_M: f64 = 1e-9;
 
@@ -75,6 +77,8 @@ pub(crate) struct Sweep {
     b: Vec2,
     /// The vector from `a` to `b`.
     leg_m: Vec2,
+    /// Its length, up to rounding.
+    length_m: f64,
     /// Smallest and largest corner of the box of both ends.
     extent_m: [Vec2; 2],
     frame: OnceCell<Frame>,
@@ -92,7 +96,8 @@ impl Sweep {
     pub(crate) fn new(a: Vec2, b: Vec2) -> Self {
         let leg_m = [b[0] - a[0], b[1] - a[1]];
         let extent_m = [[a[0].min(b[0]), a[1].min(b[1])], [a[0].max(b[0]), a[1].max(b[1])]];
-        Self { a, b, leg_m, extent_m, frame: OnceCell::new() }
+        let length_m = (leg_m[0] * leg_m[0] + leg_m[1] * leg_m[1]).sqrt();
+        Self { a, b, leg_m, length_m, extent_m, frame: OnceCell::new() }
     }
 
     /// Return length and direction, which only few tests need.
@@ -137,6 +142,31 @@ impl Gist {
         self.diagonals_m.iter().any(|&diagonal_m| sweep.crosses(diagonal_m))
     }
 
+    /// Return whether all moves from a point into an upright box surely cross one of the diagonals.
+    pub(super) fn hides(&self, from_m: Vec2, centre_m: Vec2, half_m: Vec2) -> bool {
+        self.diagonals_m.iter().any(|&[p, q]| {
+            let minus = |a: Vec2, b: Vec2| [a[0] - b[0], a[1] - b[1]];
+            let cross = |a: Vec2, b: Vec2| a[0] * b[1] - a[1] * b[0];
+            let (side_m, to_p, to_q) = (minus(q, p), minus(p, from_m), minus(q, from_m));
+            // Seen from the point, the diagonal runs to the left or to the right.
+            let facing = cross(to_p, to_q);
+            let turn = facing.signum();
+            // The least cross product of a vector and those from an origin to the box.
+            let least = |along: Vec2, origin_m: Vec2, sign: f64| {
+                sign * cross(along, minus(centre_m, origin_m))
+                    - along[0].abs() * half_m[1]
+                    - along[1].abs() * half_m[0]
+            };
+            let to_centre = minus(centre_m, from_m);
+            let sum = |v: Vec2| v[0].abs() + v[1].abs();
+            let hair = HAIR_M * (sum(to_centre) + sum(half_m));
+            facing.abs() > HAIR_M * sum(side_m)
+                && least(side_m, p, -turn) > HAIR_M * sum(side_m)
+                && least(to_p, from_m, turn) > hair
+                && least(to_q, from_m, -turn) > hair
+        })
+    }
+
     /// Return whether the agent's axis at a point is too close, if its box decides that.
     pub(super) fn blocks(&self, point_m: Vec2) -> Option<bool> {
         self.is_within(point_m, self.radius_m)
@@ -161,7 +191,7 @@ impl Gist {
     /// Return whether a move surely stays clear: its box is apart from the obstacle's, or the
     /// obstacle lies on one side of its line.
     pub(super) fn is_clear_of(&self, sweep: &Sweep) -> bool {
-        let Sweep { a, leg_m, extent_m: [low_m, high_m], .. } = sweep;
+        let Sweep { a, leg_m, length_m, extent_m: [low_m, high_m], .. } = sweep;
         let is_apart = |i: usize| {
             let reach_m = self.half_m[i] + (self.radius_m + HAIR_M);
             low_m[i] - self.centre_m[i] > reach_m || self.centre_m[i] - high_m[i] > reach_m
@@ -172,7 +202,6 @@ impl Gist {
         let [x, z] = [0, 1].map(|i| self.centre_m[i] - a[i]);
         let aside_m2 = (leg_m[0] * z - leg_m[1] * x).abs();
         let half_m2 = leg_m[1].abs() * self.half_m[0] + leg_m[0].abs() * self.half_m[1];
-        let length_m = (leg_m[0] * leg_m[0] + leg_m[1] * leg_m[1]).sqrt();
         aside_m2 > half_m2 + length_m * (self.radius_m + HAIR_M * (1.0 + length_m))
     }
 }
@@ -186,7 +215,17 @@ impl Obstacle {
         let half_m = [0, 1].map(|i| (high_m[i] - centre_m[i]).max(centre_m[i] - low_m[i]));
         let num_corners = self.outline_m.len();
         let corner = |quarters: usize| self.outline_m[quarters * num_corners / 4];
-        let diagonals_m = [[corner(0), corner(2)], [corner(1), corner(3)]];
+        // Longer than the outline's by nearly the distance to keep, at both ends.
+        let stretched = |[p, q]: [Vec2; 2]| {
+            let leg_m = [q[0] - p[0], q[1] - p[1]];
+            let length_m = leg_m[0].hypot(leg_m[1]);
+            let share = if length_m > HAIR_M { STRETCH * self.radius_m / length_m } else { 0.0 };
+            [
+                [p[0] - share * leg_m[0], p[1] - share * leg_m[1]],
+                [q[0] + share * leg_m[0], q[1] + share * leg_m[1]],
+            ]
+        };
+        let diagonals_m = [[corner(0), corner(2)], [corner(1), corner(3)]].map(stretched);
         let is_at_corner = |p: &Vec2| {
             let gap_m = |i: usize| ((p[i] - centre_m[i]).abs() - half_m[i]).abs();
             gap_m(0) < 0.1 * HAIR_M && gap_m(1) < 0.1 * HAIR_M

@@ -136,22 +136,34 @@ impl Obstacles {
         gist.is_some_and(|gist| gist.is_crossed_by(&Sweep::new(from_m, to_m)))
     }
 
+    /// Return whether an obstacle surely hides a whole upright box from a point; false for [`NONE`].
+    pub(super) fn hides(&self, obstacle: u32, from_m: Vec2, centre_m: Vec2, half_m: Vec2) -> bool {
+        let gist = self.gists.get(obstacle as usize);
+        gist.is_some_and(|gist| gist.hides(from_m, centre_m, half_m))
+    }
+
     /// Return an obstacle that blocks a move: `likely` if it does, else the first along the move.
     pub(super) fn first_between(&self, from_m: Vec2, to_m: Vec2, likely: u32) -> Option<u32> {
         let (a, b) = if from_m <= to_m { (from_m, to_m) } else { (to_m, from_m) };
         let sweep = Sweep::new(a, b);
-        let blocks = |&i: &u32| {
-            !self.gists[i as usize].is_clear_of(&sweep)
-                && (self.gists[i as usize].is_crossed_by(&sweep)
-                    || self.obstacles[i as usize].blocks_sweep(&sweep))
-        };
         let crosses = |i: u32| self.gists[i as usize].is_crossed_by(&sweep);
-        if likely != NONE && (crosses(likely) || blocks(&likely)) {
+        let is_clear_of = |i: u32| self.gists[i as usize].is_clear_of(&sweep);
+        let blocks_exactly = |i: u32| self.obstacles[i as usize].blocks_sweep(&sweep);
+        if likely != NONE && (crosses(likely) || !is_clear_of(likely) && blocks_exactly(likely)) {
             return Some(likely);
         }
+        // The obstacle that was last found not to block, which several buckets may have.
+        let mut passed = likely;
+        let mut blocks = |&i: &u32| {
+            if i == passed || is_clear_of(i) {
+                return false;
+            }
+            passed = i;
+            crosses(i) || blocks_exactly(i)
+        };
         let mut hit = None;
         self.buckets_along(a, b, |bucket| {
-            hit = bucket.iter().copied().find(blocks);
+            hit = bucket.iter().copied().find(&mut blocks);
             hit.is_none()
         });
         hit
@@ -160,22 +172,25 @@ impl Obstacles {
     /// Call `visit` for the buckets under a segment until it returns false; return whether it never
     /// did.
     fn buckets_along(&self, a: Vec2, b: Vec2, mut visit: impl FnMut(&[u32]) -> bool) -> bool {
+        let per_m = 1.0 / self.bucket_m;
         let cell = |value: f64, axis: usize| {
-            ((value - self.corner_m[axis]) / self.bucket_m).max(0.0) as usize
+            ((value - self.corner_m[axis]) * per_m).max(0.0) as u32 as usize
         };
         let is_outside = (0..2).any(|i| a[i].max(b[i]) < self.corner_m[i]);
         if is_outside || self.obstacles.is_empty() {
             return true;
         }
         let last_row = cell(a[1].max(b[1]) + HAIR_M, 1).min(self.shape[0] - 1);
+        let [width_m, height_m] = [b[0] - a[0], b[1] - a[1]];
+        let is_level = height_m.abs() < HAIR_M;
+        let share = 1.0 / height_m;
         for row in cell(a[1].min(b[1]) - HAIR_M, 1)..=last_row {
             // Stretch of the segment inside this row of buckets.
             let low = self.corner_m[1] + row as f64 * self.bucket_m - HAIR_M;
             let high = low + self.bucket_m + 2.0 * HAIR_M;
-            let at = |height: f64| ((height - a[1]) / (b[1] - a[1])).clamp(0.0, 1.0);
-            let is_level = (b[1] - a[1]).abs() < HAIR_M;
+            let at = |height: f64| ((height - a[1]) * share).clamp(0.0, 1.0);
             let span = if is_level { [0.0, 1.0] } else { [at(low), at(high)] };
-            let [x0, x1] = span.map(|t| a[0] + t * (b[0] - a[0]));
+            let [x0, x1] = span.map(|t| a[0] + t * width_m);
             if x0.max(x1) + HAIR_M < self.corner_m[0] {
                 continue;
             }

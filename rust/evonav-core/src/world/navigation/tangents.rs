@@ -17,14 +17,14 @@ const MOST_SPLITS: u32 = 5;
 const SKIN_M: f64 = 1e-4;
 /// Tolerance of the tangency test, metres over the length of an edge; it adds edges rather than
 /// removing them.
-const TANGENT_SLACK_M: f64 = 1e-6;
+pub(super) const TANGENT_SLACK_M: f64 = 1e-6;
 
 /// A place where shortest paths may bend.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node {
     pub(super) point_m: Vec2,
     /// Outward normals of the obstacle's two tangents that meet here.
-    normals: [Vec2; 2],
+    pub(super) normals: [Vec2; 2],
 }
 
 impl Node {

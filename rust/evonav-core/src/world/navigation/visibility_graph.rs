@@ -21,6 +21,7 @@ use crate::{
     world::navigation::{
         Obstacles,
         distance_field::{DistanceField, Reached},
+        distance_tiles,
         obstacles::NONE,
         tangents::{Fans, Node},
     },
@@ -75,10 +76,6 @@ impl PartialEq for Open {
 }
 
 impl Eq for Open {}
-
-/// The length that [`VisibilityGraph::distances_m`] allows for beyond the distance of the point
-/// before and the way between both, before it looks among all nodes.
-const DETOUR_M: f64 = 0.02;
 
 /// Parent of the nodes that a search reaches directly from its start.
 const START: u32 = u32::MAX;
@@ -150,17 +147,7 @@ impl VisibilityGraph {
         start_m: Vec2,
         targets_m: &[Option<Vec2>],
     ) -> Vec<f64> {
-        let field = self.field(obstacles, start_m);
-        let mut before: Option<(Vec2, f64)> = None;
-        let mut distance_m = |target_m: Vec2| {
-            let likely_m = before.map_or(f64::INFINITY, |(point_m, length_m)| {
-                length_m + distance_2d_m(point_m, target_m) + DETOUR_M
-            });
-            let length_m = field.distance_m(obstacles, target_m, likely_m);
-            before = Some((target_m, length_m));
-            length_m
-        };
-        targets_m.iter().map(|target| target.map_or(f64::INFINITY, &mut distance_m)).collect()
+        distance_tiles::distances_m(&self.field(obstacles, start_m), obstacles, targets_m)
     }
 
     /// Compute the shortest distances from a free point to all places where paths may bend.
