@@ -57,6 +57,10 @@ impl BitGrid {
         }
         let row_words = &mut self.words[row * self.stride..][..self.stride];
         let (first, last) = (start / 64, (end - 1) / 64);
+        if first == last {
+            row_words[first] |= (u64::MAX >> (64 - (end - start))) << (start % 64);
+            return;
+        }
         for (index, word) in row_words.iter_mut().enumerate().take(last + 1).skip(first) {
             let low = if index == first { start % 64 } else { 0 };
             let high = if index == last { (end - 1) % 64 } else { 63 };

@@ -1,6 +1,6 @@
 //! Connected components of a bit grid, found by joining runs of cells.
 
-use crate::grid::bits::BitGrid;
+use crate::grid::bits::{BitGrid, ones};
 
 /// A run of cells with bit 1: `start..end` of one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl Run {
     }
 }
 
-/// The 4-connected components of a bit grid.
+/// The connected components of a bit grid.
 ///
 /// Each run is joined with the runs of the previous row that it touches (Wu, Otoo & Suzuki,
 /// "Optimizing two-pass connected-component labeling", 2009), so the cost depends on the number of
@@ -45,8 +45,17 @@ pub struct Components {
 }
 
 impl Components {
-    /// Label the cells of `grid` whose bit is 1.
+    /// Label the cells of `grid` whose bit is 1; neighbours share a side.
     pub fn new(grid: &BitGrid) -> Self {
+        Self::joined(grid, 0)
+    }
+
+    /// Label the cells of `grid` whose bit is 1; neighbours share a side or a corner.
+    pub fn with_corners(grid: &BitGrid) -> Self {
+        Self::joined(grid, 1)
+    }
+
+    fn joined(grid: &BitGrid, reach: u32) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         let mut parents: Vec<u32> = Vec::new();
         let mut above = 0..0;
@@ -54,7 +63,7 @@ impl Components {
             let first = runs.len();
             push_runs(grid.row(row), row as u32, &mut runs);
             parents.extend(first as u32..runs.len() as u32);
-            join_rows(&runs, above, first..runs.len(), &mut parents);
+            join_rows(&runs, above, first..runs.len(), reach, &mut parents);
             above = first..runs.len();
         }
         // Roots are the first runs of their components, so labels ascend with them.
@@ -92,83 +101,67 @@ impl Components {
     }
 
     /// Return the runs of each component, in the order of the components.
-    pub fn by_component(&self) -> Vec<Vec<Run>> {
-        let mut lists = vec![Vec::new(); self.num];
+    pub fn by_component(&self) -> Grouped {
+        let mut ends = vec![0; self.num + 1];
+        self.labels.iter().for_each(|&label| ends[label as usize + 1] += 1);
+        for i in 1..ends.len() {
+            ends[i] += ends[i - 1];
+        }
+        let starts = ends.clone();
+        let mut runs = self.runs.clone();
         for (run, label) in self.runs() {
-            lists[label].push(run);
+            runs[ends[label] as usize] = run;
+            ends[label] += 1;
         }
-        lists
+        Grouped { runs, starts }
     }
 }
 
-/// Take 8-connected groups of cells out of a grid, in the order of their first cells; the cells of a
-/// group are in no particular order.
-pub fn take_groups(mut cells: BitGrid) -> Vec<Vec<[usize; 2]>> {
-    let mut groups = Vec::new();
-    let all: Vec<[usize; 2]> = cells.cells().collect();
-    for first in all {
-        if !cells.get(first[0], first[1]) {
-            continue;
-        }
-        cells.remove(first[0], first[1]);
-        let mut group = vec![first];
-        let mut next = 0;
-        while let Some(&[row, col]) = group.get(next) {
-            next += 1;
-            for r in row.saturating_sub(1)..=row + 1 {
-                for c in col.saturating_sub(1)..=col + 1 {
-                    if cells.get(r, c) {
-                        cells.remove(r, c);
-                        group.push([r, c]);
-                    }
-                }
-            }
-        }
-        groups.push(group);
-    }
-    groups
+/// The runs of all components, one component after another.
+#[derive(Debug, Clone)]
+pub struct Grouped {
+    runs: Vec<Run>,
+    /// Component `i` has `runs[starts[i]..starts[i + 1]]`.
+    starts: Vec<u32>,
 }
 
+impl Grouped {
+    /// Return the runs of each component, row-major.
+    pub fn iter(&self) -> impl Iterator<Item = &[Run]> {
+        self.starts.windows(2).map(|span| &self.runs[span[0] as usize..span[1] as usize])
+    }
+}
+
+/// Add the runs of a row, which begin and end where a bit differs from the one before it.
 fn push_runs(words: &[u64], row: u32, runs: &mut Vec<Run>) {
-    let mut open: Option<u32> = None;
+    let (mut before, mut open) = (0, None);
     for (index, &word) in words.iter().enumerate() {
-        let base = index as u32 * 64;
-        let mut bit = 0;
-        while bit < 64 {
-            // Length of the stretch of equal bits that starts here.
-            let rest = word >> bit;
-            if open.is_none() {
-                let zeros = rest.trailing_zeros().min(64 - bit);
-                bit += zeros;
-                if bit < 64 {
-                    open = Some(base + bit);
-                }
-            } else {
-                let ones = (!rest).trailing_zeros().min(64 - bit);
-                bit += ones;
-                if bit < 64
-                    && let Some(start) = open.take()
-                {
-                    runs.push(Run { row, start, end: base + bit });
-                }
+        for bit in ones(word ^ (word << 1 | before)) {
+            let col = (index * 64 + bit) as u32;
+            match open.take() {
+                None => open = Some(col),
+                Some(start) => runs.push(Run { row, start, end: col }),
             }
         }
+        before = word >> 63;
     }
     if let Some(start) = open {
         runs.push(Run { row, start, end: words.len() as u32 * 64 });
     }
 }
 
-/// Join the runs of two neighbouring rows that share a column.
+/// Join the runs of two neighbouring rows that share a column, or are at most `reach` columns
+/// apart (0 or 1).
 fn join_rows(
     runs: &[Run],
     mut above: std::ops::Range<usize>,
     mut here: std::ops::Range<usize>,
+    reach: u32,
     parents: &mut [u32],
 ) {
     while !above.is_empty() && !here.is_empty() {
         let (a, b) = (runs[above.start], runs[here.start]);
-        if a.start < b.end && b.start < a.end {
+        if a.start < b.end + reach && b.start < a.end + reach {
             let (a, b) = (find(parents, above.start as u32), find(parents, here.start as u32));
             parents[a.max(b) as usize] = a.min(b);
         }

@@ -3,7 +3,7 @@
 use crate::{
     grid::{
         bits::BitGrid,
-        components::take_groups,
+        components::{Components, Run},
         dilate::dilate_disk,
         fast_marching::{Until, march},
     },
@@ -64,14 +64,19 @@ pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
     unknown.invert();
     let mut frontier = dilate_disk(&unknown, 1);
     frontier.intersect(&free);
-    keep_large(frontier, config.min_cells)
+    keep_large(&frontier, config.min_cells)
 }
 
 /// Return the 8-connected groups of at least `min_cells` cells.
-pub fn keep_large(cells: BitGrid, min_cells: usize) -> BitGrid {
+pub fn keep_large(cells: &BitGrid, min_cells: usize) -> BitGrid {
     let mut large = BitGrid::new(cells.rows(), cells.cols());
-    let groups = take_groups(cells).into_iter().filter(|group| group.len() >= min_cells);
-    groups.flatten().for_each(|[row, col]| large.insert(row, col));
+    for group in Components::with_corners(cells).by_component().iter() {
+        if group.iter().map(Run::len).sum::<usize>() >= min_cells {
+            for run in group {
+                large.insert_run(run.row as usize, run.start as usize, run.end as usize);
+            }
+        }
+    }
     large
 }
 

@@ -249,7 +249,7 @@ proptest! {
                 expected.extend(group);
             }
         }
-        let kept: BTreeSet<[usize; 2]> = keep_large(grid, min_cells).cells().collect();
+        let kept: BTreeSet<[usize; 2]> = keep_large(&grid, min_cells).cells().collect();
         prop_assert_eq!(kept, expected);
     }
 

@@ -66,4 +66,28 @@ pub struct Frontier {
     pub direction_rad: f64,
     /// Cells `[row, col]` of the region, row-major.
     pub cells: Vec<[i32; 2]>,
+    /// Rows and columns of the cells.
+    pub(crate) span: Span,
+}
+
+/// The rows and columns of some cells, the last included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Span {
+    pub(crate) low: [i32; 2],
+    pub(crate) high: [i32; 2],
+}
+
+impl Span {
+    pub(super) fn of(cells: &[[i32; 2]]) -> Self {
+        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
+        for cell in cells {
+            low = [low[0].min(cell[0]), low[1].min(cell[1])];
+            high = [high[0].max(cell[0]), high[1].max(cell[1])];
+        }
+        Self { low, high }
+    }
+
+    pub(crate) fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|i| self.low[i] <= other.high[i] && other.low[i] <= self.high[i])
+    }
 }

@@ -12,7 +12,7 @@ use crate::{
     memory::{
         frontiers::{
             frontier::{Frontier, FrontierConfig},
-            regions::{Span, find_regions},
+            regions::{Region, find_regions},
             viewpoints::{place, place_at_border},
         },
         occupancy::OccupancyMap,
@@ -117,23 +117,20 @@ impl Frontiers {
 /// new ones.
 fn reconcile(
     old: Vec<Frontier>,
-    regions: Vec<Vec<[i32; 2]>>,
+    regions: Vec<Region>,
     config: &FrontierConfig,
-) -> (Vec<Frontier>, Vec<Vec<[i32; 2]>>) {
+) -> (Vec<Frontier>, Vec<Region>) {
     let mut is_taken = vec![false; regions.len()];
     let mut is_staying = vec![false; old.len()];
-    let spans: Vec<Span> = regions.iter().map(|region| Span::of(region)).collect();
     let overlaps_of = |frontier: &Frontier| {
-        let span = Span::of(&frontier.cells);
-        let pairs = regions.iter().zip(&spans);
-        let overlap = |(region, other): (&Vec<_>, &Span)| {
-            if span.meets(other) {
-                Overlap::new(&frontier.cells, region)
+        let overlap = |region: &Region| {
+            if frontier.span.meets(&region.span) {
+                Overlap::new(&frontier.cells, &region.cells)
             } else {
-                Overlap { shared: 0, either: frontier.cells.len() + region.len() }
+                Overlap { shared: 0, either: frontier.cells.len() + region.cells.len() }
             }
         };
-        pairs.map(overlap).collect()
+        regions.iter().map(overlap).collect()
     };
     let overlaps: Vec<Vec<Overlap>> = old.iter().map(overlaps_of).collect();
     for (i, row) in overlaps.iter().enumerate() {
@@ -160,7 +157,8 @@ fn reconcile(
             (0..old.len()).filter(|&i| !is_staying[i] && overlaps[i][j].iou() > 0.02).collect();
         let total: f64 = parts.iter().map(|&i| overlaps[i][j].iou()).sum();
         let num_cells: usize = parts.iter().map(|&i| old[i].cells.len()).sum();
-        let ratio = num_cells.min(region.len()) as f64 / num_cells.max(region.len()) as f64;
+        let ratio =
+            num_cells.min(region.cells.len()) as f64 / num_cells.max(region.cells.len()) as f64;
         if parts.len() >= 2 && total > 0.95 && total <= 1.0 && ratio > 0.95 {
             is_taken[j] = true;
             parts.iter().for_each(|&i| is_staying[i] = true);
@@ -170,10 +168,13 @@ fn reconcile(
         old.into_iter().zip(is_staying).filter(|(_, keep)| *keep).map(|(f, _)| f).collect();
     let is_covered = |cell: &[i32; 2]| staying.iter().any(|f| f.cells.binary_search(cell).is_ok());
     let fresh = regions.into_iter().zip(is_taken).filter(|(_, taken)| !taken).filter_map(
-        |(mut region, _)| {
-            let num_before = region.len();
-            region.retain(|cell| !is_covered(cell));
-            (region.len() == num_before || region.len() >= config.min_cells).then_some(region)
+        |(Region { mut cells, span }, _)| {
+            let num_before = cells.len();
+            cells.retain(|cell| !is_covered(cell));
+            if cells.len() == num_before {
+                return Some(Region { cells, span });
+            }
+            (cells.len() >= config.min_cells).then(|| Region::new(cells))
         },
     );
     let fresh = fresh.collect();
@@ -188,6 +189,9 @@ struct Overlap {
 
 impl Overlap {
     fn new(a: &[[i32; 2]], b: &[[i32; 2]]) -> Self {
+        if a == b {
+            return Self { shared: a.len(), either: a.len() };
+        }
         let mut shared = 0;
         let (mut i, mut j) = (0, 0);
         while i < a.len() && j < b.len() {

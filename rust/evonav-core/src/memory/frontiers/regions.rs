@@ -9,15 +9,19 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::{
         GridSpec,
-        bits::{BitGrid, beside},
-        components::{Components, Run, take_groups},
+        bits::BitGrid,
+        components::{Components, Run},
+        dilate::dilate_disk,
     },
-    memory::{frontiers::FrontierConfig, occupancy::OccupancyMap},
+    memory::{
+        frontiers::frontier::{FrontierConfig, Span},
+        occupancy::OccupancyMap,
+    },
 };
 
 /// Regions and the cells that may serve as view positions.
 pub(crate) struct Found {
-    pub(crate) regions: Vec<Vec<[i32; 2]>>,
+    pub(crate) regions: Vec<Region>,
     pub(crate) edges: BitGrid,
     /// Whether these are borders of the known floor, because there are no regions.
     pub(crate) is_last_resort: bool,
@@ -34,17 +38,14 @@ pub(crate) fn find_regions(
     Error::require_finite("agent_m", &agent_m)?;
     let island = island(map, agent_m, seeds);
     let (mut inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
-    given_up.into_iter().flat_map(BitGrid::cells).for_each(|[row, col]| inner.remove(row, col));
+    given_up.into_iter().for_each(|cells| inner.subtract(cells));
     let mut regions = Vec::new();
     if !edges.is_empty() {
-        for runs in Components::new(&inner).by_component() {
+        for runs in Components::new(&inner).by_component().iter() {
             let num_cells: usize = runs.iter().map(Run::len).sum();
             if num_cells >= config.min_cells.max(2) {
-                let mut cells = Vec::with_capacity(num_cells);
-                for run in &runs {
-                    cells.extend((run.start..run.end).map(|col| [run.row as i32, col as i32]));
-                }
-                split_wide(map, agent_m, cells, config.max_span_rad, &mut regions);
+                let region = Region::of_runs(runs);
+                split_wide(map, agent_m, region, config.max_span_rad, &mut regions);
             }
         }
     }
@@ -52,29 +53,45 @@ pub(crate) fn find_regions(
         return Ok(Found { regions, edges, is_last_resort: false });
     }
     let (unknown, edges) = borders(map, &island, given_up);
-    let groups = take_groups(unknown).into_iter();
-    let regions = groups.filter(|cells| cells.len() >= config.min_border_cells).map(|mut cells| {
-        cells.sort_unstable();
-        cells.into_iter().map(|cell| cell.map(|i| i as i32)).collect()
-    });
-    let regions = regions.collect();
+    let groups = Components::with_corners(&unknown).by_component();
+    let regions = groups.iter().map(Region::of_runs);
+    let regions = regions.filter(|region| region.cells.len() >= config.min_border_cells).collect();
     Ok(Found { regions, edges, is_last_resort: true })
+}
+
+/// Cells that form a frontier, row-major.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Region {
+    pub(crate) cells: Vec<[i32; 2]>,
+    pub(crate) span: Span,
+}
+
+impl Region {
+    pub(crate) fn new(cells: Vec<[i32; 2]>) -> Self {
+        Self { span: Span::of(&cells), cells }
+    }
+
+    fn of_runs(runs: &[Run]) -> Self {
+        let mut cells = Vec::with_capacity(runs.iter().map(Run::len).sum());
+        let mut ends = Vec::with_capacity(2 * runs.len());
+        for run in runs {
+            let row = run.row as i32;
+            cells.extend((run.start..run.end).map(|col| [row, col as i32]));
+            ends.extend([[row, run.start as i32], [row, run.end as i32 - 1]]);
+        }
+        Self { span: Span::of(&ends), cells }
+    }
 }
 
 /// Return the unknown cells beside island cells (4 neighbours), without those given up, and the
 /// island cells beside them.
 fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> (BitGrid, BitGrid) {
-    let (rows, cols) = (island.rows(), island.cols());
-    let (mut unknown, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
-    for [row, col] in island.cells() {
-        for [r, c] in beside([row, col]) {
-            let is_known = map.free().get(r, c) || map.blocked().get(r, c);
-            if r < rows && c < cols && !is_known && !given_up.is_some_and(|g| g.get(r, c)) {
-                unknown.insert(r, c);
-                edges.insert(row, col);
-            }
-        }
+    let mut unknown = dilate_disk(island, 1);
+    for others in [map.free(), map.blocked()].into_iter().chain(given_up) {
+        unknown.subtract(others);
     }
+    let mut edges = dilate_disk(&unknown, 1);
+    edges.intersect(island);
     (unknown, edges)
 }
 
@@ -167,31 +184,31 @@ fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
 fn split_wide(
     map: &OccupancyMap,
     agent_m: Vec2,
-    cells: Vec<[i32; 2]>,
+    region: Region,
     max_span_rad: f64,
-    regions: &mut Vec<Vec<[i32; 2]>>,
+    regions: &mut Vec<Region>,
 ) {
-    if is_in_narrow_box(map, agent_m, &cells, max_span_rad)
-        || is_narrow(map, agent_m, &cells, max_span_rad)
+    if is_in_narrow_box(map, agent_m, &region.span, max_span_rad)
+        || is_narrow(map, agent_m, &region.cells, max_span_rad)
     {
-        regions.push(cells);
+        regions.push(region);
         return;
     }
-    let angles = unwrapped_angles(map, agent_m, &cells);
+    let angles = unwrapped_angles(map, agent_m, &region.cells);
     let (low, high) = angles
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &a| (low.min(a), high.max(a)));
     if high - low <= max_span_rad {
-        regions.push(cells);
+        regions.push(region);
         return;
     }
     let num_parts = ((high - low) / max_span_rad) as usize + 1;
     let limits = k_means_limits(&angles, low, high, num_parts);
     let mut parts = vec![Vec::new(); num_parts];
-    for (cell, angle) in cells.into_iter().zip(angles) {
+    for (cell, angle) in region.cells.into_iter().zip(angles) {
         parts[limits.partition_point(|&limit| limit <= angle)].push(cell);
     }
-    regions.extend(parts.into_iter().filter(|part| !part.is_empty()));
+    regions.extend(parts.into_iter().filter(|part| !part.is_empty()).map(Region::new));
 }
 
 /// Return `[x, z]` from the agent to the middle of a cell.
@@ -239,14 +256,13 @@ impl Kernel for MeanDirection<'_> {
     }
 }
 
-/// Return whether a box around cells, two cells or more from the agent, spans less than an angle.
+/// Return whether a box of cells, two cells or more from the agent, spans less than an angle.
 fn is_in_narrow_box(
     map: &OccupancyMap,
     agent_m: Vec2,
-    cells: &[[i32; 2]],
+    &Span { low, high }: &Span,
     max_span_rad: f64,
 ) -> bool {
-    let Span { low, high } = Span::of(cells);
     let corners =
         [low, [low[0], high[1]], [high[0], low[1]], high].map(|cell| offset_m(map, agent_m, &cell));
     let ahead = [0, 1].map(|i| corners[0][i] + corners[3][i]);
@@ -262,28 +278,6 @@ fn is_in_narrow_box(
         (least, most) = (least.min(tangent), most.max(tangent));
     }
     is_away && most.atan() - least.atan() < max_span_rad - 1e-9
-}
-
-/// The rows and columns of some cells, the last included.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Span {
-    pub(crate) low: [i32; 2],
-    pub(crate) high: [i32; 2],
-}
-
-impl Span {
-    pub(crate) fn of(cells: &[[i32; 2]]) -> Self {
-        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for cell in cells {
-            low = [low[0].min(cell[0]), low[1].min(cell[1])];
-            high = [high[0].max(cell[0]), high[1].max(cell[1])];
-        }
-        Self { low, high }
-    }
-
-    pub(crate) fn meets(&self, other: &Self) -> bool {
-        (0..2).all(|i| self.low[i] <= other.high[i] && other.low[i] <= self.high[i])
-    }
 }
 
 /// Return whether cells surely span at most an angle, without an arc tangent for each cell.

@@ -6,7 +6,8 @@ use crate::{
     memory::{
         frontiers::{
             Frontier, FrontierConfig,
-            regions::{Span, mean_direction},
+            frontier::Span,
+            regions::{Region, mean_direction},
         },
         occupancy::OccupancyMap,
     },
@@ -22,14 +23,14 @@ pub(crate) fn place(
     map: &OccupancyMap,
     edges: &BitGrid,
     agent_m: Vec2,
-    cells: Vec<[i32; 2]>,
+    Region { cells, span }: Region,
     id: u64,
     config: &FrontierConfig,
 ) -> Frontier {
     let [x, z] = mean_direction(map, agent_m, &cells);
     let direction_rad = x.atan2(z);
     let ahead = [direction_rad.sin(), direction_rad.cos()];
-    let mut candidates = edges_beside(edges, &cells);
+    let mut candidates = edges_beside(edges, &cells, &span);
     if candidates.is_empty() {
         candidates = edges.cells().collect();
     }
@@ -50,7 +51,7 @@ pub(crate) fn place(
     let nearest = ranked.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     let position_m =
         nearest.map_or(agent_m, |&(_, _, cell)| push_away(map, map.spec().centre_m(cell), config));
-    Frontier { id, position_m, direction_rad, cells }
+    Frontier { id, position_m, direction_rad, cells, span }
 }
 
 /// Create the frontier of a group of unknown cells: the view position is on the nearest border
@@ -59,7 +60,7 @@ pub(crate) fn place_at_border(
     map: &OccupancyMap,
     edges: &BitGrid,
     agent_m: Vec2,
-    cells: Vec<[i32; 2]>,
+    Region { cells, span }: Region,
     id: u64,
     _: &FrontierConfig,
 ) -> Frontier {
@@ -72,16 +73,15 @@ pub(crate) fn place_at_border(
         .min_by(|a, b| distance_2d_m(*a, agent_m).total_cmp(&distance_2d_m(*b, agent_m)));
     let position_m = nearest.unwrap_or(agent_m);
     let [x, z] = mean_direction(map, position_m, &cells);
-    Frontier { id, position_m, direction_rad: x.atan2(z), cells }
+    Frontier { id, position_m, direction_rad: x.atan2(z), cells, span }
 }
 
 /// Return the edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them,
 /// row-major.
-fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
+fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]], span: &Span) -> Vec<[usize; 2]> {
     if cells.is_empty() {
         return Vec::new();
     }
-    let span = Span::of(cells);
     let (low, high) = (span.low.map(|i| (i - 2).max(0) as usize), span.high.map(|i| i as usize));
     let rows = low[0]..(high[0] + 3).min(edges.rows());
     let mut region = BitGrid::new(rows.len(), edges.cols());
