@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
-    world::navigation::{Obstacles, obstacles::NONE, tangents::Node},
+    world::navigation::{Obstacles, nodes::Node, obstacles::NONE},
 };
 
 /// Relative error of bounds that are computed by a square root instead of `hypot`, far above

@@ -16,7 +16,7 @@ use crate::{
     world::navigation::{
         Obstacles,
         distance_field::{DistanceField, Reached},
-        tangents::TANGENT_SLACK_M,
+        nodes::TANGENT_SLACK_M,
     },
 };
 

@@ -4,6 +4,7 @@ mod agent_body;
 mod distance_field;
 mod distance_tiles;
 mod free_space;
+mod nodes;
 pub(crate) mod obstacle;
 mod obstacles;
 mod tangents;

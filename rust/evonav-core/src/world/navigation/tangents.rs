@@ -5,7 +5,13 @@ use std::{
     f64::consts::{FRAC_PI_2, FRAC_PI_8, TAU},
 };
 
-use crate::{geometry::Vec2, world::navigation::Obstacle};
+use crate::{
+    geometry::Vec2,
+    world::navigation::{
+        Obstacle,
+        nodes::{Node, Nodes},
+    },
+};
 
 /// Largest turn of a path at one node around a corner.
 const TURN_RAD: f64 = FRAC_PI_8;
@@ -15,29 +21,6 @@ const MOST_SPLITS: u32 = 5;
 /// Distance that nodes keep in addition to the agent's radius, so that an agent that walks an edge
 /// in steps by rounded headings is never blocked: 1e-4 degrees are 2e-5 m after 10 m.
 const SKIN_M: f64 = 1e-4;
-/// Tolerance of the tangency test, metres over the length of an edge; it adds edges rather than
-/// removing them.
-pub(super) const TANGENT_SLACK_M: f64 = 1e-6;
-
-/// A place where shortest paths may bend.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Node {
-    pub(super) point_m: Vec2,
-    /// Outward normals of the obstacle's two tangents that meet here.
-    pub(super) normals: [Vec2; 2],
-}
-
-impl Node {
-    /// Return whether a straight line through this node towards `point_m` grazes the obstacle here,
-    /// rather than running into it on one side or the other.
-    pub(super) fn is_tangent_to(&self, point_m: Vec2) -> bool {
-        let leg = [point_m[0] - self.point_m[0], point_m[1] - self.point_m[1]];
-        let [a, b] = self.normals.map(|n| n[0] * leg[0] + n[1] * leg[1]);
-        ((a <= TANGENT_SLACK_M) | (b <= TANGENT_SLACK_M))
-            & ((a >= -TANGENT_SLACK_M) | (b >= -TANGENT_SLACK_M))
-    }
-}
-
 /// The tangents that replace rounded corners, by the corner's directions. Most corners of a house
 /// are right angles along its axes, so few differ.
 #[derive(Debug, Default)]
@@ -83,7 +66,7 @@ impl Fans {
         &mut self,
         obstacle: &Obstacle,
         is_free: &impl Fn(Vec2) -> bool,
-        nodes: &mut Vec<Node>,
+        nodes: &mut Nodes,
     ) {
         let outline = &obstacle.outline_m;
         let heading = |a: Vec2, b: Vec2| (b[1] - a[1]).atan2(b[0] - a[0]);
@@ -128,7 +111,7 @@ impl Arc {
         step: &Step,
         depth: u32,
         is_free: &impl Fn(Vec2) -> bool,
-        nodes: &mut Vec<Node>,
+        nodes: &mut Nodes,
     ) {
         let at = |reach_m: f64| [0, 1].map(|i| self.corner_m[i] + reach_m * step.towards[i]);
         let point_m = at(self.radius_m / step.half_cos);

@@ -22,8 +22,9 @@ use crate::{
         Obstacles,
         distance_field::{DistanceField, Reached},
         distance_tiles,
+        nodes::{Node, Nodes},
         obstacles::NONE,
-        tangents::{Fans, Node},
+        tangents::Fans,
     },
 };
 
@@ -41,7 +42,7 @@ struct Edge {
 /// The graph of all taut paths of one scene and agent.
 #[derive(Debug)]
 pub struct VisibilityGraph {
-    nodes: Vec<Node>,
+    nodes: Nodes,
     edges: Vec<OnceLock<Box<[Edge]>>>,
 }
 
@@ -83,24 +84,27 @@ const START: u32 = u32::MAX;
 impl VisibilityGraph {
     /// Build the graph: nodes around every obstacle where `is_free` allows the agent to stand.
     pub fn build(obstacles: &Obstacles, is_free: impl Fn(Vec2) -> bool) -> Self {
-        let (mut nodes, mut fans) = (Vec::new(), Fans::default());
+        let (mut nodes, mut fans) = (Nodes::default(), Fans::default());
         for obstacle in obstacles.iter() {
             fans.push_corner_nodes(obstacle, &is_free, &mut nodes);
         }
-        let edges = nodes.iter().map(|_| OnceLock::new()).collect();
+        let edges = (0..nodes.len()).map(|_| OnceLock::new()).collect();
         Self { nodes, edges }
     }
 
-    /// Return a test of whether a taut path may go straight between a node and `end_m`.
+    /// Return the nodes to which a taut path from a start may go first.
     ///
     /// From an end that lies inside the tangents of a corner, no path passes that corner
-    /// tangentially: there the test accepts every node.
-    fn leads_to(obstacles: &Obstacles, end_m: Vec2) -> impl Fn(&Node) -> bool {
-        let is_hugged = obstacles.is_hugged(end_m);
-        move |node| is_hugged || node.is_tangent_to(end_m)
+    /// tangentially: it may lead to every node.
+    fn first_after(&self, obstacles: &Obstacles, start_m: Vec2) -> Vec<usize> {
+        if obstacles.is_hugged(start_m) {
+            return (0..self.nodes.len()).collect();
+        }
+        self.nodes.tangent_to(Node::end(start_m)).collect()
     }
 
-    /// Return the shortest path between two free points, both included; `None` if there is none.
+    /// Return the shortest path between two free points that do not see each other, both included;
+    /// `None` if there is none.
     ///
     /// # Complexity
     /// A* with the straight line as heuristic: O(k (n + log n)) for k expansions among n nodes the
@@ -111,21 +115,18 @@ impl VisibilityGraph {
         start_m: Vec2,
         target_m: Vec2,
     ) -> Option<Vec<Vec2>> {
-        if obstacles.is_clear_between(start_m, target_m) {
-            return Some(vec![start_m, target_m]);
-        }
-        let ahead_m = |node: u32| distance_2d_m(self.nodes[node as usize].point_m, target_m);
+        let ahead_m = |node: u32| distance_2d_m(self.nodes.point_m(node as usize), target_m);
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, ahead_m);
         let blocker = Cell::new(NONE);
         let sees_target =
             |node: &Node| obstacles.is_clear_between_after(node.point_m, target_m, &blocker);
-        let leads_to_target = Self::leads_to(obstacles, target_m);
+        let is_hugged = obstacles.is_hugged(target_m);
         while let Some(node) = search.pop(self, obstacles, start_m) {
-            let here = &self.nodes[node as usize];
+            let here = self.nodes.at(node as usize);
             // Nodes are expanded in the order of the shortest path that may lead over them, so the
             // first node that sees the target is on the shortest path.
-            if leads_to_target(here) && sees_target(here) {
+            if (is_hugged || here.is_tangent_to(target_m)) && sees_target(&here) {
                 return Some(self.trace(&search, node, start_m, target_m));
             }
             let cost_m = search.cost_m[node as usize];
@@ -164,40 +165,38 @@ impl VisibilityGraph {
                 search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
             }
         }
-        let nodes = self.nodes.iter().enumerate().filter(|&(i, _)| search.is_closed[i]);
-        DistanceField::new(start_m, nodes.map(|(i, &node)| Reached::new(node, search.cost_m[i])))
+        let reached = (0..self.nodes.len()).filter(|&i| search.is_closed[i]);
+        DistanceField::new(
+            start_m,
+            reached.map(|i| Reached::new(self.nodes.at(i), search.cost_m[i])),
+        )
     }
 
     fn edges_of(&self, obstacles: &Obstacles, node: u32) -> &[Edge] {
         self.edges[node as usize].get_or_init(|| {
-            let here = self.nodes[node as usize];
-            let mut edges = self.seen_from_node(obstacles, node, here);
+            let mut edges = self.seen_from_node(obstacles, node as usize);
             edges.shrink_to_fit();
             edges.into_boxed_slice()
         })
     }
 
-    fn seen_from_node(&self, obstacles: &Obstacles, node: u32, here: Node) -> Vec<Edge> {
-        let (mut edges, blocker) = (Vec::new(), Cell::new(NONE));
-        for (i, other) in self.nodes.iter().enumerate() {
-            let is_candidate = i != node as usize
-                && here.is_tangent_to(other.point_m)
-                && other.is_tangent_to(here.point_m);
-            if is_candidate
-                && obstacles.is_clear_between_after(here.point_m, other.point_m, &blocker)
-            {
-                let length_m = distance_2d_m(here.point_m, other.point_m);
-                edges.push(Edge { to: i as u32, length_m });
-            }
-        }
-        edges
+    fn seen_from_node(&self, obstacles: &Obstacles, node: usize) -> Vec<Edge> {
+        let (here, blocker) = (self.nodes.at(node), Cell::new(NONE));
+        let others = self.nodes.tangent_to(here).filter(|&other| other != node);
+        let seen = others.filter_map(|other| {
+            let point_m = self.nodes.point_m(other);
+            let is_seen = obstacles.is_clear_between_after(here.point_m, point_m, &blocker);
+            let length_m = || distance_2d_m(here.point_m, point_m);
+            is_seen.then(|| Edge { to: other as u32, length_m: length_m() })
+        });
+        seen.collect()
     }
 
     fn trace(&self, search: &Search, last: u32, start_m: Vec2, target_m: Vec2) -> Vec<Vec2> {
         let mut path = vec![target_m];
         let mut node = last;
         while node != START {
-            path.push(self.nodes[node as usize].point_m);
+            path.push(self.nodes.point_m(node as usize));
             node = search.parents[node as usize];
         }
         path.push(start_m);
@@ -237,10 +236,8 @@ impl Search {
         start_m: Vec2,
         ahead_m: impl Fn(u32) -> f64,
     ) {
-        let leads_to_start = VisibilityGraph::leads_to(obstacles, start_m);
-        let first = graph.nodes.iter().enumerate().filter(|(_, node)| leads_to_start(node));
-        let open = first.map(|(i, node)| {
-            let (node_index, cost_m) = (i as u32, distance_2d_m(start_m, node.point_m));
+        let open = graph.first_after(obstacles, start_m).into_iter().map(|i| {
+            let (node_index, cost_m) = (i as u32, distance_2d_m(start_m, graph.nodes.point_m(i)));
             let bound_m = cost_m + ahead_m(node_index);
             Open { bound_m, cost_m, node: node_index, parent: START }
         });
@@ -272,7 +269,7 @@ impl Search {
                 || parent == START
                     && !obstacles.is_clear_between_after(
                         start_m,
-                        graph.nodes[i].point_m,
+                        graph.nodes.point_m(i),
                         &self.blocker,
                     )
             {
