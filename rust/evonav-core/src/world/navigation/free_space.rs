@@ -9,7 +9,8 @@ use crate::{
     world::{
         footprint::footprint,
         navigation::{
-            AgentBody, DistanceField, Obstacle, Obstacles, VisibilityGraph, obstacles::NONE,
+            AgentBody, DistanceField, Obstacle, Obstacles, VisibilityGraph, obstacle::Gist,
+            obstacles::NONE,
         },
         scene::{BodyKind, Scene},
     },
@@ -62,8 +63,8 @@ pub struct Navigation {
     agent: AgentBody,
     config: NavigationConfig,
     obstacles: Obstacles,
-    /// Footprints of the floors' parts.
-    floors: Vec<Obstacle>,
+    /// Footprints of the floors' parts, and the boxes that decide most tests of them.
+    floors: Vec<(Gist, Obstacle)>,
     min_m: Vec2,
     max_m: Vec2,
     graph: OnceLock<VisibilityGraph>,
@@ -93,6 +94,7 @@ impl Navigation {
         let obstacles = Obstacles::build(&scene.bodies, thinner, config.step_height_m)?;
         let floors = floors_of(scene)?;
         let [min_m, max_m] = extent_of(&floors);
+        let floors = floors.into_iter().map(|floor| (floor.gist(), floor)).collect();
         Ok(Self { agent, config, obstacles, floors, min_m, max_m, graph: OnceLock::new() })
     }
 
@@ -325,15 +327,23 @@ impl Navigation {
 
     /// Return whether a point is over a floor, up to a slack.
     pub(crate) fn is_indoors(&self, point_m: Vec2) -> bool {
-        self.floors.iter().any(|floor| floor.blocks(point_m))
+        let is_over = |(gist, floor): &(Gist, Obstacle)| {
+            gist.blocks(point_m).unwrap_or_else(|| floor.blocks(point_m))
+        };
+        self.floors.iter().any(is_over)
     }
 
     fn graph(&self) -> &VisibilityGraph {
         self.graph.get_or_init(|| {
             let blocker = Cell::new(NONE);
-            VisibilityGraph::build(&self.obstacles, |point_m| {
+            let is_free = |point_m| {
                 self.obstacles.is_clear_after(point_m, &blocker) && self.is_indoors(point_m)
-            })
+            };
+            let may_be_free = |centre_m, half_m| {
+                !self.obstacles.cover(centre_m, half_m, &blocker)
+                    && !self.floors.iter().all(|(gist, _)| gist.is_apart_from(centre_m, half_m))
+            };
+            VisibilityGraph::build(&self.obstacles, is_free, may_be_free)
         })
     }
 }

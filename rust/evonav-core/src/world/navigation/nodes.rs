@@ -66,11 +66,22 @@ impl Nodes {
 
     /// Return the nodes to which a straight line from a node may go so that it grazes the obstacles
     /// at both.
-    pub(super) fn tangent_to(&self, here: Node) -> impl Iterator<Item = usize> {
-        let is_tangent = evonav_simd::compute(Tangents { nodes: self, here });
-        is_tangent.into_iter().enumerate().filter_map(|(i, is_tangent)| is_tangent.then_some(i))
+    pub(super) fn tangent_to(&self, here: Node) -> Vec<usize> {
+        let are_tangent = evonav_simd::compute(Tangents { nodes: self, here });
+        let mut found = Vec::new();
+        for (k, block) in are_tangent.chunks(BLOCK).enumerate() {
+            // Few blocks have any.
+            if block.iter().fold(false, |any, is_tangent| any | is_tangent) {
+                let numbers = (k * BLOCK..).zip(block);
+                found.extend(numbers.filter(|(_, is_tangent)| **is_tangent).map(|(i, _)| i));
+            }
+        }
+        found
     }
 }
+
+/// Number of nodes that are left out together if none of them is tangent.
+const BLOCK: usize = 16;
 
 struct Tangents<'a> {
     nodes: &'a Nodes,
@@ -83,15 +94,15 @@ impl Kernel for Tangents<'_> {
     #[inline(always)]
     fn compute(self) -> Vec<bool> {
         let Self { nodes, here } = self;
-        let mut is_tangent = vec![false; nodes.len()];
-        let num = is_tangent.len();
+        let mut are_tangent = vec![false; nodes.len()];
+        let num = are_tangent.len();
         let [xs, zs, axs, azs, bxs, bzs] = nodes.columns.each_ref().map(|column| &column[..num]);
-        for (i, is_tangent) in is_tangent.iter_mut().enumerate() {
-            let there =
-                Node { point_m: [xs[i], zs[i]], normals: [[axs[i], azs[i]], [bxs[i], bzs[i]]] };
+        for (i, is_tangent) in are_tangent.iter_mut().enumerate() {
+            let normals = [[axs[i], azs[i]], [bxs[i], bzs[i]]];
+            let there = Node { point_m: [xs[i], zs[i]], normals };
             let leg = [xs[i] - here.point_m[0], zs[i] - here.point_m[1]];
             *is_tangent = here.is_tangent_along(leg) & there.is_tangent_along(leg.map(|v| -v));
         }
-        is_tangent
+        are_tangent
     }
 }

@@ -172,14 +172,34 @@ impl Gist {
         self.is_within(point_m, self.radius_m)
     }
 
+    /// Return whether the agent's axis is surely too close at all points of an upright box.
+    pub(super) fn covers(&self, centre_m: Vec2, half_m: Vec2) -> bool {
+        let [x, z] = [0, 1].map(|i| {
+            ((centre_m[i] - self.centre_m[i]).abs() + half_m[i] - self.half_m[i]).max(0.0)
+        });
+        let reach_m = self.radius_m - HAIR_M;
+        self.is_upright && reach_m > 0.0 && x * x + z * z < reach_m * reach_m
+    }
+
+    /// Return whether the agent's axis is surely far enough away at all points of an upright box.
+    pub(super) fn is_apart_from(&self, centre_m: Vec2, half_m: Vec2) -> bool {
+        (0..2).any(|i| {
+            let gap_m = (centre_m[i] - self.centre_m[i]).abs() - half_m[i] - self.half_m[i];
+            gap_m > self.radius_m + HAIR_M
+        })
+    }
+
     /// Return [`Obstacle::hugs`], if its box decides that.
     pub(super) fn hugs(&self, point_m: Vec2) -> Option<bool> {
         self.is_within(point_m, HUG * self.radius_m)
     }
 
     fn is_within(&self, point_m: Vec2, reach_m: f64) -> Option<bool> {
-        let [x, z] =
-            [0, 1].map(|i| ((point_m[i] - self.centre_m[i]).abs() - self.half_m[i]).max(0.0));
+        let [x, z] = [0, 1].map(|i| {
+            let gap_m = (point_m[i] - self.centre_m[i]).abs() - self.half_m[i];
+            // A number that is none stays none, so that the box decides nothing.
+            if gap_m < 0.0 { 0.0 } else { gap_m }
+        });
         let gap_m2 = x * x + z * z;
         if gap_m2 > (reach_m + HAIR_M).powi(2) {
             return Some(false);

@@ -90,6 +90,19 @@ impl Obstacles {
         false
     }
 
+    /// Return whether one obstacle surely blocks all points of a small upright box: `blocker`, or
+    /// one near the middle.
+    pub(super) fn cover(&self, centre_m: Vec2, half_m: Vec2, blocker: &Cell<u32>) -> bool {
+        let covers = |i: u32| self.gists[i as usize].covers(centre_m, half_m);
+        if blocker.get() != NONE && covers(blocker.get()) {
+            return true;
+        }
+        let Some([row, col]) = self.bucket_of(centre_m) else { return false };
+        let Some(&found) = self.bucket(row, col).iter().find(|&&i| covers(i)) else { return false };
+        blocker.set(found);
+        true
+    }
+
     /// Return whether a point is in collision or so close to it that it may lie between a rounded
     /// corner and the corner's tangents.
     pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {

@@ -83,10 +83,16 @@ const START: u32 = u32::MAX;
 
 impl VisibilityGraph {
     /// Build the graph: nodes around every obstacle where `is_free` allows the agent to stand.
-    pub fn build(obstacles: &Obstacles, is_free: impl Fn(Vec2) -> bool) -> Self {
+    /// Where `may_be_free` is false, for the middle and half the size of an upright box, no point
+    /// of the box is free.
+    pub fn build(
+        obstacles: &Obstacles,
+        is_free: impl Fn(Vec2) -> bool,
+        may_be_free: impl Fn(Vec2, Vec2) -> bool,
+    ) -> Self {
         let (mut nodes, mut fans) = (Nodes::default(), Fans::default());
         for obstacle in obstacles.iter() {
-            fans.push_corner_nodes(obstacle, &is_free, &mut nodes);
+            fans.push_corner_nodes(obstacle, &is_free, &may_be_free, &mut nodes);
         }
         let edges = (0..nodes.len()).map(|_| OnceLock::new()).collect();
         Self { nodes, edges }
@@ -100,7 +106,7 @@ impl VisibilityGraph {
         if obstacles.is_hugged(start_m) {
             return (0..self.nodes.len()).collect();
         }
-        self.nodes.tangent_to(Node::end(start_m)).collect()
+        self.nodes.tangent_to(Node::end(start_m))
     }
 
     /// Return the shortest path between two free points that do not see each other, both included;
@@ -182,7 +188,7 @@ impl VisibilityGraph {
 
     fn seen_from_node(&self, obstacles: &Obstacles, node: usize) -> Vec<Edge> {
         let (here, blocker) = (self.nodes.at(node), Cell::new(NONE));
-        let others = self.nodes.tangent_to(here).filter(|&other| other != node);
+        let others = self.nodes.tangent_to(here).into_iter().filter(|&other| other != node);
         let seen = others.filter_map(|other| {
             let point_m = self.nodes.point_m(other);
             let is_seen = obstacles.is_clear_between_after(here.point_m, point_m, &blocker);
