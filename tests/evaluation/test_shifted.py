@@ -118,6 +118,7 @@ def test_the_agent_behind_a_shift_passes_everything_on():
         "cpu_s",
         "begin_task",
         "begin_stage",
+        "look",
         "act",
         "diagnostics",
         "entries",
