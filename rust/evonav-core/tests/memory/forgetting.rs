@@ -204,11 +204,11 @@ fn the_size_is_that_of_points_and_tables() {
         let blocks = points.iter().map(|point| point.map(|v| (v / edge_m).floor() as i32));
         blocks.collect::<BTreeSet<_>>().len()
     };
-    // Three coordinates and a link a point; a bit a voxel and a number a cell, in blocks of 64.
+    // Three coordinates and a link a point; a bit a voxel, and a link and bits a block, in cubes of
+    // 64 blocks.
     let estimate = |points: &[Point]| {
         points.len() * (size_of::<Point>() + size_of::<u32>())
-            + num_blocks(points, 0.04) * size_of::<u64>()
-            + num_blocks(points, 0.1) * 64 * size_of::<u32>()
+            + num_blocks(points, 0.16) * 64 * (size_of::<u64>() + size_of::<u32>())
     };
     let least: usize = map.entries().iter().map(|entry| estimate(entry.cloud.points())).sum();
     // Vectors and hash tables have at most about as much room again, and blocks a key each.

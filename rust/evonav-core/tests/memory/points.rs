@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use evonav_core::{
-    memory::objects::{cloud::Cloud, dbscan::dbscan, voxels::voxel_filter},
+    memory::objects::{cloud::Cloud, dbscan::dbscan, voxel_filter::voxel_filter},
     sensors::unproject::{MaskedDepth, Point},
 };
 use proptest::{collection::vec, prelude::*};

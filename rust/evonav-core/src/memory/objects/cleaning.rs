@@ -5,16 +5,23 @@ use std::borrow::Cow;
 use crate::{
     geometry::{Aabb, Vec3},
     memory::objects::{
-        ObjectMapConfig,
-        cloud::Cloud,
-        dbscan::largest_cluster,
-        voxels::{bounds, voxel_filter},
+        ObjectMapConfig, cloud::Cloud, dbscan::largest_cluster, point_blocks::PointBlocks,
+        voxel_filter::voxel_filter, voxels::bounds,
     },
     sensors::unproject::Point,
 };
 
-/// Clean a detection's points; return them with the box around them, or `None` if too few are left.
-pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<Point>, Aabb)> {
+/// The points of a detection.
+#[derive(Debug, Clone)]
+pub(crate) struct Patch {
+    pub(crate) points: Vec<Point>,
+    /// The same by voxel.
+    pub(crate) blocks: PointBlocks,
+    pub(crate) bounds_m: Aabb,
+}
+
+/// Clean a detection's points; `None` if too few are left.
+pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<Patch> {
     if points.len() < config.min_points {
         return None;
     }
@@ -28,7 +35,10 @@ pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<P
     let bounds_m = Aabb { min_m, max_m };
     // A picture on a wall is a plane, but as a set of voxels it has a volume.
     let volume_m3: f64 = bounds_m.size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
-    (volume_m3 >= config.min_box_m3).then_some((cluster, bounds_m))
+    (volume_m3 >= config.min_box_m3).then(|| {
+        let blocks = PointBlocks::new(&cluster, 1.0 / config.voxel_m);
+        Patch { points: cluster, blocks, bounds_m }
+    })
 }
 
 /// Reduce an entry's cloud to its largest cluster, if enough points are left.

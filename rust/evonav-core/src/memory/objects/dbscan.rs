@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::LazyLock};
 
 use crate::{
     grid::components::find,
-    memory::objects::voxels::{Voxel, VoxelIndex, bounds, voxel_of},
+    memory::objects::voxels::{Voxel, VoxelIndex, bounds, voxel_of, voxels_of},
     sensors::unproject::Point,
 };
 
@@ -123,8 +123,7 @@ impl<'a> Grid<'a> {
         let num = points.len() / 4;
         let (mut voxels, mut slots) = (Vec::with_capacity(num), Vec::with_capacity(num));
         let mut sizes: Vec<u32> = Vec::with_capacity(num);
-        let enter = |&point: &Point| {
-            let voxel = voxel_of(point, inverse_edge);
+        let enter = |voxel: Voxel| {
             let slot = index.slot(voxel);
             let cell = index.entry_at(slot, voxel, voxels.len() as u32);
             if cell as usize == voxels.len() {
@@ -135,7 +134,7 @@ impl<'a> Grid<'a> {
             sizes[cell as usize] += 1;
             cell
         };
-        let cell_of: Vec<u32> = points.iter().map(enter).collect();
+        let cell_of: Vec<u32> = voxels_of(points, inverse_edge).into_iter().map(enter).collect();
         let mut starts = Vec::with_capacity(voxels.len() + 1);
         let mut num_fours = 0;
         starts.push(0);

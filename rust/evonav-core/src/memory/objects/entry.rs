@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::{Aabb, Vec3},
-    memory::objects::{ObjectMapConfig, cloud::Cloud},
+    memory::objects::{ObjectMapConfig, cleaning::Patch, cloud::Cloud},
     sensors::unproject::Point,
 };
 
@@ -12,8 +12,7 @@ pub(crate) struct Sighting {
     pub(crate) label: String,
     pub(crate) confidence: f32,
     pub(crate) feature: Option<Vec<f32>>,
-    pub(crate) points: Vec<Point>,
-    pub(crate) bounds_m: Aabb,
+    pub(crate) patch: Patch,
 }
 
 /// An object entry: detections that appear to be of one object.
@@ -51,13 +50,16 @@ impl Entry {
         view: u64,
         config: &ObjectMapConfig,
     ) -> Self {
+        let Patch { points, blocks, .. } = &sighting.patch;
+        let radius_m = config.overlap_radius_m as f32;
+        let cloud = Cloud::of_blocks(points, blocks, config.voxel_m, radius_m);
         Self {
             id,
             label_counts: vec![(sighting.label, 1)],
             num_detections: 1,
             confidence: sighting.confidence,
             feature: sighting.feature,
-            cloud: Cloud::new(&sighting.points, config.voxel_m, config.overlap_radius_m as f32),
+            cloud,
             first_seen_stage: stage,
             last_seen_stage: stage,
             last_seen_view: view,
@@ -104,15 +106,15 @@ impl Entry {
     pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
         self.count(vec![(sighting.label, 1)], sighting.feature, 1);
         self.confidence = self.confidence.max(sighting.confidence);
-        self.grow(&sighting.points);
+        self.grow(|cloud| cloud.merge_blocks(&sighting.patch.points, &sighting.patch.blocks));
         self.last_seen_stage = stage;
         self.last_seen_view = view;
     }
 
-    /// Add points to voxels without a point.
-    fn grow(&mut self, points: &[Point]) {
+    /// Merge points into the cloud.
+    fn grow(&mut self, merge: impl FnOnce(&mut Cloud)) {
         let num_points = self.cloud.points().len();
-        self.cloud.merge(points);
+        merge(&mut self.cloud);
         self.is_changed = true;
         self.has_grown |= self.cloud.points().len() != num_points;
     }
@@ -137,7 +139,7 @@ impl Entry {
     pub(crate) fn absorb(&mut self, other: Self) {
         self.count(other.label_counts, other.feature, other.num_detections);
         self.confidence = self.confidence.max(other.confidence);
-        self.grow(other.cloud.points());
+        self.grow(|cloud| cloud.merge(other.cloud.points()));
         self.first_seen_stage = self.first_seen_stage.min(other.first_seen_stage);
         self.last_seen_stage = self.last_seen_stage.max(other.last_seen_stage);
         self.last_seen_view = self.last_seen_view.max(other.last_seen_view);

@@ -7,10 +7,12 @@ pub mod dbscan;
 pub mod depth_evidence;
 mod entry;
 mod object_map;
+mod point_blocks;
 pub mod seen_through;
 pub mod sight_lines;
 mod size;
 mod visibility;
+pub mod voxel_filter;
 pub mod voxels;
 
 pub use config::ObjectMapConfig;

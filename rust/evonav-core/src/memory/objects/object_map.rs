@@ -10,10 +10,11 @@ use crate::{
     geometry::{Vec3, distance_2d_m},
     memory::objects::{
         Entry, ObjectMapConfig,
-        cleaning::{centroid_m, clean, denoise},
+        cleaning::{Patch, centroid_m, clean, denoise},
         cloud::Cloud,
         depth_evidence::{DepthEvidence, EvidenceConfig, depth_evidence},
         entry::Sighting,
+        point_blocks::PointBlocks,
         sight_lines::{SightConfig, reach_m, visible_shares},
     },
     sensors::{
@@ -175,8 +176,8 @@ impl ObjectMap {
         let compare = |sighting: Option<Sighting>| match sighting {
             None => Comparison { overlap: 0.0, distance_m: f64::INFINITY },
             Some(sighting) => Comparison {
-                overlap: entry.cloud.overlap(&sighting.points),
-                distance_m: distance_m(centroid_m(&sighting.points), centre_m),
+                overlap: entry.cloud.overlap_blocks(&sighting.patch.points, &sighting.patch.blocks),
+                distance_m: distance_m(centroid_m(&sighting.patch.points), centre_m),
             },
         };
         Ok(self.sightings(view, f64::INFINITY)?.into_iter().map(compare).collect())
@@ -230,15 +231,14 @@ impl ObjectMap {
         let [x, _, z] = view.image.camera.position_m;
         let clouds = unproject_masks(view.image, num, config.max_points)?;
         let sightings = clouds.into_iter().enumerate().map(|(index, points)| {
-            let (points, bounds_m) = clean(&points, config)?;
-            let [centre_x, _, centre_z] = bounds_m.centre_m();
+            let patch = clean(&points, config)?;
+            let [centre_x, _, centre_z] = patch.bounds_m.centre_m();
             let is_near = distance_2d_m([x, z], [centre_x, centre_z]) <= max_distance_m;
             is_near.then(|| Sighting {
                 label: view.labels[index].clone(),
                 confidence: view.confidences[index],
                 feature: features.map(|n| view.features[index * n..(index + 1) * n].to_vec()),
-                points,
-                bounds_m,
+                patch,
             })
         });
         Ok(sightings.collect())
@@ -270,6 +270,7 @@ impl ObjectMap {
     /// Return the entry, among the first `num`, that resembles a sighting most, if the similarity
     /// exceeds the threshold.
     fn best_match(&self, sighting: &Sighting, num: usize) -> Option<usize> {
+        let Patch { points, blocks, bounds_m, .. } = &sighting.patch;
         let threshold = self.config.match_threshold;
         let visual = |entry: &Entry| {
             self.config.visual_weight
@@ -279,7 +280,7 @@ impl ObjectMap {
         let candidates: Vec<(usize, f64)> = self.entries[..num]
             .iter()
             .enumerate()
-            .filter(|(_, entry)| entry.is_beside(&sighting.bounds_m, &self.config))
+            .filter(|(_, entry)| entry.is_beside(bounds_m, &self.config))
             .map(|(index, entry)| (index, visual(entry)))
             .filter(|&(_, visual)| visual + 1.0 > threshold)
             .collect();
@@ -288,12 +289,12 @@ impl ObjectMap {
         if let [(index, visual)] = candidates[..] {
             let is_enough = |overlap| visual + overlap > threshold;
             let cloud = &self.entries[index].cloud;
-            return cloud.overlaps(&sighting.points, is_enough).then_some(index);
+            return cloud.overlaps(points, blocks, is_enough).then_some(index);
         }
         let mut best = (threshold, None);
         for (index, visual) in candidates {
             if visual + 1.0 > best.0 {
-                let similarity = visual + self.entries[index].cloud.overlap(&sighting.points);
+                let similarity = visual + self.entries[index].cloud.overlap_blocks(points, blocks);
                 if similarity > best.0 {
                     best = (similarity, Some(index));
                 }
@@ -348,8 +349,9 @@ impl ObjectMap {
                 let is_new = i != j && (a.is_changed || b.is_changed);
                 if is_new && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
                     let points = a.cloud.points();
-                    if b.cloud.overlaps(points, |overlap| overlap > config.merge_overlap) {
-                        pairs.push((b.cloud.overlap(points), i, j));
+                    let blocks = PointBlocks::new(points, 1.0 / config.voxel_m);
+                    if b.cloud.overlaps(points, &blocks, |overlap| overlap > config.merge_overlap) {
+                        pairs.push((b.cloud.overlap_blocks(points, &blocks), i, j));
                     }
                 }
             }

@@ -1,4 +1,6 @@
-//! Voxels by hash: the voxel filter, and the tables of neighbour queries.
+//! Voxels: which one contains a point, and tables of voxels.
+
+use evonav_simd::Kernel;
 
 use crate::sensors::unproject::Point;
 
@@ -10,8 +12,34 @@ pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
     point.map(|value| floor(f64::from(value) * inverse_edge))
 }
 
+/// Return the voxel that contains each point; see [`voxel_of`].
+pub(crate) fn voxels_of(points: &[Point], inverse_edge: f64) -> Vec<Voxel> {
+    let mut voxels = vec![[0; 3]; points.len()];
+    let floors = voxels.as_flattened_mut();
+    evonav_simd::compute(Floors { values: points.as_flattened(), inverse_edge, floors });
+    voxels
+}
+
+struct Floors<'a> {
+    values: &'a [f32],
+    inverse_edge: f64,
+    floors: &'a mut [i32],
+}
+
+impl Kernel for Floors<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        for (whole, value) in self.floors.iter_mut().zip(self.values) {
+            *whole = floor(f64::from(*value) * self.inverse_edge);
+        }
+    }
+}
+
 /// Return the largest whole number that is not above a value, or the nearest `i32`.
-fn floor(value: f64) -> i32 {
+#[inline(always)]
+pub(crate) fn floor(value: f64) -> i32 {
     // `f64::floor` is a library call on baseline x86-64, and a conversion checks what it converts.
     // Added to this number, a value is rounded to a whole one, which the lowest bits then show.
     const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
@@ -37,10 +65,11 @@ impl VoxelTable {
         Self { slots: vec![(FREE_SLOT, 0); (num * 2).next_power_of_two().max(16)], len: 0 }
     }
 
-    fn num_heap_bytes(&self) -> usize {
+    pub(crate) fn num_heap_bytes(&self) -> usize {
         self.slots.capacity() * size_of::<(u64, u32)>()
     }
 
+    #[inline]
     pub(crate) fn get(&self, voxel: Voxel) -> Option<u32> {
         let key = key_of(voxel);
         let (found, value) = self.slots[self.slot(key)];
@@ -81,82 +110,6 @@ impl VoxelTable {
                 self.slots[slot] = (key, value);
             }
         }
-    }
-}
-
-/// A value for each block of 4 x 4 x 4 voxels, since the voxels of a surface lie together.
-#[derive(Debug, Clone)]
-pub(crate) struct Blocks<T> {
-    /// Index in `values` of each block.
-    index: VoxelTable,
-    values: Vec<T>,
-    /// Block that was used last, and the index of its value.
-    last: (Voxel, usize),
-}
-
-impl<T> Blocks<T> {
-    pub(crate) fn with_capacity(num: usize) -> Self {
-        let (index, values) = (VoxelTable::with_capacity(num), Vec::with_capacity(num));
-        Self { index, values, last: ([i32::MAX; 3], 0) }
-    }
-
-    /// Return the number of bytes of the values and of the table that finds them.
-    pub(crate) fn num_heap_bytes(&self) -> usize {
-        self.index.num_heap_bytes() + self.values.capacity() * size_of::<T>()
-    }
-
-    /// Return the value of a voxel's block.
-    pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
-        self.index.get(block_of(voxel)).map(|index| &self.values[index as usize])
-    }
-
-    /// Return the value of a voxel's block, which is `new` if there was none, and the voxel's
-    /// [`place`].
-    pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
-        let voxel = clamped(voxel);
-        let block = voxel.map(|i| i >> 2);
-        if block != self.last.0 {
-            let (&mut index, is_new) = self.index.entry(block, self.values.len() as u32);
-            if is_new {
-                self.values.push(new);
-            }
-            self.last = (block, index as usize);
-        }
-        (&mut self.values[self.last.1], place_in_block(voxel))
-    }
-}
-
-/// Return the position of a voxel in its block: 0 to 63.
-pub(crate) fn place(voxel: Voxel) -> usize {
-    place_in_block(clamped(voxel))
-}
-
-/// Return the same as [`place`] for a voxel within the bounds.
-fn place_in_block(voxel: Voxel) -> usize {
-    let [x, y, z] = voxel.map(|i| (i & 3) as usize);
-    x << 4 | y << 2 | z
-}
-
-/// A set of voxels.
-#[derive(Debug, Clone)]
-pub(crate) struct VoxelSet(Blocks<u64>);
-
-impl VoxelSet {
-    pub(crate) fn with_capacity(num_blocks: usize) -> Self {
-        Self(Blocks::with_capacity(num_blocks))
-    }
-
-    /// Return the number of bytes of the set's table.
-    pub(crate) fn num_heap_bytes(&self) -> usize {
-        self.0.num_heap_bytes()
-    }
-
-    /// Insert a voxel; return whether it is new.
-    pub(crate) fn insert(&mut self, voxel: Voxel) -> bool {
-        let (bits, place) = self.0.entry(voxel, 0);
-        let is_new = *bits >> place & 1 == 0;
-        *bits |= 1 << place;
-        is_new
     }
 }
 
@@ -219,11 +172,13 @@ impl VoxelIndex {
     }
 
     /// Return the value of a voxel; `value` is inserted if there is none.
+    #[inline]
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> u32 {
         self.entry_at(self.slot(voxel), voxel, value)
     }
 
     /// Return the same as [`VoxelIndex::entry`] for a voxel whose slot is known.
+    #[inline]
     pub(crate) fn entry_at(&mut self, slot: usize, voxel: Voxel, value: u32) -> u32 {
         match self {
             Self::Dense { slots, .. } => {
@@ -244,16 +199,12 @@ fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
     (x * size[1] + y) * size[2] + z
 }
 
-const HALF: i32 = 1 << 20;
-
-/// Return the block of 4 x 4 x 4 voxels around a voxel.
-fn block_of(voxel: Voxel) -> Voxel {
-    clamped(voxel).map(|i| i >> 2)
-}
+/// Largest number of voxels from the origin to a voxel that is distinguished.
+pub(crate) const HALF: i32 = 1 << 20;
 
 /// Clamp a voxel's index: voxels within a million of the origin (10 km at 0.01 m) are
 /// distinguished.
-fn clamped(voxel: Voxel) -> Voxel {
+pub(crate) fn clamped(voxel: Voxel) -> Voxel {
     voxel.map(|i| i.clamp(-HALF, HALF - 1))
 }
 
@@ -265,57 +216,44 @@ fn key_of(voxel: Voxel) -> u64 {
 /// Return the smallest and the largest corner of the box around points; `None` without points.
 pub(crate) fn bounds(points: &[Point]) -> Option<[Point; 2]> {
     let &first = points.first()?;
-    Some(points.iter().fold([first; 2], |[low, high], point| {
-        // `f32::min` looks out for NaN, which takes longer.
-        let lower = [0, 1, 2].map(|i| if point[i] < low[i] { point[i] } else { low[i] });
-        [lower, [0, 1, 2].map(|i| if point[i] > high[i] { point[i] } else { high[i] })]
-    }))
+    // Four points at a time.
+    let (fours, rest) = points.as_flattened().as_chunks::<12>();
+    let mut low: [f32; 12] = std::array::from_fn(|i| first[i % 3]);
+    let mut high = low;
+    for four in fours {
+        low = std::array::from_fn(|i| low[i].min(four[i]));
+        high = std::array::from_fn(|i| high[i].max(four[i]));
+    }
+    for (i, &value) in rest.iter().enumerate() {
+        (low[i], high[i]) = (low[i].min(value), high[i].max(value));
+    }
+    let lowest = |i: usize| (3..12).step_by(3).fold(low[i], |value, step| low[i + step].min(value));
+    let highest =
+        |i: usize| (3..12).step_by(3).fold(high[i], |value, step| high[i + step].max(value));
+    Some([[0, 1, 2].map(lowest), [0, 1, 2].map(highest)])
 }
 
-/// Reduce points to one per voxel, the mean of the points inside, in the order of the voxels' first
-/// points. This is Open3D's `voxel_down_sample` with voxels aligned to the world instead of the
-/// cloud.
-pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
-    let inverse_edge = 1.0 / edge_m;
-    let Some(corners) = bounds(points) else { return Vec::new() };
-    let corners = corners.map(|corner| block_of(voxel_of(corner, inverse_edge)));
-    let mut index = VoxelIndex::between(corners, 0, points.len());
-    // Number of the average of each voxel, by blocks.
-    let mut blocks: Vec<[u32; 64]> = Vec::with_capacity(points.len() / 4);
-    let mut last = ([i32::MAX; 3], 0);
-    let mut averages: Vec<Point> = Vec::with_capacity(points.len());
-    // Of the voxels with several points: sum, number of points, and number of the average.
-    let mut sums: Vec<([f64; 3], f64, u32)> = Vec::new();
-    let mut sum_of: Vec<u32> = Vec::with_capacity(points.len());
-    for &point in points {
-        let voxel = clamped(voxel_of(point, inverse_edge));
-        let block = voxel.map(|i| i >> 2);
-        if block != last.0 {
-            last = (block, index.entry(block, blocks.len() as u32) as usize);
-            if last.1 == blocks.len() {
-                blocks.push([FREE_INDEX; 64]);
-            }
+#[cfg(test)]
+mod tests {
+    use proptest::{collection::vec, prelude::*};
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn many_points_at_once_are_as_one_by_one(
+            points in vec([-9.0_f32..9.0, -1e-3_f32..1e-3, -1e30_f32..1e30], 0..40),
+            edge_m in 0.001..2.0,
+        ) {
+            let one_by_one: Vec<Voxel> =
+                points.iter().map(|&point| voxel_of(point, 1.0 / edge_m)).collect();
+            prop_assert_eq!(voxels_of(&points, 1.0 / edge_m), one_by_one);
+            let extreme = |axis: usize, pick: fn(f32, f32) -> f32| {
+                points.iter().map(|point| point[axis]).reduce(pick)
+            };
+            let corner = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|axis| extreme(axis, pick));
+            let corners = bounds(&points).map(|corners| corners.map(|corner| corner.map(Some)));
+            prop_assert_eq!(corners.unwrap_or_default(), [corner(f32::min), corner(f32::max)]);
         }
-        let average = &mut blocks[last.1][place_in_block(voxel)];
-        if *average == FREE_INDEX {
-            *average = averages.len() as u32;
-            averages.push(point);
-            sum_of.push(FREE_INDEX);
-            continue;
-        }
-        let sum = &mut sum_of[*average as usize];
-        if *sum == FREE_INDEX {
-            *sum = sums.len() as u32;
-            sums.push((averages[*average as usize].map(f64::from), 1.0, *average));
-        }
-        let (sum, count, _) = &mut sums[*sum as usize];
-        for (sum, value) in sum.iter_mut().zip(point) {
-            *sum += f64::from(value);
-        }
-        *count += 1.0;
     }
-    for (sum, count, average) in sums {
-        averages[average as usize] = sum.map(|value| (value / count) as f32);
-    }
-    averages
 }

@@ -1,0 +1,46 @@
+//! Thin point clouds.
+
+use crate::{memory::objects::point_blocks::PointBlocks, sensors::unproject::Point};
+
+/// Reduce points to one per voxel, the mean of the points inside, in the order of the voxels' first
+/// points. This is Open3D's `voxel_down_sample` with voxels aligned to the world instead of the
+/// cloud.
+pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
+    const ALONE: u32 = u32::MAX;
+    let PointBlocks { blocks, spots } = PointBlocks::new(points, 1.0 / edge_m);
+    let num_voxels: u32 = blocks.iter().map(|(_, bits)| bits.count_ones()).sum();
+    if num_voxels as usize == points.len() {
+        return points.to_vec();
+    }
+    // The voxels still to be met in each block, and number of the average of the others.
+    let mut left: Vec<u64> = blocks.iter().map(|&(_, bits)| bits).collect();
+    let mut numbers = vec![[0_u32; 64]; blocks.len()];
+    let mut averages: Vec<Point> = Vec::with_capacity(num_voxels as usize);
+    // Of the voxels with several points: sum, number of points, and number of the average.
+    let mut sums: Vec<([f64; 3], f64, u32)> = Vec::new();
+    let mut sum_of: Vec<u32> = Vec::with_capacity(num_voxels as usize);
+    for (&point, spot) in points.iter().zip(&spots) {
+        let average = &mut numbers[spot.block()][spot.place()];
+        if left[spot.block()] & spot.bit() != 0 {
+            left[spot.block()] ^= spot.bit();
+            *average = averages.len() as u32;
+            averages.push(point);
+            sum_of.push(ALONE);
+            continue;
+        }
+        let sum = &mut sum_of[*average as usize];
+        if *sum == ALONE {
+            *sum = sums.len() as u32;
+            sums.push((averages[*average as usize].map(f64::from), 1.0, *average));
+        }
+        let (sum, count, _) = &mut sums[*sum as usize];
+        for (sum, value) in sum.iter_mut().zip(point) {
+            *sum += f64::from(value);
+        }
+        *count += 1.0;
+    }
+    for (sum, count, average) in sums {
+        averages[average as usize] = sum.map(|value| (value / count) as f32);
+    }
+    averages
+}
