@@ -98,8 +98,11 @@ class Silent:
     def describe(self, label):
         pass
 
-    def ask(self, operation, *arguments):
-        if operation == "costs":
+    def send(self, operation, *arguments):
+        self.operation = operation
+
+    def answer(self):
+        if self.operation == "costs":
             raise AgentFailedError(ErrorKind.AGENT, "ZeroDivisionError: division by zero")
         return {"sensors": wire.SENSORS.write(SensorConfig())}
 

@@ -130,7 +130,7 @@ def test_failures_are_contained_as_without_a_sandbox(tmp_path):
     ],
 )
 def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, change, num_workers, reason):
-    monkeypatch.setattr("evonav.evaluation.hosting.process.why_not", lambda: "")
+    monkeypatch.setattr("evonav.evaluation.run.components.why_not", lambda: "")
     write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=replace(TOY, **change), hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match=f"isolation = sandbox: .*{reason}"):
@@ -141,7 +141,7 @@ def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, 
 
 
 def test_a_system_without_one_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("evonav.evaluation.hosting.process.why_not", lambda: "this kernel offers no Landlock")
+    monkeypatch.setattr("evonav.evaluation.run.components.why_not", lambda: "this kernel offers no Landlock")
     write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=TOY, hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match="isolation = sandbox: this kernel offers no Landlock"):

@@ -17,7 +17,7 @@ from evonav.agents.agent import EntryBelief, NavigateTo, RoundDiagnostics, Senso
 from evonav.agents.hosting import wire
 from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.vlm.answer import read_answer, read_response, usage_of
-from evonav.decision.vlm.relay import RESPONSE, read_request, request_bytes
+from evonav.decision.vlm.relay import read_request, request_bytes, response_type
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.house import bundled_houses, stream_houses
 from evonav.house.asset_sizes import read_asset_sizes
@@ -197,7 +197,7 @@ def responses(_folder: Path) -> Reader:
         with suppress(InvalidArgumentError):
             read_request(data + line_end + pixels)
         with suppress(ValueError):
-            RESPONSE.validate_json(data, strict=True)
+            response_type().validate_json(data, strict=True)
         response = read_response(data.decode(errors="replace"))
         usage_of(response)
         read_answer(response, "key", is_replayed=False)

@@ -1,7 +1,6 @@
 """Parse and show commands as evonav does: `-h`, plain flags, panels in order, and old names that still work."""
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from typing import Any
 
 import typer
@@ -89,24 +88,17 @@ class Group(_Shown, TyperGroup):
         places = {name: place for place, name in enumerate(self.order)}
         return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(places)))
 
-    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's
-        """Run the called command, in its `beginning` if it has one."""
-        args: list[str] = [*ctx._protected_args, *ctx.args]
-        command = self.commands.get(args[0]) if args else None
-        beginning = getattr(getattr(command, "callback", None), "beginning", None)
-        with nullcontext() if beginning is None or _asks_for_help(args) else beginning():
-            return super().invoke(ctx)
-
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - click's
         """Return the called command's name, the command with all its options, and its arguments."""
         args = in_new_names(str(self.name), args, is_quiet=ctx.resilient_parsing)
         name, command, rest = super().resolve_command(ctx, args)
-        expand = getattr(getattr(command, "callback", None), "expand", None)
+        callback, asks_for_help = getattr(command, "callback", None), ctx.resilient_parsing or _asks_for_help(rest)
+        beginning, expand = getattr(callback, "beginning", None), getattr(callback, "expand", None)
+        if beginning is not None and not asks_for_help:
+            ctx.with_resource(beginning())
         if command is not None and expand is not None:
             app = new_app()
-            app.command(name, help=command.help, epilog=command.epilog, cls=Command)(
-                expand(has_help=ctx.resilient_parsing or _asks_for_help(rest))
-            )
+            app.command(name, help=command.help, epilog=command.epilog, cls=Command)(expand(has_help=asks_for_help))
             command = typer.main.get_command(app)
         return name, command, rest
 
