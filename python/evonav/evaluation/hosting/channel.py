@@ -31,14 +31,9 @@ class SharedBlock:
             with tempfile.TemporaryFile() as file:
                 self.descriptor = os.dup(file.fileno())
         self._map: mmap.mmap | None = None
-        self._end = 0
-        """Number of bytes that were written last."""
 
     def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
-        """Copy buffers into the shared memory, and return offset and size of each.
-
-        What is beyond them is given back: the first round of a stage has more views than later ones.
-        """
+        """Copy buffers into the shared memory, and return offset and size of each."""
         views = [buffer.raw() for buffer in buffers]
         places, end = [], 0
         for view in views:
@@ -50,7 +45,6 @@ class SharedBlock:
             os.ftruncate(self.descriptor, end)
             self._map = mmap.mmap(self.descriptor, end)
         if self._map is not None:
-            self._give_back(end)
             with memoryview(self._map) as block:
                 for (offset, size), view in zip(places, views, strict=True):
                     block[offset : offset + size] = view
@@ -58,15 +52,6 @@ class SharedBlock:
             view.release()
             buffer.release()
         return places
-
-    def _give_back(self, end: int) -> None:
-        """Free the pages after the first bytes; they are empty if they are used again."""
-        assert self._map is not None
-        start = -(-end // mmap.PAGESIZE) * mmap.PAGESIZE
-        if hasattr(mmap, "MADV_REMOVE") and start < self._end:
-            with suppress(OSError):  # a system without it keeps them
-                self._map.madvise(mmap.MADV_REMOVE, start, len(self._map) - start)
-        self._end = end
 
     def close(self) -> None:
         """Release the shared memory; the reader keeps its own."""
