@@ -2,6 +2,8 @@
 
 use evonav_simd::Kernel;
 
+use crate::grid::bits::ones;
+
 /// Equal pixels beside each other in a row of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Run {
@@ -29,7 +31,9 @@ pub(crate) fn runs(pixels: &[i32], width_px: usize) -> impl Iterator<Item = Run>
     for first in (0..pixels.len()).step_by(width_px.max(1)) {
         starts[first / 64] |= 1 << (first % 64);
     }
-    let mut starts = ones(starts).chain([pixels.len()]);
+    let starts = starts.into_iter().enumerate();
+    let starts = starts.flat_map(|(index, bits)| ones(bits).map(move |bit| index * 64 + bit));
+    let mut starts = starts.chain([pixels.len()]);
     let mut begin = starts.next().unwrap_or(0);
     let (mut row, mut first) = (0, 0);
     starts.map(move |end| {
@@ -39,15 +43,6 @@ pub(crate) fn runs(pixels: &[i32], width_px: usize) -> impl Iterator<Item = Run>
         let run = Run { value: pixels[begin], row, cols: [begin - first, end - first] };
         begin = end;
         run
-    })
-}
-
-/// Return the indices of the bits that are set.
-fn ones(bits: Vec<u64>) -> impl Iterator<Item = usize> {
-    bits.into_iter().enumerate().flat_map(|(index, word)| {
-        let left = std::iter::successors(Some(word), |left| Some(left & left.wrapping_sub(1)));
-        left.take_while(|&left| left != 0)
-            .map(move |left| index * 64 + left.trailing_zeros() as usize)
     })
 }
 

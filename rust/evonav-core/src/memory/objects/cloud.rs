@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::{
     geometry::Aabb,
+    grid::bits::ones,
     memory::objects::{
         dbscan::distance2,
         point_blocks::{PointBlocks, bits_between, block_of, place},
@@ -305,15 +306,6 @@ impl<'a> Finder<'a> {
         }
         self.found[number] = Some((near, begin..self.around.len()));
     }
-}
-
-/// Return the places of the bits that are set.
-fn ones(mut bits: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let place = (bits != 0).then_some(bits.trailing_zeros() as usize);
-        bits &= bits.wrapping_sub(1);
-        place
-    })
 }
 
 /// Return the cube of a block.
