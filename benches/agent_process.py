@@ -38,6 +38,7 @@ with the import of the agent.
 """
 SIDE_PX = 300
 NUM_ROUNDS = 200
+NUMS_OF_VIEWS = (0, 1, 3, 7)
 NUM_TASKS = 4
 NUM_PAIRS = 2
 
@@ -71,7 +72,7 @@ def run() -> str:
 def _rounds() -> Iterator[str]:
     yield "| views of 300x300, with colours | wall | CPU | by pipe: wall | CPU | CPU ratio |"
     yield "| --- | --- | --- | --- | --- | --- |"
-    for num_views in (0, 1, 3, 7):
+    for num_views in NUMS_OF_VIEWS:
         seen = _observation(num_views)
         with _agent() as agent, _by_pipe() as pipe:
             ours, peers = [], []
@@ -103,7 +104,8 @@ def _agent() -> Iterator[RemoteAgent]:
 
 def _timed_agent(agent: RemoteAgent, seen: Observation) -> tuple[float, float]:
     wall_s, cpu_s = time.perf_counter(), time.process_time() + agent.cpu_s
-    agent.act(seen)
+    agent.look(seen)
+    agent.act()
     return time.perf_counter() - wall_s, time.process_time() + agent.cpu_s - cpu_s
 
 
