@@ -151,6 +151,14 @@ class HouseObject:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
+def object_outlines(house: House) -> list[tuple[str, str, _Vec3, _Vec3, list[_Vec2], list[list[_Vec2]]]]:
+    """Return the objects of a house as drawings show them, in order of `objects`, without those that have no parts.
+
+    Id, category, centre and size of the axis-aligned box, its corners `(x, z)`, and the convex outlines of the parts,
+    each once, lower ones first. Corners and outlines are rounded to the millimetre. Unknown assets have the size and
+    shape of their category; `HouseError` if that is unknown, too.
+    """
+
 def assets() -> list[tuple[str, str, _Vec3]]:
     """Return id, category and box size in metres of every asset of the catalogue, ordered by id."""
 

@@ -40,6 +40,23 @@ def test_footprints_fill_the_box_of_their_asset(number: int) -> None:
     assert num_checked > 20
 
 
+@pytest.mark.parametrize("number", range(4))
+def test_outlines_are_those_of_the_parts_to_the_millimetre_each_once_lower_ones_first(number: int) -> None:
+    house = list(bundled_houses(4))[number]
+    found = iter(_core.object_outlines(house))
+    for object_id, category, parts in house.footprints(allow_unknown_assets=True):
+        outlines = [[(round(x, 3), round(z, 3)) for x, z in one] for one, _, _ in sorted(parts, key=lambda one: one[2])]
+        once = [outline for index, outline in enumerate(outlines) if outline not in outlines[:index]]
+        xs, zs = zip(*(point for outline, _, _ in parts for point in outline), strict=True)
+        ys = [height for _, low, high in parts for height in (low, high)]
+        box = [(min(axis), max(axis)) for axis in (xs, ys, zs)]
+        (x0, x1), _, (z0, z1) = [(round(low, 3), round(high, 3)) for low, high in box]
+        centre_m, size_m = tuple((low + high) / 2 for low, high in box), tuple(high - low for low, high in box)
+        corners_m = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
+        assert next(found) == (object_id, category, centre_m, size_m, corners_m, once)
+    assert next(found, None) is None
+
+
 def test_an_l_counter_is_an_l_and_an_unknown_asset_is_an_error_unless_allowed() -> None:
     document = json.loads(next(iter(bundled_houses(1))).to_json())
     counter = {**document["objects"][0], "id": "counter", "assetId": "Countertop_L_8x6", "children": []}

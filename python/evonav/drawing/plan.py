@@ -8,11 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from evonav._core import House, Wall
+from evonav._core import House, Wall, object_outlines
 from evonav._core import Opening as HouseOpening
 
-DIGITS = 3
-"""Decimals of the outlines' coordinates: millimetres."""
 Point2 = tuple[float, float]
 """`(x, z)` in metres."""
 Point3 = tuple[float, float, float]
@@ -76,7 +74,7 @@ class HouseRoom:
 
     room_id: str
     room_type: str
-    polygon_m: tuple[Point2, ...]
+    polygon_m: Sequence[Point2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +86,10 @@ class HouseFootprint:
     centre_m: Point3
     size_m: Point3
     """Size of the axis-aligned box."""
-    polygon_m: tuple[Point2, ...]
-    """Corners of the object's box."""
-    outlines_m: tuple[tuple[Point2, ...], ...]
-    """Convex outlines of its parts, lower ones first."""
+    polygon_m: Sequence[Point2]
+    """Corners of the object's box, to the millimetre."""
+    outlines_m: Sequence[Sequence[Point2]]
+    """Convex outlines of its parts to the millimetre, each once, lower ones first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +120,7 @@ def plan_of(house: House) -> HousePlan:
     """
     walls = {wall.id: wall for wall in house.walls}
     return HousePlan(
-        rooms=tuple(HouseRoom(room.id, room.room_type, tuple(room.polygon_m)) for room in house.rooms),
+        rooms=tuple(HouseRoom(room.id, room.room_type, room.polygon_m) for room in house.rooms),
         # Every wall has two sides at the same place: one is enough for a picture.
         walls=tuple(sorted({(min(w.from_m, w.to_m), max(w.from_m, w.to_m)) for w in walls.values() if not w.is_empty})),
         openings=tuple(
@@ -131,11 +129,7 @@ def plan_of(house: House) -> HousePlan:
             for hole in holes
             if hole.wall_ids[0] in walls
         ),
-        objects=tuple(
-            _footprint(object_id, category, parts)
-            for object_id, category, parts in house.footprints(allow_unknown_assets=True)
-            if parts
-        ),
+        objects=tuple(HouseFootprint(*values) for values in object_outlines(house)),
     )
 
 
@@ -161,23 +155,3 @@ def _hole(kind: OpeningKind, hole: HouseOpening, wall: Wall) -> HouseHole:
         for along_m in (hole.hole_min_m[0], hole.hole_max_m[0])
     )
     return HouseHole(kind, near, far)
-
-
-def _footprint(object_id: str, category: str, parts: Sequence[tuple[Sequence[Point2], float, float]]) -> HouseFootprint:
-    """Return the outlines of an object's convex parts, each once, and their common box."""
-    points = [point for outline, _, _ in parts for point in outline]
-    x0, y0, z0 = (min(x for x, _ in points), min(low_m for _, low_m, _ in parts), min(z for _, z in points))
-    x1, y1, z1 = (max(x for x, _ in points), max(high_m for _, _, high_m in parts), max(z for _, z in points))
-    lower_first = sorted(parts, key=lambda part: part[2])
-    return HouseFootprint(
-        object_id=object_id,
-        category=category,
-        centre_m=((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
-        size_m=(x1 - x0, y1 - y0, z1 - z0),
-        polygon_m=_rounded([(x0, z0), (x1, z0), (x1, z1), (x0, z1)]),
-        outlines_m=tuple(dict.fromkeys(_rounded(outline) for outline, _, _ in lower_first)),
-    )
-
-
-def _rounded(outline_m: Sequence[Point2]) -> tuple[Point2, ...]:
-    return tuple((round(x, DIGITS), round(z, DIGITS)) for x, z in outline_m)

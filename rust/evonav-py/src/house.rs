@@ -4,7 +4,10 @@ use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     geometry::{Vec2, Vec3},
     house::{self, HouseDelta},
-    world::footprint::{Footprint, object_footprints},
+    world::{
+        footprint::{Footprint, object_footprints},
+        outlines::{self, ObjectOutlines},
+    },
 };
 use pyo3::prelude::*;
 
@@ -12,6 +15,11 @@ use crate::error;
 
 /// Id, category, and outline, lowest and highest height of each convex part.
 type ObjectFootprints = (String, String, Vec<(Vec<Vec2>, f64, f64)>);
+
+/// Id, category, centre and size of the box, its corners, and the outline of each convex part.
+type Outlines = (String, String, Point3, Point3, [Point2; 4], Vec<Vec<Point2>>);
+type Point2 = (f64, f64);
+type Point3 = (f64, f64, f64);
 
 /// A ProcTHOR house (schema 0.0.1 or 1.0.0), checked; the document is stored without loss.
 ///
@@ -273,6 +281,22 @@ fn object(house: &house::House, object: &house::Object) -> HouseObject {
         child_ids: object.children.iter().map(id).collect(),
         room_id: object.room.map(|index| house.rooms[index].id.clone()),
     }
+}
+
+/// Return the outlines of a house's objects: see `evonav_core::world::outlines`.
+#[pyfunction]
+pub fn object_outlines(py: Python<'_>, house: &House) -> PyResult<Vec<Outlines>> {
+    let unknown = unknown_assets(true);
+    let found = py
+        .detach(|| outlines::object_outlines(&house.inner, Catalogue::bundled(), unknown))
+        .map_err(error::to_py)?;
+    let points = |outline: Vec<Vec2>| outline.into_iter().map(Into::into).collect();
+    let object = |one: ObjectOutlines| {
+        let outlines_m = one.outlines_m.into_iter().map(points).collect();
+        let corners_m = one.corners_m.map(Into::into);
+        (one.id, one.category, one.centre_m.into(), one.size_m.into(), corners_m, outlines_m)
+    };
+    Ok(found.into_iter().map(object).collect())
 }
 
 /// Return the id, category and size of every asset of the catalogue, by id.

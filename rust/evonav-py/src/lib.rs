@@ -29,7 +29,7 @@ mod _core {
             StoreError, TaskError,
         },
         generation::{default_generation_parameters, generate_task},
-        house::{House, HouseObject, Opening, Room, Wall, assets},
+        house::{House, HouseObject, Opening, Room, Wall, assets, object_outlines},
         house_generation::{HouseMaker, default_house_parameters},
         inspection::inspect_house,
         memory::{

@@ -4,6 +4,7 @@ import hashlib
 import hmac
 import json
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -97,7 +98,7 @@ class EpisodeSpec:
         Raises:
             HouseError: The house is malformed.
         """
-        return House(self.stages[stage - 1].house_json, name=self.house)
+        return _parsed(self.stages[stage - 1].house_json, self.house)
 
     def floor_plan(self, stage: int) -> FloorPlan:
         """Return the floor plan of a stage (1-based).
@@ -177,6 +178,12 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
         for stage in range(1, num_stages + 1)
     )
     return EpisodeSpec(task_id, "", Pose(0.0, 0.0, 0.0, 0.0), stages)
+
+
+@lru_cache(maxsize=4)
+def _parsed(house_json: str, name: str) -> House:
+    """Parse a house once for a stage and its floor plan."""
+    return House(house_json, name=name)
 
 
 def _guided_walk(oracle: OracleStage) -> GuidedWalk:

@@ -88,7 +88,7 @@ def encode_stage(
         cpu_s=cpu_s,
         costs=None if costs is None else {k: v for k, v in asdict(costs).items() if v is not None},
         failure=failure,
-        floor_plan=None if floor_plan is None else floor_plan.model_dump_json(),
+        floor_plan=None if floor_plan is None else floor_plan.to_json(),
     )
 
 

@@ -1,16 +1,14 @@
 """Record floor plans: rooms, walls, openings and exact footprints of a house, from which maps are drawn."""
 
 from base64 import b64encode
-from dataclasses import fields
 from io import BytesIO
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, WebPImagePlugin  # noqa: F401 - or Pillow imports all its plug-ins for the first WebP
 
-from evonav.drawing.plan import HouseFootprint, HouseHole, HousePlan, HouseRoom, plan_of
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Opening, RoomFootprint
+from evonav.drawing.plan import plan_of
+from evonav.evaluation.records.schema import FloorPlan
 from evonav.house import House
 
 
@@ -30,26 +28,18 @@ def floor_plan_of(
         HouseError: An object has neither a known asset nor a known category.
     """
     plan = plan_of(house)
-    return FloorPlan(
-        task_id=task_id,
-        house=house.name,
-        stage=stage,
-        rooms=tuple(RoomFootprint(**_values(room)) for room in plan.rooms),
-        walls=plan.walls,
-        openings=tuple(Opening(**_values(opening)) for opening in plan.openings),
-        objects=_footprints(plan),
-        reference_image=reference_image,
-        objects_at_end=() if at_end is None else _footprints(plan_of(at_end)),
-    )
-
-
-def _footprints(plan: HousePlan) -> tuple[ObjectFootprint, ...]:
-    return tuple(ObjectFootprint(**_values(item)) for item in plan.objects)
-
-
-def _values(item: HouseRoom | HouseHole | HouseFootprint) -> dict[str, Any]:
-    """Return the values of an item by name. They are immutable: `asdict` would copy every number."""
-    return {field.name: getattr(item, field.name) for field in fields(item)}
+    values = {
+        "task_id": task_id,
+        "house": house.name,
+        "stage": stage,
+        "rooms": plan.rooms,
+        "walls": plan.walls,
+        "openings": plan.openings,
+        "objects": plan.objects,
+        "reference_image": reference_image,
+        "objects_at_end": () if at_end is None else plan_of(at_end).objects,
+    }
+    return FloorPlan.model_validate(values, from_attributes=True)
 
 
 def image_uri(image: NDArray[np.uint8], side_px: int) -> str:

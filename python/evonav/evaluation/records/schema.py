@@ -378,7 +378,6 @@ class FloorPlan(Record):
         """The floor plan after the change during the stage; itself without one."""
         return self.model_copy(update={"objects": self.objects_at_end}) if self.objects_at_end else self
 
-    @model_serializer(mode="wrap")
-    def _without_change(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        values: dict[str, Any] = handler(self)
-        return {name: value for name, value in values.items() if name != "objects_at_end" or value}
+    def to_json(self) -> str:
+        """Return the JSON, without `objects_at_end` if it is empty."""
+        return self.model_dump_json(exclude=None if self.objects_at_end else {"objects_at_end"})

@@ -6,5 +6,6 @@ pub mod inspection;
 pub mod layout;
 pub mod mesh;
 pub mod navigation;
+pub mod outlines;
 pub mod scene;
 pub mod skin;

@@ -15,6 +15,7 @@ mod inspection;
 mod navigation;
 mod navigation_recorded;
 mod navigation_reference;
+mod object_outlines;
 mod outlines;
 mod random_spawn;
 mod scene;
