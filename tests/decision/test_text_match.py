@@ -189,5 +189,5 @@ def test_doors_and_windows_are_no_candidates_and_no_hints():
     model, asked = question([*structures, FRIDGE], stage=stage)
     with pytest.raises(AnswerError, match="nothing to go to"):
         model.answer(asked)
-    for frontier in (NEAR, FAR):
-        assert Matcher().frontier_cost_m(parsed, frontier, structures) == frontier.travel_m
+    costs_m = Matcher().frontier_costs_m(parsed, [NEAR, FAR], structures)
+    assert costs_m == [NEAR.travel_m, FAR.travel_m]

@@ -1,5 +1,6 @@
 """Store views for prompts and for a second look: a small image each, with its detections."""
 
+from bisect import insort
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -87,13 +88,14 @@ class ViewStore:
             stage: Stage of the task.
             round_: Round of the stage.
         """
-        boxes = boxes_of(view.detections)
+        detections = view.detections
+        boxes = boxes_of(detections)
         named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
         around = self._layouts(view, boxes) if self._keeps_layouts else [None] * len(boxes)
         seen = tuple(
-            Seen(entry_id, label, float(confidence), area_px, box_px, colours, layout)
+            Seen(entry_id, label, confidence, area_px, box_px, colours, layout)
             for entry_id, label, confidence, (area_px, box_px), colours, layout in zip(
-                entry_ids, view.detections.labels, view.detections.confidences, boxes, named, around, strict=True
+                entry_ids, detections.labels, detections.confidences.tolist(), boxes, named, around, strict=True
             )
         )
         jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)
@@ -122,9 +124,10 @@ class ViewStore:
             self._keep_largest(target, self._largest.pop(old, []))
 
     def _keep_largest(self, entry_id: int, found: Sequence[tuple[int, Seen]]) -> None:
-        ranked = sorted((*self._largest.get(entry_id, ()), *found), key=lambda pair: -pair[1].area_px)
-        if ranked:
-            self._largest[entry_id] = ranked[:NUM_LARGEST]
+        ranked = self._largest.setdefault(entry_id, [])
+        for pair in found:
+            insort(ranked, pair, key=lambda one: -one[1].area_px)
+        del ranked[NUM_LARGEST:]
 
     def resolve(self, entry_id: int) -> int:
         """Return the entry that an entry has become."""

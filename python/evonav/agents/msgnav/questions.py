@@ -307,8 +307,7 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
 
     def by_rule(self, matcher: Matcher) -> tuple[int, str]:
         """Choose the cheapest frontier."""
-        goal = matcher.parsed(self.goal)
-        costs_m = [matcher.frontier_cost_m(goal, frontier, self.surroundings) for frontier in self.frontiers]
+        costs_m = matcher.frontier_costs_m(matcher.parsed(self.goal), self.frontiers, self.surroundings)
         index = costs_m.index(min(costs_m))
         return index, f"costs {costs_m[index]:.1f} m"
 

@@ -198,12 +198,13 @@ class AppearanceMatcher(Matcher):
             ratios.append(1.0 if holds is None else truth / share if holds else (1.0 - truth) / (1.0 - share))
         return ratios
 
-    def frontier_cost_m(
-        self, goal: ParsedGoal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]
-    ) -> float:
-        """Return the cost of `Matcher`, of a way that is shorter for the frontier to which the agent already goes."""
-        travel_m = frontier.travel_m * (1.0 - self.numbers.keep * frontier.is_current)
-        return super().frontier_cost_m(goal, replace(frontier, travel_m=travel_m), around)
+    def frontier_costs_m(
+        self, goal: ParsedGoal, frontiers: Sequence[FrontierCandidate], around: Sequence[ObjectCandidate]
+    ) -> list[float]:
+        """Return the costs of `Matcher`, of a way that is shorter for the frontier to which the agent already goes."""
+        keep = self.numbers.keep
+        ways = [replace(one, travel_m=one.travel_m * (1.0 - keep * one.is_current)) for one in frontiers]
+        return super().frontier_costs_m(goal, ways, around)
 
     def _probability(self, relation: Relation) -> float:
         """Return the probability that the goal's views show a relation."""

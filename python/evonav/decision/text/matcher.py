@@ -95,6 +95,10 @@ class Matcher:
 
     def __init__(self, config: TextMatchConfig | None = None) -> None:
         self.config = config or TextMatchConfig()
+        self._scored: ParsedGoal | None = None
+        """The goal of `_scores`."""
+        self._scores: dict[str, float] = {}
+        """Scores by label: agents ask for the same ones in every round."""
 
     def parsed(self, goal: Goal) -> ParsedGoal:
         """Return the parsed instruction."""
@@ -109,6 +113,13 @@ class Matcher:
 
         Doors and windows score 0 even where they are named: every room has them.
         """
+        if goal is not self._scored:
+            self._scored, self._scores = goal, {}
+        if label not in self._scores:
+            self._scores[label] = self._label_score(goal, label)
+        return self._scores[label]
+
+    def _label_score(self, goal: ParsedGoal, label: str) -> float:
         if is_structure(label):
             return 0.0
         own = similarity(goal.noun, label)
@@ -234,22 +245,23 @@ class Matcher:
                 votes[room].append(weight)
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
 
-    def frontier_cost_m(
-        self, goal: ParsedGoal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]
-    ) -> float:
-        """Return the distance to travel, less the value of a hint: a mentioned object, or the right type of room.
+    def frontier_costs_m(
+        self, goal: ParsedGoal, frontiers: Sequence[FrontierCandidate], around: Sequence[ObjectCandidate]
+    ) -> list[float]:
+        """Return each distance to travel, less the value of a hint: a mentioned object, or the right type of room.
 
         Doors and windows are no hints: every room has them.
         """
         mentioned = {r.noun for r in goal.relations if r.kind != "in" and not is_structure(r.noun)}
-        is_lead = any(
-            canonical(other.label) in mentioned
-            and math.dist(other.ground_m, frontier.position_m) <= self.config.lead_radius_m
-            for other in around
-        )
-        if not is_lead and goal.room is not None:
-            is_lead = self.room_around(frontier.position_m, around) == goal.room
-        return frontier.travel_m - (self.config.lead_m if is_lead else 0.0)
+        leads_m = [other.ground_m for other in around if canonical(other.label) in mentioned]
+        signs = [] if goal.room is None else self.room_signs(around)
+        config, costs_m = self.config, []
+        for frontier in frontiers:
+            is_lead = any(math.dist(lead_m, frontier.position_m) <= config.lead_radius_m for lead_m in leads_m)
+            if not is_lead and signs:
+                is_lead = self.room_of_signs(frontier.position_m, signs) == goal.room
+            costs_m.append(frontier.travel_m - (config.lead_m if is_lead else 0.0))
+        return costs_m
 
 
 def gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:

@@ -57,11 +57,10 @@ def _labels(entries: Sequence[ObjectCandidate]) -> set[str]:
 
 
 def _ranked(scores: Mapping[str, float], entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
-    keys = []
-    for index, entry in enumerate(entries):
-        keys.append(
-            (-scores[entry.label], -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index)
-        )
+    keys = [
+        (-scores[entry.label], -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index)
+        for index, entry in enumerate(entries)
+    ]
     return [key[-1] for key in sorted(keys)]
 
 
@@ -108,8 +107,7 @@ def best_frontier(
     matcher: Matcher, goal: Goal, frontiers: Sequence[FrontierCandidate], surroundings: Sequence[ObjectCandidate]
 ) -> int | None:
     """Return the index of the frontier that costs least, of equals the first; `None` without any."""
-    parsed = matcher.parsed(goal)
-    costs_m = [matcher.frontier_cost_m(parsed, frontier, surroundings) for frontier in frontiers]
+    costs_m = matcher.frontier_costs_m(matcher.parsed(goal), frontiers, surroundings)
     return costs_m.index(min(costs_m)) if costs_m else None
 
 
