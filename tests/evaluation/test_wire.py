@@ -141,9 +141,15 @@ def test_large_and_deep_diagnostics_are_refused() -> None:
         wire.DIAGNOSTICS.write(RoundDiagnostics(details={"a": nested}))
 
 
-@given(st.integers(0), st.floats(0, 1e9), st.dictionaries(TEXTS, TEXTS.map(lambda text: json.dumps(text).encode())))
-def test_answers_are_read_as_written(number, cpu_s, parts) -> None:
-    assert wire.read_answer(wire.write_answer(number, cpu_s, parts), number) == (cpu_s, parts)
+@given(
+    st.integers(0),
+    st.floats(0, 1e9),
+    st.integers(0, 2),
+    st.dictionaries(TEXTS, TEXTS.map(lambda text: json.dumps(text).encode())),
+)
+def test_answers_are_read_as_written(number, cpu_s, slot, parts) -> None:
+    head, read = wire.read_answer(wire.write_answer(number, cpu_s, slot, parts), number)
+    assert (head.number, head.cpu_s, head.free_slot, read) == (number, cpu_s, slot, parts)
 
 
 @pytest.mark.parametrize(
@@ -152,9 +158,12 @@ def test_answers_are_read_as_written(number, cpu_s, parts) -> None:
         (b'{"number": 1, "parts": []}', 'missing "cpu_s"'),
         (b'{"number": 1, "cpu_s": "2", "parts": []}', "cpu_s = '2'"),
         (b'{"number": 1, "cpu_s": NaN, "parts": []}', "cpu_s = nan"),
-        (b'{"number": 2, "cpu_s": 0.5, "parts": []}', "number = 2: expected 1"),
-        (b'{"number": 1, "cpu_s": 0.5, "parts": ["action"]}', r"parts = \('action',\): 0 follow"),
-        (b'{"number": 1, "cpu_s": 0.5, "parts": []}\n{}', r"parts = \(\): 1 follow"),
+        (b'{"number": 1, "cpu_s": 0.5, "parts": []}', 'missing "free_slot"'),
+        (b'{"number": 1, "cpu_s": 0.5, "free_slot": 3, "parts": []}', "free_slot = 3: Input should be less than 3"),
+        (b'{"number": 1, "cpu_s": 0.5, "free_slot": -1, "parts": []}', "free_slot = -1: Input should be greater"),
+        (b'{"number": 2, "cpu_s": 0.5, "free_slot": 0, "parts": []}', "number = 2: expected 1"),
+        (b'{"number": 1, "cpu_s": 0.5, "free_slot": 0, "parts": ["action"]}', r"parts = \('action',\): 0 follow"),
+        (b'{"number": 1, "cpu_s": 0.5, "free_slot": 0, "parts": []}\n{}', r"parts = \(\): 1 follow"),
         (b"cos\nsystem\n(S'true'\nt", "Invalid JSON: expected value"),
         (b"", "Invalid JSON"),
     ],

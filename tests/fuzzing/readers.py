@@ -170,7 +170,7 @@ def messages(_folder: Path) -> Reader:
         (wire.ENTRIES.write([entry, entry]), wire.ENTRIES.read),
         (wire.COSTS.write({"num_questions": 3, "cost_usd": 0.1}), wire.COSTS.read),
         (wire.FAILURE.write(wire.Failure("agent", "it broke", "Traceback")), wire.FAILURE.read),
-        (wire.write_answer(3, 0.5, {"action": b"{}", "entries": b"[]"}), lambda text: wire.read_answer(text, 3)),
+        (wire.write_answer(3, 0.5, 1, {"action": b"{}", "entries": b"[]"}), lambda text: wire.read_answer(text, 3)),
     ]
 
     class Messages(Reader):

@@ -1,15 +1,13 @@
 """Run an agent's process: make agents of one name and answer requests until the evaluator closes the connection.
 
 `evonav.evaluation.hosting.process` starts the process. Requests come from the evaluator, who is trusted, so they are
-pickled. Their arrays are copied out of one block of shared memory, so that an agent may keep and change them. Answers
-are JSON. The process gets no path of a task and imports nothing that reads one.
+pickled, with their arrays in shared memory, which an agent may keep and change (`evonav.agents.hosting.shared_slots`).
+Answers are JSON. The process gets no path of a task and imports nothing that reads one.
 """
 
 import ctypes
 import faulthandler
-import mmap
 import os
-import pickle
 import signal
 import socket
 import struct
@@ -25,6 +23,8 @@ from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import sandbox, wire
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
+from evonav.agents.hosting.requests import read_request
+from evonav.agents.hosting.shared_slots import SharedSlots
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
@@ -71,9 +71,11 @@ def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], S
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     faulthandler.enable()
     _end_with_parent(life_fd)
+    memory = SharedSlots(block_fd)
+    os.register_at_fork(before=memory.part)
     closed = suppress(BrokenPipeError, ConnectionResetError)
     with socket.socket(fileno=socket_fd) as connection, closed, profiling.sampled("agents"):
-        _serve(connection, _Block(block_fd), (new_server or _Server)())
+        _serve(connection, memory, (new_server or _Server)())
 
 
 def _end_with_parent(life_fd: int) -> None:
@@ -98,32 +100,13 @@ def _end_group() -> None:
     os._exit(1)
 
 
-class _Block:
-    """The reader's side of the shared memory."""
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-        self._map: mmap.mmap | None = None
-
-    def copies(self, places: list[tuple[int, int]]) -> list[bytearray]:
-        """Return copies of parts, each given by offset and size."""
-        end = max((offset + size for offset, size in places), default=0)
-        if end == 0:
-            return [bytearray() for _ in places]
-        if self._map is None or len(self._map) < end:
-            self._map = mmap.mmap(self._descriptor, os.fstat(self._descriptor).st_size, access=mmap.ACCESS_READ)
-        with memoryview(self._map) as block:
-            return [bytearray(block[offset : offset + size]) for offset, size in places]
-
-
-def _serve(connection: socket.socket, block: _Block, server: Server) -> None:
+def _serve(connection: socket.socket, memory: SharedSlots, server: Server) -> None:
     pid = os.getpid()
     while True:
         request = _received(connection)
         if request is None:
             return
-        number, places, message = pickle.loads(request)  # noqa: S301 - from the evaluator
-        operation, arguments = pickle.loads(message, buffers=block.copies(places))  # noqa: S301
+        number, operation, arguments = read_request(request, memory.arrays)
         parts = server.answer(operation, arguments)
         del arguments
         if os.getpid() != pid:
@@ -131,7 +114,7 @@ def _serve(connection: socket.socket, block: _Block, server: Server) -> None:
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):  # an agent may have closed or replaced it
                 stream.flush()
-        data = wire.write_answer(number, time.process_time(), parts)
+        data = wire.write_answer(number, time.process_time(), memory.free, parts)
         connection.sendall(LENGTH.pack(len(data)) + data)
 
 

@@ -39,6 +39,7 @@ from evonav.agents.agent import (
     ViewSchedule,
 )
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
+from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
 
@@ -330,28 +331,29 @@ FAILURE: Part[Failure] = Part("failure", Failure, MAX_DIAGNOSTICS_BYTES)
 
 
 @dataclass(frozen=True, slots=True)
-class _Head:
+class Head:
+    """The first line of an answer."""
+
     number: int
+    """Number of the request."""
     cpu_s: Annotated[float, Field(ge=0, le=MAX_COUNT, allow_inf_nan=False)]
+    """CPU time of the process."""
+    free_slot: Annotated[int, Field(ge=0, lt=NUM_SLOTS)]
+    """Slot of the shared memory for the next request."""
     parts: tuple[str, ...]
+    """Names of the lines that follow."""
 
 
-_HEAD: Part[_Head] = Part("", _Head, MAX_DIAGNOSTICS_BYTES)
+_HEAD: Part[Head] = Part("", Head, MAX_DIAGNOSTICS_BYTES)
 
 
-def write_answer(number: int, cpu_s: float, parts: Mapping[str, bytes]) -> bytes:
-    """Return an answer: a line that says what it is, then a line for each part.
-
-    Args:
-        number: Number of the request.
-        cpu_s: CPU time of the process.
-        parts: JSON by name.
-    """
-    return b"\n".join([to_json(_Head(number, cpu_s, tuple(parts))), *parts.values()])
+def write_answer(number: int, cpu_s: float, free_slot: int, parts: Mapping[str, bytes]) -> bytes:
+    """Return an answer: a line that says what it is, then a line for each part, which is JSON by name."""
+    return b"\n".join([to_json(Head(number, cpu_s, free_slot, tuple(parts))), *parts.values()])
 
 
-def read_answer(message: bytes, number: int) -> tuple[float, dict[str, bytes]]:
-    """Return the CPU time of the process and the parts, still as JSON.
+def read_answer(message: bytes, number: int) -> tuple[Head, dict[str, bytes]]:
+    """Return what an answer says of itself, and the parts, still as JSON.
 
     Args:
         message: Bytes that `write_answer` returned.
@@ -366,4 +368,4 @@ def read_answer(message: bytes, number: int) -> tuple[float, dict[str, bytes]]:
         raise InvalidArgumentError(f"number = {head.number}: expected {number}")
     if len(head.parts) != len(texts):
         raise InvalidArgumentError(f"parts = {head.parts!r}: {len(texts)} follow")
-    return head.cpu_s, dict(zip(head.parts, texts, strict=True))
+    return head, dict(zip(head.parts, texts, strict=True))

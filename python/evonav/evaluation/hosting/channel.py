@@ -2,18 +2,28 @@
 
 import mmap
 import os
-import pickle
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+
+from evonav.agents.hosting.shared_slots import NUM_SLOTS, Order, Place, Places
 
 MAX_LOG_BYTES = 10_000_000
 """Largest log of an episode; further output is dropped, and the log says so."""
 _MAX_LINE_BYTES = 65536
 _ALIGN = 64
+_LEAST_SLOT_BYTES = 1 << 22
+"""Sizes are powers of two from here on, so that few slots outgrow their place; only what is written takes memory."""
+
+
+class _Slot(NamedTuple):
+    begin: int
+    map: mmap.mmap
 
 
 class SharedBlock:
@@ -30,33 +40,47 @@ class SharedBlock:
         else:
             with tempfile.TemporaryFile() as file:
                 self.descriptor = os.dup(file.fileno())
-        self._map: mmap.mmap | None = None
+        self._slots: list[_Slot | None] = [None] * NUM_SLOTS
+        self._end = 0
+        self.free = 0
+        """Number of the slot that is written next: one of which the reader has no array."""
 
-    def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
-        """Copy buffers into the shared memory, and return offset and size of each."""
-        views = [buffer.raw() for buffer in buffers]
-        places, end = [], 0
-        for view in views:
-            places.append((end, view.nbytes))
-            end += -(-view.nbytes // _ALIGN) * _ALIGN
-        if end and (self._map is None or len(self._map) < end):
-            if self._map is not None:
-                self._map.close()
-            os.ftruncate(self.descriptor, end)
-            self._map = mmap.mmap(self.descriptor, end)
-        if self._map is not None:
-            with memoryview(self._map) as block:
-                for (offset, size), view in zip(places, views, strict=True):
-                    block[offset : offset + size] = view
-        for buffer, view in zip(buffers, views, strict=True):
-            view.release()
-            buffer.release()
-        return places
+    def write(self, arrays: Iterable[object]) -> Places:
+        """Copy arrays into a slot of the shared memory, and return where they are."""
+        places: list[Place] = []
+        inside, size = [], 0
+        for array in arrays:
+            if type(array) is not np.ndarray or array.dtype.kind not in "biuf":
+                places.append((array,))
+                continue
+            order: Order = "F" if array.flags.fnc else "C"
+            places.append((array.dtype.str, array.shape, size, order, array.flags.writeable))
+            inside.append((array, size, order))
+            size += -(-array.nbytes // _ALIGN) * _ALIGN
+        if size == 0:
+            return self.free, 0, 0, 0, places
+        slot = self._slot(size)
+        for array, offset, order in inside:
+            np.ndarray(array.shape, array.dtype, slot.map, offset, None, order)[...] = array
+        return self.free, slot.begin, slot.begin + len(slot.map), size, places
+
+    def _slot(self, size: int) -> _Slot:
+        """Return the slot that is written next, at the end of the file if it is too small where it is."""
+        slot = self._slots[self.free]
+        if slot is None or len(slot.map) < size:
+            if slot is not None:
+                slot.map.close()
+            begin, size = self._end, max(_LEAST_SLOT_BYTES, 1 << (size - 1).bit_length())
+            self._end += size
+            os.ftruncate(self.descriptor, self._end)
+            slot = self._slots[self.free] = _Slot(begin, mmap.mmap(self.descriptor, size, offset=begin))
+        return slot
 
     def close(self) -> None:
         """Release the shared memory; the reader keeps its own."""
-        if self._map is not None:
-            self._map.close()
+        for slot in self._slots:
+            if slot is not None:
+                slot.map.close()
         os.close(self.descriptor)
 
 

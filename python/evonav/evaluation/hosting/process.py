@@ -11,7 +11,6 @@ Unless it is in a sandbox (`evonav.agents.hosting.sandbox`), an agent can read e
 
 import json
 import os
-import pickle
 import select
 import shutil
 import signal
@@ -28,6 +27,7 @@ from pathlib import Path
 
 from evonav.agents.hosting import forking, wire
 from evonav.agents.hosting.error_text import clean
+from evonav.agents.hosting.requests import write_request
 from evonav.agents.hosting.sandbox import Policy
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
@@ -272,9 +272,9 @@ class AgentProcess:
     def answer(self) -> dict[str, bytes]:
         """Return the parts of the answer to the request that was sent; see `ask`."""
         with self._ended_if_lost():
-            cpu_s, parts = wire.read_answer(self._message(self._request[2]), self._num_asked)
+            head, parts = wire.read_answer(self._message(self._request[2]), self._num_asked)
         self._is_waiting = False
-        self._own_cpu_s = cpu_s
+        self._own_cpu_s, self._block.free = head.cpu_s, head.free_slot
         if (failure := parts.get("failure")) is not None:
             raise failure_of(failure, is_sandboxed=self._scratch is not None)
         return parts
@@ -296,10 +296,8 @@ class AgentProcess:
             raise AgentFailedError(ErrorKind.CRASH, message) from None
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
-        buffers: list[pickle.PickleBuffer] = []
-        message = pickle.dumps((operation, arguments), protocol=5, buffer_callback=buffers.append)
         self._num_asked += 1
-        request = pickle.dumps((self._num_asked, self._block.write(buffers), message), protocol=5)
+        request = write_request(self._num_asked, operation, arguments, self._block.write)
         self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
         self._connection.sendall(LENGTH.pack(len(request)) + request)
 
