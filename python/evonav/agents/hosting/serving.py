@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, BinaryIO, Literal, Protocol
 
 from evonav.agents.agent import Agent
 from evonav.agents.explanation import explaining
@@ -73,9 +73,11 @@ def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], S
     _end_with_parent(life_fd)
     memory = SharedSlots(block_fd)
     os.register_at_fork(before=memory.part)
+    connection = socket.socket(fileno=socket_fd)
+    requests = open(socket_fd, "rb", closefd=False)  # noqa: SIM115 - closed below
     closed = suppress(BrokenPipeError, ConnectionResetError)
-    with socket.socket(fileno=socket_fd) as connection, closed, profiling.sampled("agents"):
-        _serve(connection, memory, (new_server or _Server)())
+    with connection, requests, closed, profiling.sampled("agents"):
+        _serve(requests, connection, memory, (new_server or _Server)())
 
 
 def _end_with_parent(life_fd: int) -> None:
@@ -100,12 +102,9 @@ def _end_group() -> None:
     os._exit(1)
 
 
-def _serve(connection: socket.socket, memory: SharedSlots, server: Server) -> None:
+def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, server: Server) -> None:
     pid = os.getpid()
-    while True:
-        request = _received(connection)
-        if request is None:
-            return
+    while (request := _received(requests)) is not None:
         number, operation, arguments = read_request(request, memory.arrays)
         parts = server.answer(operation, arguments)
         del arguments
@@ -118,23 +117,14 @@ def _serve(connection: socket.socket, memory: SharedSlots, server: Server) -> No
         connection.sendall(LENGTH.pack(len(data)) + data)
 
 
-def _received(connection: socket.socket) -> bytearray | None:
-    """Return the next message; `None` at the end of the connection."""
-    header = _exactly(connection, LENGTH.size)
-    return None if header is None else _exactly(connection, LENGTH.unpack(header)[0])
-
-
-def _exactly(connection: socket.socket, size: int) -> bytearray | None:
-    """Return the next `size` bytes; `None` if the connection ends first."""
-    data = bytearray(size)
-    with memoryview(data) as rest:
-        done = 0
-        while done < size:
-            count = connection.recv_into(rest[done:])
-            if count == 0:
-                return None
-            done += count
-    return data
+def _received(requests: BinaryIO) -> bytes | None:
+    """Return the next request; `None` at the end of the connection."""
+    header = requests.read(LENGTH.size)
+    if len(header) < LENGTH.size:
+        return None
+    (size,) = LENGTH.unpack(header)
+    request = requests.read(size)
+    return request if len(request) == size else None
 
 
 class _Server:

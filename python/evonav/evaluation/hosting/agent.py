@@ -1,8 +1,8 @@
 """Agents as the evaluator sees them, in its own process or another; every answer has been checked."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
 from evonav.agents.explanation import explaining
@@ -15,6 +15,8 @@ from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess, fa
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
+
+T = TypeVar("T")
 
 
 class HostedAgent(ABC):
@@ -251,22 +253,19 @@ class RemoteAgent(HostedAgent):
     def _send(self, operation: str, *arguments: object) -> None:
         if self._process is None:
             self._make()
-        with self._used(operation) as process:
-            process.send(operation, *arguments)
+        self._use(operation, lambda process: process.send(operation, *arguments))
 
     def _answer(self, operation: str) -> dict[str, bytes]:
-        with self._used(operation) as process:
-            return process.answer()
+        return self._use(operation, AgentProcess.answer)
 
-    @contextmanager
-    def _used(self, operation: str) -> Iterator[AgentProcess]:
-        """Let other episodes compute while the block uses the process, and add up its CPU time."""
+    def _use(self, operation: str, call: Callable[[AgentProcess], T]) -> T:
+        """Call something of the process while other episodes compute, and add up its CPU time."""
         process = self._process
         assert process is not None
         before_s = process.cpu_s
         try:
             with self._processes.waiting():
-                yield process
+                return call(process)
         except AgentFailedError as error:
             if error.kind.loses_memory or operation == "make":
                 self.close()

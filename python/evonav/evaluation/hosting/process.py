@@ -20,8 +20,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -266,34 +266,32 @@ class AgentProcess:
         timeout_s = timeout_s or self._hosting.timeout_s
         self._request = (operation, timeout_s, time.monotonic() + timeout_s)
         self._is_waiting = True
-        with self._ended_if_lost():
+        try:
             self._send(operation, arguments, self._request[2])
+        except OSError as error:
+            raise self._lost(error) from None
 
     def answer(self) -> dict[str, bytes]:
         """Return the parts of the answer to the request that was sent; see `ask`."""
-        with self._ended_if_lost():
+        try:
             head, parts = wire.read_answer(self._message(self._request[2]), self._num_asked)
+        except (OSError, InvalidArgumentError) as error:
+            raise self._lost(error) from None
         self._is_waiting = False
         self._own_cpu_s, self._block.free = head.cpu_s, head.free_slot
         if (failure := parts.get("failure")) is not None:
             raise failure_of(failure, is_sandboxed=self._scratch is not None)
         return parts
 
-    @contextmanager
-    def _ended_if_lost(self) -> Iterator[None]:
-        """End the process if it does not answer in time, or as it should."""
+    def _lost(self, error: OSError | InvalidArgumentError) -> AgentFailedError:
+        """End the process, which did not answer in time or as it should, and return what happened."""
         operation, timeout_s, _ = self._request
-        try:
-            yield
-        except TimeoutError:
+        if isinstance(error, TimeoutError):
             self.close(is_at_once=True)
-            message = f"no answer to `{operation}` within {timeout_s:g} s"
-            raise AgentFailedError(ErrorKind.TIMEOUT, message) from None
-        except (OSError, InvalidArgumentError) as error:
-            died = self._cause_of_death() if isinstance(error, OSError) else None
-            self.close(is_at_once=True)
-            message = died or f"malformed response: {clean(str(error))}"
-            raise AgentFailedError(ErrorKind.CRASH, message) from None
+            return AgentFailedError(ErrorKind.TIMEOUT, f"no answer to `{operation}` within {timeout_s:g} s")
+        died = self._cause_of_death() if isinstance(error, OSError) else None
+        self.close(is_at_once=True)
+        return AgentFailedError(ErrorKind.CRASH, died or f"malformed response: {clean(str(error))}")
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
         self._num_asked += 1
