@@ -91,7 +91,7 @@ def cause_share_table(run: RecordedRun, stratum: str) -> Table:
     """
     counts: dict[str, Counter[FailureCause | None]] = {agent: Counter() for agent in run.agents}
     for (agent, _, _), outcome in run.outcomes.items():
-        if outcome.record.is_scored and stratum_of(outcome.record) == stratum:
+        if outcome.row.is_scored and outcome.row.stratum == stratum:
             counts[agent][outcome.cause] += 1
     causes = [cause for cause in FailureCause if any(part[cause] for part in counts.values())]
     totals = {agent: sum(part.values()) for agent, part in counts.items()}
@@ -105,13 +105,6 @@ def cause_share_table(run: RecordedRun, stratum: str) -> Table:
     )
 
 
-def stratum_of(record: StageRecord) -> str:
-    """Return the key of a record in `STRATA`."""
-    if record.stage == 1:
-        return "stage_1"
-    return "relocated" if record.target.is_relocated else "not_relocated"
-
-
 def success_by_group(run: RecordedRun, group_of: Mapping[str, str]) -> dict[str, dict[str, tuple[int, int]]]:
     """Return successes and scored stages by group of tasks and agent.
 
@@ -121,8 +114,8 @@ def success_by_group(run: RecordedRun, group_of: Mapping[str, str]) -> dict[str,
     """
     found: dict[str, dict[str, tuple[int, int]]] = defaultdict(dict)
     for (agent, task_id, _), outcome in run.outcomes.items():
-        if outcome.record.is_scored:
+        if outcome.row.is_scored:
             successes, n = found[group_of[task_id]].get(agent, (0, 0))
-            is_success = outcome.record.state is EndState.SUCCESS
+            is_success = outcome.row.state == EndState.SUCCESS
             found[group_of[task_id]][agent] = (successes + is_success, n + 1)
     return dict(found)

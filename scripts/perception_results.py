@@ -15,7 +15,8 @@ from results import ROOT, pooled_tasks, run_agents, run_parser, spread, write_pa
 
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentSummary, house_of
-from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
 from evonav.perception.shorthand import read_word
 from evonav.report.paper.tables import PAPER, PaperResult
@@ -37,14 +38,14 @@ PERCEPTIONS = (
 """The curves are of the first ones; what a learned detector gives stands beside them in the tables."""
 IMAGES = ROOT / "docs" / "images"
 
-Keep = Callable[[StageRecord], bool]
+Keep = Callable[[StageMetrics], bool]
 CLAIMS: tuple[tuple[str, str, str, Keep], ...] = (
-    ("MSGNav minus FTU", "ftu", "msgnav", lambda record: True),
-    ("3D-Mem minus FU", "fu", "3d-mem", lambda record: True),
-    ("Stage-Reset minus FU", "fu", "stage-reset", lambda record: True),
-    ("FTU minus FU", "fu", "ftu", lambda record: True),
-    ("FTU minus FU, moved", "fu", "ftu", lambda record: record.stage > 1 and record.target.is_relocated),
-    ("FTU minus FU, not moved", "fu", "ftu", lambda record: record.stage > 1 and not record.target.is_relocated),
+    ("MSGNav minus FTU", "ftu", "msgnav", lambda row: True),
+    ("3D-Mem minus FU", "fu", "3d-mem", lambda row: True),
+    ("Stage-Reset minus FU", "fu", "stage-reset", lambda row: True),
+    ("FTU minus FU", "fu", "ftu", lambda row: True),
+    ("FTU minus FU, moved", "fu", "ftu", lambda row: row.stratum == "relocated"),
+    ("FTU minus FU, not moved", "fu", "ftu", lambda row: row.stratum == "not_relocated"),
 )
 """Differences that the paper draws its conclusions about perception from (its Sec. 5, Tables 1 and 2)."""
 
@@ -122,7 +123,7 @@ def cost_table(runs: Mapping[str, RecordedRun]) -> Table:
         gap = NONE
         if moved is not None and stayed is not None and moved.sr is not None and stayed.sr is not None:
             gap = f"{100 * (moved.sr - stayed.sr):+.1f}"
-        costs = (_points(_between(best, agent, run, agent, lambda record: True)) for _, run in others)
+        costs = (_points(_between(best, agent, run, agent, lambda row: True)) for _, run in others)
         rows.append((agent, gap, *costs))
     columns = (
         "Agent",
@@ -139,14 +140,14 @@ def cost_table(runs: Mapping[str, RecordedRun]) -> Table:
 def _between(run_a: RecordedRun, a: str, run_b: RecordedRun, b: str, keep: Keep) -> PairedEffect | None:
     """Success of `b` in one run less that of `a` in another, over the stages that both scored."""
     ours, theirs = (
-        {key[1:]: one.record for key, one in run.outcomes.items() if key[0] == name and one.record.is_scored}
+        {key[1:]: one.row for key, one in run.outcomes.items() if key[0] == name and one.row.is_scored}
         for run, name in ((run_a, a), (run_b, b))
     )
-    keys = [key for key, record in ours.items() if key in theirs and keep(record)]
+    keys = [key for key, row in ours.items() if key in theirs and keep(row)]
     if not keys:
         return None
     before, after = (
-        np.array([records[key].state is EndState.SUCCESS for key in keys], np.float64) for records in (ours, theirs)
+        np.array([rows[key].state == EndState.SUCCESS for key in keys], np.float64) for rows in (ours, theirs)
     )
     return paired_effect(before, after, [house_of(ours[key]) for key in keys])
 

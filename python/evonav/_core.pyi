@@ -625,6 +625,34 @@ class BatchSimulator:
 def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, int], tuple[float, float]]:
     """Return shape `(R, C)` and corner `(x, z)` of `EmbeddedSimulator.occupancy`'s grid, without building objects."""
 
+# drawing
+
+def outlines(polygons_m: Sequence[Sequence[_Vec2]]) -> list[str]:
+    """Return SVG path data of closed polygons in whole centimetres, relative; z is up the page."""
+
+def label_point(
+    polygon_m: Sequence[_Vec2], num: int, *, taken_m: Sequence[tuple[float, float, float, float]], size_m: _Vec2
+) -> _Vec2:
+    """Return where in a polygon a label stands best, of `num * num` places: over little, far from the edges.
+
+    `taken_m` are boxes that a label of `size_m` should not cover. NaN without corners or places.
+    """
+
+# resampling
+
+def draw_counts(state: int, increment: int, *, num_clusters: int, num_resamples: int) -> tuple[NDArray[np.uint8], int]:
+    """Draw how often each cluster is in each resample, with replacement: the counts of NumPy's `multinomial`.
+
+    Args:
+        state: State of a `np.random.PCG64`.
+        increment: Its increment.
+        num_clusters: C, the number of clusters and of draws in a resample.
+        num_resamples: R.
+
+    Returns:
+        `(R, C)` counts, and the state behind them.
+    """
+
 # evolution
 
 def default_generation_parameters() -> str:

@@ -12,7 +12,7 @@ from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.compare.selection import read_compared_agents
-from evonav.report.plots.run_plots import run_plots
+from evonav.report.plots.run_plots import run_breakdowns, run_plots
 from evonav.report.plots.specs import CurvePlot
 from evonav.report.run import load_run
 from evonav.report.tables.run_tables import run_tables
@@ -25,7 +25,7 @@ def run(tmp_path: Path) -> Path:
 
 def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(run: Path) -> None:
     sides = read_compared_agents([str(run)])
-    records = load_run(run).records_by_agent()
+    rows = load_run(run).rows_by_agent()
     for by in STANDARD[:-1]:
         found = breakdown(sides, by)
         for agent, num_scored in (("fu", 18), ("ftu", 16)):
@@ -33,7 +33,7 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
             assert sum(cell.n for (_, name), cell in found.cells.items() if name == agent) == expected, by
     found = breakdown(sides, "stratum")
     assert found.groups == ("first", "moved")
-    told = rates([record for record in records["ftu"] if record.stage == 2])
+    told = rates([row for row in rows["ftu"] if row.stage == 2])
     cell = found.cells["moved", "ftu"]
     assert (cell.n, cell.num_clusters, cell.value) == (told.n, 8, told.sr)
     assert cell.ci95 == told.sr_ci95 is not None
@@ -104,7 +104,7 @@ def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Pa
 
 def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
     loaded = load_run(run)
-    plots = run_plots(loaded)
+    plots = run_plots(loaded, run_breakdowns(loaded))
     assert [plot.title for plot, _ in plots] == [
         "SR differences, points",
         "SPL differences, points",
@@ -116,11 +116,12 @@ def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
         "SR by success radius",
     ]
     assert all(caption.endswith(("house.", "says.")) for _, caption in plots)
-    titles = [table.title for table in run_tables(loaded)]
+    titles = [table.title for table in run_tables(loaded, run_breakdowns(loaded))]
     assert [
         title for title in ("SR by path length", "SR by rooms", "SR by success radius") if title not in titles
     ] == []
 
 
 def test_a_run_without_a_stage_has_no_plot(tmp_path: Path) -> None:
-    assert run_plots(load_run(record_run(tmp_path / "empty", [], {"task": 2}, ["fu"]))) == []
+    empty = load_run(record_run(tmp_path / "empty", [], {"task": 2}, ["fu"]))
+    assert run_plots(empty, run_breakdowns(empty)) == []

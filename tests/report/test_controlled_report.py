@@ -140,8 +140,10 @@ def test_splits_go_by_the_target_its_room_and_other_rooms(pairs):
     found = [split_of(analysis.outcomes["evolved", "fu"][task, 2]) for task in TASKS]
     assert found == ["target", "room", "target", "room", "target", "room"]
     one = analysis.outcomes["evolved", "fu"]["task-1", 2]
-    elsewhere = one.record.model_copy(update={"transition": TransitionRecord(mode="FULL_SHUFFLE", room_id="room|2")})
-    assert split_of(type(one)(one.row, elsewhere)) == "other"
+    with RunStore(run_of(pairs, "evolved")) as store:
+        record = store.record("fu", "task-1", 2)
+    elsewhere = record.model_copy(update={"transition": TransitionRecord(mode="FULL_SHUFFLE", room_id="room|2")})
+    assert split_of(type(one).of(one.row, elsewhere)) == "other"
     rows = {row[0]: row[1:4] for row in pair_tables(analysis)[1].rows}
     assert rows["the target moved: fu"] == ("3", "100.0", "33.3")
     assert rows["another room changed: fu"][0] == "0"

@@ -18,6 +18,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
 from evonav.report.pages import run_page as html
+from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables
@@ -90,7 +91,7 @@ def test_the_page_shows_the_numbers_of_the_tables(write_run: WriteRun) -> None:
     run_dir = write_run()
     text = write_report(run_dir).read_text(encoding="utf-8")
     run = load_run(run_dir)
-    for table in findings.run_tables(run):
+    for table in findings.run_tables(run, run_breakdowns(run)):
         for row in table.rows:
             for cell in row:
                 assert f">{cell}<" in text, cell

@@ -21,8 +21,8 @@ F64 = NDArray[np.float64]
 
 def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:
     run = load_run(write_run())
-    records = run.records_by_agent()
-    expected = summarise("ftu", records["ftu"], 12)
+    rows = run.rows_by_agent()
+    expected = summarise("ftu", rows["ftu"], 12)
     assert expected.sr_ci95 is not None
     assert expected.sr_ci95[0] < expected.sr_ci95[1]
     row = dict(zip(tables.headline(run.summaries).columns, tables.headline(run.summaries).rows[1], strict=True))
@@ -30,7 +30,7 @@ def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:
     assert row["SR % [95% CI]"] == f"91.7 [{low:.1f}, {high:.1f}]"
     assert (row["n"], row["success"], row["failure"]) == ("12", "11", "1")
     assert row["stages"] == "all 12"
-    pairs = agent_pairs(records)
+    pairs = agent_pairs(rows)
     assert run.pairs == tuple(pairs)
 
 

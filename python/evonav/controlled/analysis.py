@@ -115,7 +115,7 @@ def load_analysis(directory: Path) -> Analysis:
             agents.add(agent)
             if one.row.is_scored:
                 outcomes.setdefault((arm.name, agent), {})[task_id, stage] = one
-            elif one.record.state is not EndState.GUIDED:
+            elif one.row.state != EndState.GUIDED:
                 num_unscored += 1
     if not agents:
         raise StoreError(f"{directory}: no agent was run: `evonav controlled evaluate {directory}` first")
@@ -135,18 +135,16 @@ def moved_keys(analysis: Analysis, *agents: str) -> list[Key]:
 
 def split_of(evolved: RecordedStage) -> str:
     """Return what a pair's change touched: a key of `SPLITS`."""
-    record = evolved.record
-    if record.target.is_relocated_now:
+    if evolved.row.is_relocated_now:
         return "target"
-    return "room" if record.transition.room_id == record.target.room_id else "other"
+    return "room" if evolved.is_change_around_target else "other"
 
 
 def has_moved_far(evolved: RecordedStage) -> bool:
     """Return whether the target left the success radius around its old place; if not, it is found there too."""
-    target = evolved.record.target
-    if not target.is_relocated_now or target.first_position_m is None:
+    if not evolved.row.is_relocated_now or evolved.first_target_m is None:
         return False
-    (x0, _, z0), (x1, _, z1) = target.first_position_m, target.position_m
+    (x0, _, z0), (x1, _, z1) = evolved.first_target_m, evolved.target_m
     return math.dist((x0, z0), (x1, z1)) > SUCCESS_RADIUS_M
 
 

@@ -127,12 +127,12 @@ def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
         css = text_of("report.css") + map_css()
         page = page_text("controlled_pair.html.j2", css, has_drawings=True, **values)
         write_atomically(out / PAIRS_DIR / _page_name(key), page)
-        first = analysis.outcomes[analysis.arms[0], agents[0]][key].record
+        first = analysis.outcomes[analysis.arms[0], agents[0]][key]
         cells = [
             [
                 ("none", "no score")
                 if (one := analysis.outcomes[arm, agent].get(key)) is None
-                else (one.record.state.value, f"{arm_words(arm)}: {outcome_words(one.record)}")
+                else (one.row.state, f"{arm_words(arm)}: {outcome_words(one.row)}")
                 for arm in analysis.arms
             ]
             for agent in analysis.agents
@@ -141,7 +141,7 @@ def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
             {
                 "task_id": key[0],
                 "page": f"{PAIRS_DIR}/{_page_name(key)}",
-                "category": first.goal.category,
+                "category": first.category,
                 "change": values["change"],
                 "cells": cells,
             }

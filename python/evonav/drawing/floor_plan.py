@@ -1,11 +1,13 @@
 """Draw a house from above: floors, walls, openings, furniture, labels, as SVG groups that many pictures share."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from evonav import _core
 from evonav.drawing.plan import ObjectPlan, Plan, RoomPlan
 from evonav.drawing.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
@@ -88,13 +90,17 @@ def frame_of(maps: Iterable[Plan]) -> Frame:
 
 def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
     """Return the ids of objects that do not stand in the same place in all of the stages."""
-    places: dict[str, set[tuple[tuple[int, int], ...]]] = {}
-    seen: dict[str, int] = {}
+    first: dict[str, Sequence[Point]] = {}
+    seen: Counter[str] = Counter()
+    moved = set()
     for m in maps:
         for item in m.objects:
-            places.setdefault(item.object_id, set()).add(tuple(cm(point) for point in item.polygon_m))
-            seen[item.object_id] = seen.get(item.object_id, 0) + 1
-    return frozenset(name for name, found in places.items() if len(found) > 1 or seen[name] != len(maps))
+            seen[item.object_id] += 1
+            polygon_m = first.setdefault(item.object_id, item.polygon_m)
+            # Most objects stay to the bit: only others are compared by centimetres.
+            if polygon_m != item.polygon_m and outline(polygon_m) != outline(item.polygon_m):
+                moved.add(item.object_id)
+    return frozenset(name for name, num in seen.items() if name in moved or num != len(maps))
 
 
 def ground(stage_map: Plan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
@@ -171,32 +177,7 @@ def label_point(
         taken_m: Boxes that it should not cover.
         size_m: Width and height of the label.
     """
-    corners = np.asarray(polygon_m, dtype=np.float64)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    steps = (np.arange(num) + 0.5) / num
-    x, z = np.meshgrid(low[0] + steps * (high[0] - low[0]), low[1] + steps * (high[1] - low[1]))
-    points = np.stack([x.ravel(), z.ravel()], axis=1)
-    a, b = corners, np.roll(corners, -1, axis=0)
-    edge = b - a
-    length2 = np.maximum((edge**2).sum(axis=1), 1e-12)
-    t = np.clip(((points[:, None] - a) * edge).sum(axis=2) / length2, 0.0, 1.0)
-    gap_m = np.linalg.norm(points[:, None] - (a + t[..., None] * edge), axis=2).min(axis=1)
-    crosses = (a[:, 1] > points[:, None, 1]) != (b[:, 1] > points[:, None, 1])
-    slope = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
-    at_x = a[:, 0] + (points[:, None, 1] - a[:, 1]) / slope * edge[:, 0]
-    inside = (crosses & (points[:, None, 0] < at_x)).sum(axis=1) % 2 == 1
-    # Among points that are about as good, the one nearest to the middle of the room looks right.
-    score = gap_m - 0.15 * np.linalg.norm(points - corners.mean(axis=0), axis=1)
-    if taken_m and size_m[0] > 0.0:
-        half = np.asarray(size_m) / 2
-        boxes = np.asarray(taken_m)
-        over = np.minimum(points[:, None] + half, boxes[:, 2:]) - np.maximum(points[:, None] - half, boxes[:, :2])
-        covered = (np.clip(over, 0.0, None).prod(axis=2)).sum(axis=1) / (size_m[0] * size_m[1])
-        # A label that reaches over an edge is as bad as one over furniture.
-        reach = np.clip(half[1] - gap_m, 0.0, None) / half[1] + np.clip(half[0] - gap_m, 0.0, None) / half[0]
-        score = 0.3 * score - 2.0 * covered - 0.5 * reach
-    best = int(np.argmax(np.where(inside, score, -np.inf)))
-    return (float(points[best, 0]), float(points[best, 1]))
+    return _core.label_point(polygon_m, num, taken_m=taken_m, size_m=size_m)
 
 
 def _footprint(item: ObjectPlan, *, has_parts: bool) -> str:
@@ -215,7 +196,7 @@ def _footprint(item: ObjectPlan, *, has_parts: bool) -> str:
 
 def _shape(item: ObjectPlan, css: str, hint: str, *, has_parts: bool) -> str:
     """Draw all parts as one outline, and in a large object the parts themselves, higher ones over lower ones."""
-    parts = [outline(part) for part in item.outlines_m]
+    parts = _core.outlines(item.outlines_m)
     # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
     union = f'<path class="{css}" d="{join(parts)}">{hint}</path>'
     if css != "item" or len(parts) == 1 or not has_parts:
@@ -276,7 +257,7 @@ def _meet(a: Box, b: Box) -> bool:
 
 def outline(polygon_m: Sequence[Point]) -> str:
     """Return path data of a closed polygon."""
-    return polyline([cm(point) for point in polygon_m], closed=True)
+    return _core.outlines([polygon_m])[0]
 
 
 def _lines(segments: Iterable[tuple[Point, Point]]) -> str:

@@ -12,7 +12,8 @@ from evonav.errors import StoreError
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
+from evonav.evaluation.records.base import BeliefRecord, Point3
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageError, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import FailureCause
@@ -23,11 +24,32 @@ NOTES = ("tasks_dir", "task_digests", "sessions")
 
 @dataclass(frozen=True, slots=True)
 class RecordedStage:
-    """A recorded stage, with what tables and overviews show of it."""
+    """A recorded stage: its row, and what else of its record tables and overviews show."""
 
     row: StageMetrics
-    record: StageRecord
-    """The record without its trace and entries."""
+    category: str
+    """The goal's."""
+    error: StageError | None
+    target_m: Point3
+    first_target_m: Point3 | None
+    """The target's place in stage 1, if it ever moved."""
+    is_change_around_target: bool
+    """True if the target is in the room that changed before the stage."""
+    belief: BeliefRecord | None
+
+    @staticmethod
+    def of(row: StageMetrics, record: StageRecord) -> "RecordedStage":
+        """Return a stage from its row and its record, which may lack its trace and entries."""
+        target = record.target
+        return RecordedStage(
+            row=row,
+            category=record.goal.category,
+            error=record.error,
+            target_m=target.position_m,
+            first_target_m=target.first_position_m,
+            is_change_around_target=record.transition.room_id == target.room_id,
+            belief=record.belief_at_start,
+        )
 
     @property
     def cause(self) -> FailureCause | None:
@@ -85,12 +107,12 @@ class RecordedRun:
             StoreError: An agent has more records than the run has stages.
         """
         total = sum(self.num_stages.values())
-        return tuple(summarise(agent, records, total) for agent, records in self.records_by_agent().items())
+        return tuple(summarise(agent, rows, total) for agent, rows in self.rows_by_agent().items())
 
     @cached_property
     def pairs(self) -> tuple[AgentPair, ...]:
         """Every two agents on the stages that both scored."""
-        return tuple(agent_pairs(self.records_by_agent()))
+        return tuple(agent_pairs(self.rows_by_agent()))
 
     @property
     def wall_s(self) -> dict[str, list[float]]:
@@ -124,16 +146,16 @@ class RecordedRun:
             {key: digest.hexdigest() for key, digest in episodes.items()},
         )
 
-    def records_by_agent(self) -> dict[str, list[StageRecord]]:
-        """Return the records of each agent, without traces."""
-        found: dict[str, list[StageRecord]] = {agent: [] for agent in self.agents}
+    def rows_by_agent(self) -> dict[str, list[StageMetrics]]:
+        """Return the rows of each agent."""
+        found: dict[str, list[StageMetrics]] = {agent: [] for agent in self.agents}
         for (agent, _, _), outcome in self.outcomes.items():
-            found[agent].append(outcome.record)
+            found[agent].append(outcome.row)
         return found
 
     def scored(self, agent: str) -> list[RecordedStage]:
         """Return an agent's stages that count in rates."""
-        return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.record.is_scored]
+        return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.row.is_scored]
 
     def cause_counts(self) -> dict[str, Counter[FailureCause | None]]:
         """Count stages by cause, for each agent."""
@@ -173,9 +195,9 @@ def load_run(run_dir: Path) -> RecordedRun:
             keys = sorted(key for key in states if key[0] == agent)
             for key, record in zip(keys, store.records(agent, is_brief=True), strict=True):
                 _check(run_dir, key, states[key], record, planned)
-                outcomes[key] = RecordedStage(rows[key], record)
+                outcomes[key] = RecordedStage.of(rows[key], record)
         # Tasks that the header does not name have as many stages as their records say.
-        num_stages = {one.record.task_id: one.record.num_stages for one in outcomes.values()} | (planned or {})
+        num_stages = {one.row.task_id: one.row.num_stages for one in outcomes.values()} | (planned or {})
         return RecordedRun(
             run_dir=run_dir,
             agents=agents,

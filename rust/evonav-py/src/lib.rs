@@ -3,6 +3,7 @@
 
 mod arrays;
 mod camera;
+mod drawing;
 mod error;
 mod generation;
 mod house;
@@ -10,6 +11,7 @@ mod house_generation;
 mod inspection;
 mod memory;
 mod perception;
+mod resampling;
 mod sensors;
 mod simulator;
 mod unigoal;
@@ -24,6 +26,7 @@ mod _core {
     #[pymodule_export]
     use super::{
         camera::{project_points, unproject_image, unproject_masks},
+        drawing::{best_label_point, outlines},
         error::{
             DecisionError, EvonavError, HouseError, InvalidArgumentError, SimulationError,
             StoreError, TaskError,
@@ -43,6 +46,7 @@ mod _core {
                 distort_masks, draw_normals, mask_outlines, noisy_depth, paint_blobs, surface_sites,
             },
         },
+        resampling::draw_counts,
         sensors::{
             encode_png, instance_areas, mask_extents, number_instances, renumber_masks,
             visible_cells,

@@ -7,8 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from evonav.evaluation.records.base import PlacesRecord, Point2
-from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.base import BeliefRecord, PlacesRecord, Point2, Point3
 
 NUM_BINS = 10
 """Number of bins of the expected calibration error, all of the same width."""
@@ -121,9 +120,13 @@ class BeliefSummary:
     median_rank: float | None
 
 
-def belief_summary(records: Iterable[StageRecord], radius_m: float) -> BeliefSummary:
-    """Score an agent's probabilities over its stages, at a success radius."""
-    beliefs = [(record.target.position_m, record.belief_at_start) for record in records if record.belief_at_start]
+def belief_summary(beliefs: Sequence[tuple[Point3, BeliefRecord]], radius_m: float) -> BeliefSummary:
+    """Score an agent's probabilities over its stages, at a success radius.
+
+    Args:
+        beliefs: The target's position and the belief of each stage as which began the agent told one.
+        radius_m: The success radius.
+    """
     presence = calibration(pair for _, belief in beliefs for pair in belief.presence)
     scores = [place_score(b.places, (at[0], at[2]), radius_m) for at, b in beliefs if b.places is not None]
     n = len(scores)

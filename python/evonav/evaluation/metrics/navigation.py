@@ -13,22 +13,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import during_stratum, stratum_of
-from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
 SUMMARY_VERSION = 2
 """The version of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
 
 
-class _Stage(Protocol):
+class HouseStage(Protocol):
+    """A stage in a house."""
+
     @property
-    def house(self) -> str: ...
+    def house(self) -> str: ...  # noqa: D102
     @property
-    def task_id(self) -> str: ...
+    def task_id(self) -> str: ...  # noqa: D102
 
 
-def house_of(stage: _Stage) -> str:
+class Stage(HouseStage, Protocol):
+    """A stage as rates see it: a record (`StageRecord`), or a row made of one (`StageMetrics`)."""
+
+    @property
+    def stage(self) -> int: ...  # noqa: D102
+    @property
+    def state(self) -> str: ...  # noqa: D102
+    @property
+    def is_scored(self) -> bool: ...  # noqa: D102
+    @property
+    def spl(self) -> float | None: ...  # noqa: D102
+    @property
+    def soft_spl(self) -> float | None: ...  # noqa: D102
+    @property
+    def has_stopped(self) -> bool: ...  # noqa: D102
+    @property
+    def path_length_m(self) -> float | None: ...  # noqa: D102
+    @property
+    def terminal_distance_m(self) -> float | None: ...  # noqa: D102
+    @property
+    def mode(self) -> str: ...  # noqa: D102
+    @property
+    def stratum(self) -> str: ...  # noqa: D102
+    @property
+    def during_stratum(self) -> str | None: ...  # noqa: D102
+
+
+def house_of(stage: HouseStage) -> str:
     """Return the house that a stage is resampled with; its task where the record does not name a house.
 
     Args:
@@ -96,7 +124,7 @@ class AgentPair:
         return self.sr.n
 
 
-def rates(records: Sequence[StageRecord]) -> Rates:
+def rates(records: Sequence[Stage]) -> Rates:
     """Return SR and SPL over the scored stages among `records`."""
     scored = [record for record in records if record.is_scored]
     if not scored:
@@ -113,7 +141,7 @@ def rates(records: Sequence[StageRecord]) -> Rates:
     )
 
 
-def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> AgentSummary:
+def summarise(agent: str, records: Sequence[Stage], num_stages: int) -> AgentSummary:
     """Summarise an agent as a table row. Stages of the run without a record count as not run.
 
     Raises:
@@ -121,7 +149,7 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
     """
     if len({(record.task_id, record.stage) for record in records}) != len(records) or len(records) > num_stages:
         raise StoreError(f"{agent}: {len(records)} records of {num_stages} stages, each at most once: not a run's")
-    counts = Counter(record.state for record in records)
+    counts = Counter(EndState(record.state) for record in records)
     counts[EndState.NOT_RUN] += num_stages - len(records)
     scored = [record for record in records if record.is_scored]
     overall = rates(scored)
@@ -140,7 +168,7 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
     )
 
 
-def agent_pairs(records_by_agent: Mapping[str, Sequence[StageRecord]]) -> list[AgentPair]:
+def agent_pairs(records_by_agent: Mapping[str, Sequence[Stage]]) -> list[AgentPair]:
     """Compare every two agents on the stages that both scored; two without such a stage are left out."""
     scored = {
         agent: {(record.task_id, record.stage): record for record in records if record.is_scored}
@@ -155,7 +183,7 @@ def agent_pairs(records_by_agent: Mapping[str, Sequence[StageRecord]]) -> list[A
     return [replace(pair, sr=sr, spl=spl) for pair, sr, spl in zip(pairs, srs, spls, strict=True)]
 
 
-def _agent_pair(a: str, b: str, stages: Sequence[tuple[StageRecord, StageRecord]]) -> AgentPair:
+def _agent_pair(a: str, b: str, stages: Sequence[tuple[Stage, Stage]]) -> AgentPair:
     values_a, values_b = (success_and_spl(records) for records in zip(*stages, strict=True))
     sr, spl = paired_effects(values_a, values_b, [house_of(record) for record, _ in stages])
     return AgentPair(
@@ -202,21 +230,21 @@ def _effect_json(name: str, effect: PairedEffect) -> dict[str, Any]:
     }
 
 
-def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
-    splits: dict[str, list[StageRecord]] = defaultdict(list)
-    has_changes = any(record.during is not None for record in scored)
+def _splits(scored: Sequence[Stage]) -> dict[str, list[Stage]]:
+    splits: dict[str, list[Stage]] = defaultdict(list)
+    has_changes = any(record.during_stratum is not None for record in scored)
     for record in scored:
         if has_changes:
-            splits[during_stratum(record)].append(record)
-        splits[stratum_of(record)].append(record)
+            splits[record.during_stratum or "unchanged_during"].append(record)
+        splits[record.stratum].append(record)
         if record.stage > 1:
-            splits[record.transition.kind].append(record)
+            splits[record.mode].append(record)
     return dict(sorted(splits.items()))
 
 
-def success_and_spl(scored: Sequence[StageRecord]) -> NDArray[np.float64]:
+def success_and_spl(scored: Sequence[Stage]) -> NDArray[np.float64]:
     """Return `(N, 2)` success, 0 or 1, and SPL of scored stages."""
-    rows = [(float(record.state is EndState.SUCCESS), record.spl or 0.0) for record in scored]
+    rows = [(float(record.state == EndState.SUCCESS), record.spl or 0.0) for record in scored]
     return np.array(rows, dtype=np.float64)
 
 

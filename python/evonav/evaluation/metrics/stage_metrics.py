@@ -150,7 +150,7 @@ _COPIED = tuple(field.name for field in fields(RecordMetrics) if field.name in {
 """The metrics that are fields of the record."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class StageMetrics(StageCosts, RecordMetrics):
     """A stage as one row: the metrics of its record, changes since the stage before, and costs."""
 
@@ -167,6 +167,11 @@ class StageMetrics(StageCosts, RecordMetrics):
     def is_scored(self) -> bool:
         """True if the stage counts in rates."""
         return self.success is not None
+
+    @property
+    def during_stratum(self) -> str | None:
+        """`during`, by the name that a record has for it."""
+        return self.during
 
     def is_success_at(self, radius_m: float) -> bool | None:
         """Return whether the stage were a success with another radius; `None` where the stage has no score."""
@@ -267,8 +272,8 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         cause=None if cause is None else cause.value,
         error_kind=None if record.error is None else record.error.kind.value,
         category=record.target.category,
-        mode="first" if record.stage == 1 else record.transition.kind,
-        stratum=stratum_of(record),
+        mode=record.mode,
+        stratum=record.stratum,
         is_relocated_now=record.target.is_relocated_now,
         is_agent_in_changed_room=record.transition.is_agent_in_room,
         num_relocations=len(record.transition.relocations),
@@ -302,28 +307,9 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         num_entries_at_start=None if start is None else start.num_entries,
         precision_at_start=start.num_right / start.num_entries if start is not None and start.num_entries else None,
         recall_at_start=_recall(start),
-        during=None if record.during is None else during_stratum(record),
+        during=record.during_stratum,
         spl_after_change=_spl_after_change(record),
     )
-
-
-DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
-"""Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
-
-
-def during_stratum(record: StageRecord) -> str:
-    """Return the name in `DURING_STRATA` of what happened during a stage."""
-    during = record.during
-    if during is None or during.at_round is None:
-        return "unchanged_during"
-    return "target_moved_during" if during.is_target_relocated else "changed_during"
-
-
-def stratum_of(record: StageRecord) -> str:
-    """Return the paper's stratum: `relocated` if the target ever moved since stage 1; `stage_1` is in neither."""
-    if record.stage == 1:
-        return "stage_1"
-    return "relocated" if record.target.is_relocated else "not_relocated"
 
 
 def _spl_after_change(record: StageRecord) -> float | None:

@@ -39,6 +39,10 @@ class TransitionRecord(Record):
         return "extensions" if self.num_added or self.num_removed or self.num_states else "static"
 
 
+DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
+"""Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
+
+
 class DuringRecord(Record):
     """The change of the house during the stage (docs/extensions.md). Oracle."""
 
@@ -58,6 +62,13 @@ class DuringRecord(Record):
     """Length of the agent's path up to the change."""
     reference_after_m: Real | None = None
     """Length of the shortest path from the agent's place at the change to the target after it; `None` without one."""
+
+    @property
+    def stratum(self) -> str:
+        """The name in `DURING_STRATA` of what happened during the stage."""
+        if self.at_round is None:
+            return "unchanged_during"
+        return "target_moved_during" if self.is_target_relocated else "changed_during"
 
     @property
     def done(self) -> tuple[Relocation, ...]:

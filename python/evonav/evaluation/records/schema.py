@@ -308,6 +308,22 @@ class StageRecord(Record):
         return self.state.is_scored
 
     @property
+    def mode(self) -> str:
+        """The kind of the transition before the stage (`TransitionRecord.kind`); `first` in stage 1."""
+        return "first" if self.stage == 1 else self.transition.kind
+
+    @property
+    def stratum(self) -> str:
+        """The paper's: `relocated` if the target ever moved since stage 1; `stage_1` is in neither of the others."""
+        later = "relocated" if self.target.is_relocated else "not_relocated"
+        return "stage_1" if self.stage == 1 else later
+
+    @property
+    def during_stratum(self) -> str | None:
+        """`DuringRecord.stratum`; `None` without a change during the stage in the task."""
+        return None if self.during is None else self.during.stratum
+
+    @property
     def target_m_at_end(self) -> Point3:
         """The target's position as the stage ends, by which success is judged."""
         during = self.during

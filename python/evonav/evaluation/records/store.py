@@ -10,7 +10,7 @@ import os
 import shutil
 import sqlite3
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -269,11 +269,9 @@ class RunStore:
         return self._texts("record", agent, task_id)
 
     def _texts(self, column: str, agent: str | None, task_id: str | None) -> Iterator[str]:
-        query = (
-            f"SELECT {column} FROM stages WHERE (?1 IS NULL OR agent = ?1) AND (?2 IS NULL OR task_id = ?2) "  # noqa: S608
-            "ORDER BY agent, task_id, stage"
-        )
-        for (text,) in self._rows(query, (agent, task_id)):
+        wanted = {name: value for name, value in (("agent", agent), ("task_id", task_id)) if value is not None}
+        query = f"SELECT {column} FROM stages {_where(wanted)} ORDER BY agent, task_id, stage"  # noqa: S608
+        for (text,) in self._rows(query, tuple(wanted.values())):
             yield text
 
     def record(self, agent: str, task_id: str, stage: int) -> StageRecord:
@@ -311,12 +309,18 @@ class RunStore:
 
     def maps(self, task_id: str | None = None) -> Iterator[FloorPlan]:
         """Yield floor plans by task and stage."""
-        query = "SELECT map FROM stage_maps WHERE ?1 IS NULL OR task_id = ?1 ORDER BY task_id, stage"
-        for (text,) in self._rows(query, (task_id,)):
+        wanted = {} if task_id is None else {"task_id": task_id}
+        query = f"SELECT map FROM stage_maps {_where(wanted)} ORDER BY task_id, stage"  # noqa: S608
+        for (text,) in self._rows(query, tuple(wanted.values())):
             try:
                 yield FloorPlan.model_validate_json(text)
             except ValidationError as error:
                 raise StoreError(f"{self.path}: {error}") from error
+
+    def num_rooms(self) -> dict[str, int]:
+        """Return the number of rooms of each task's house, by its first stored floor plan."""
+        query = "SELECT task_id, json_array_length(map, '$.rooms'), min(stage) FROM stage_maps GROUP BY task_id"
+        return {task_id: num for task_id, num, _ in self._rows(query)}
 
     def timings(self) -> dict[tuple[str, str, int], tuple[float, float]]:
         """Return wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
@@ -382,6 +386,12 @@ def _why_no_run(run_dir: Path) -> str:
     if inner:
         return f"no run here, but {len(inner)} below: name one, such as {inner[0]}"
     return f"no run here ({FILE_NAME} not found)"
+
+
+def _where(columns: Iterable[str]) -> str:
+    """Return the condition that columns have given values; SQLite looks those up that begin a table's key."""
+    conditions = " AND ".join(f"{column} = ?" for column in columns)
+    return f"WHERE {conditions}" if conditions else ""
 
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON

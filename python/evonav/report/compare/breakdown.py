@@ -187,8 +187,7 @@ def _room_counts(compared_agents: Sequence[ComparedAgent]) -> dict[str, int]:
     counts: dict[str, int] = {}
     for run in {compared.run.run_dir: compared.run for compared in compared_agents}.values():
         with RunStore(run.run_dir) as store:
-            firsts = {task_id: next(store.maps(task_id), None) for task_id in run.num_stages}
-        counts |= {task_id: len(first.rooms) for task_id, first in firsts.items() if first is not None}
+            counts |= store.num_rooms()
     return counts
 
 

@@ -6,6 +6,7 @@ from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.drawing.style import file_css
 from evonav.drawing.svg import escape, slug
+from evonav.evaluation.metrics.navigation import Stage
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.report.maps.trajectory import change, course
@@ -63,11 +64,11 @@ def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
     return ", ".join(phrases)
 
 
-def outcome_words(record: StageRecord) -> str:
+def outcome_words(stage: Stage) -> str:
     """Return `success, SPL 0.83` and the like."""
-    if record.state is EndState.SUCCESS:
-        return "success" if record.spl is None else f"success, SPL {record.spl:.2f}"
-    return str(record.state.value).replace("_", " ")
+    if stage.state == EndState.SUCCESS:
+        return "success" if stage.spl is None else f"success, SPL {stage.spl:.2f}"
+    return EndState(stage.state).value.replace("_", " ")
 
 
 def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:

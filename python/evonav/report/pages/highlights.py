@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedRun, RecordedStage
 from evonav.report.tables.causes import FailureCause
@@ -70,29 +71,33 @@ def highlights_first(run: RecordedRun) -> list[tuple[str, str]]:
 
 def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
     """Rate how well a stage shows the benchmark, and name the agents that show it."""
-    good = [agent for agent, outcome in found.items() if outcome.record.state is EndState.SUCCESS]
+    good = [agent for agent, outcome in found.items() if outcome.row.state == EndState.SUCCESS]
     misled = [agent for agent, outcome in found.items() if outcome.cause is FailureCause.STALE_ENTRY]
-    bad = misled or [agent for agent, outcome in found.items() if outcome.record.state is EndState.FAILURE]
+    bad = misled or [agent for agent, outcome in found.items() if outcome.row.state == EndState.FAILURE]
     pair = bad[:1] + good[:1]
     if not pair:
         return -1.0, []
-    record = found[pair[0]].record
-    score = 6.0 * bool(misled) + 3.0 * (len(pair) == 2) + 2.0 * record.target.is_relocated_now
-    return score + (record.transition.kind != "static"), pair
+    row = found[pair[0]].row
+    score = 6.0 * bool(misled) + 3.0 * (len(pair) == 2) + 2.0 * row.is_relocated_now
+    return score + _is_changed(row), pair
 
 
 def _num_rounds(run: RecordedRun, agent: str, task_id: str) -> int:
     keys = ((agent, task_id, stage) for stage in range(1, run.num_stages[task_id] + 1))
-    return sum(run.outcomes[key].record.num_rounds for key in keys if key in run.outcomes)
+    return sum(run.outcomes[key].row.num_rounds for key in keys if key in run.outcomes)
 
 
 def _score(run: RecordedRun, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
     last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
     hero = last[-1]
-    has_success = hero.record.state is EndState.SUCCESS
+    has_success = hero.row.state == EndState.SUCCESS
     is_misled = any(outcome.cause is FailureCause.STALE_ENTRY for outcome in last)
     score = 6.0 * (is_misled and has_success) + 4.0 * (hero.row.stale_path_m > 0 and has_success)
-    score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
-    window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
-    score += sum(record.transition.kind != "static" for record in window)
-    return score + sum(record.state is EndState.SUCCESS for record in window)
+    score += 2.0 * hero.row.is_relocated_now + 2.0 * has_success + len(stages)
+    window = [run.outcomes[agents[-1], task_id, k].row for k in stages]
+    score += sum(map(_is_changed, window))
+    return score + sum(row.state == EndState.SUCCESS for row in window)
+
+
+def _is_changed(row: StageMetrics) -> bool:
+    return row.mode not in ("first", "static")

@@ -19,7 +19,7 @@ from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, text_of
 from evonav.report.plots.render import plot_elements
-from evonav.report.plots.run_plots import run_plots
+from evonav.report.plots.run_plots import Breakdowns, run_breakdowns, run_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.run import RecordedRun, RecordedStage, Task, load_run
 from evonav.report.tables import table as tables
@@ -61,7 +61,8 @@ def write_report(
     """
     run = run_dir if isinstance(run_dir, RecordedRun) else load_run(run_dir)
     out_dir = out_dir or run.run_dir
-    found = run_tables(run)
+    breakdowns = run_breakdowns(run)
+    found = run_tables(run, breakdowns)
     with_rows = [table for table in found if table.rows]
     write_atomically(out_dir / "table.md", tables.markdown_tables(with_rows))
     write_atomically(out_dir / "table.tex", tables.latex_tables(with_rows))
@@ -72,7 +73,7 @@ def write_report(
     with replacing(path) as beside, beside.open("w", encoding="utf-8") as file:
         tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
         for text in page.generate(
-            **_template_values(run, found, has_replays=bool(replays)), tasks=tasks, replays=replays
+            **_template_values(run, found, breakdowns, has_replays=bool(replays)), tasks=tasks, replays=replays
         ):
             file.write(text)
     return path
@@ -130,7 +131,9 @@ def _write_maps(run: RecordedRun, task: Task, map_dir: Path) -> None:
         write_atomically(map_dir / map_name(record), drawn)
 
 
-def _template_values(run: RecordedRun, found: Sequence[tables.Table], *, has_replays: bool) -> dict[str, Any]:
+def _template_values(
+    run: RecordedRun, found: Sequence[tables.Table], breakdowns: Breakdowns, *, has_replays: bool
+) -> dict[str, Any]:
     overview = [
         {
             "anchor": slug(task_id),
@@ -145,7 +148,7 @@ def _template_values(run: RecordedRun, found: Sequence[tables.Table], *, has_rep
     ]
     headline, *others = found
     shown = [table for table in others if table.rows]
-    plots, failures = run_plots(run), failure_groups(run)
+    plots, failures = run_plots(run, breakdowns), failure_groups(run)
     sections = [
         ("rates", headline.title),
         *([("replays", "Round by round")] if has_replays else []),
@@ -191,9 +194,9 @@ def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
     """State and tooltip of an overview square."""
     if outcome is None:
         return ("none", "no record yet")
-    record = outcome.record
-    why = f": {CAUSE_NAMES[outcome.cause]}" if outcome.cause is not None and record.is_scored else ""
-    return (record.state.value, f"{record.goal.category}, {outcome_words(record)}{why}")
+    row = outcome.row
+    why = f": {CAUSE_NAMES[outcome.cause]}" if outcome.cause is not None and row.is_scored else ""
+    return (row.state, f"{outcome.category}, {outcome_words(row)}{why}")
 
 
 def _bars(summary: AgentSummary) -> list[Markup]:

@@ -114,16 +114,16 @@ def filter_data(run: RecordedRun, task_id: str) -> dict[str, str]:
     """Return the `data-*` attributes of a task that the page's filters use."""
     keys = [(agent, task_id, stage) for agent in run.agents for stage in range(1, run.num_stages[task_id] + 1)]
     outcomes = {key: run.outcomes[key] for key in keys if key in run.outcomes}
-    states = {key: outcome.record.state for key, outcome in outcomes.items()}
+    states = {key: outcome.row.state for key, outcome in outcomes.items()}
     num_disagreements = 0
     for stage in range(1, run.num_stages[task_id] + 1):
         found = {states.get((agent, task_id, stage)) for agent in run.agents}
-        num_disagreements += EndState.SUCCESS in found and len(found) > 1
+        num_disagreements += EndState.SUCCESS.value in found and len(found) > 1
     causes = sorted({outcome.cause.name for outcome in outcomes.values() if outcome.cause is not None})
-    categories = {outcome.record.goal.category.lower() for outcome in outcomes.values()}
+    categories = {outcome.category.lower() for outcome in outcomes.values()}
     return {
         "task": slug(task_id),
-        "failures": str(sum(state is not EndState.SUCCESS for state in states.values())),
+        "failures": str(sum(state != EndState.SUCCESS for state in states.values())),
         "disagreements": str(num_disagreements),
         "causes": " ".join(causes),
         "words": " ".join([task_id.lower(), *sorted(categories)]),

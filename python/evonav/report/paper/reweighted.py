@@ -6,8 +6,7 @@ import numpy as np
 
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import house_of, success_and_spl
-from evonav.evaluation.metrics.stage_metrics import stratum_of
-from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.paper.tables import PAPER, Perception
 from evonav.report.run import RecordedRun
@@ -41,16 +40,16 @@ def reweighted_table(runs: Sequence[RecordedRun], mix: str, perception: Percepti
     num_rooms = {task: count for run in runs for task, count in _num_rooms(run).items()}
     tasks = list(num_rooms)
     weighting = reweight(mix, list(num_rooms.values()), [None] * len(tasks))
-    by_agent: dict[str, list[StageRecord]] = {}
+    by_agent: dict[str, list[StageMetrics]] = {}
     for run in runs:
-        for agent, records in run.records_by_agent().items():
-            by_agent.setdefault(agent, []).extend(records)
+        for agent, mine in run.rows_by_agent().items():
+            by_agent.setdefault(agent, []).extend(mine)
     rows = []
     for agent in agents_in_order(by_agent):
-        scored = [record for record in by_agent[agent] if record.is_scored]
+        scored = [row for row in by_agent[agent] if row.is_scored]
         cells = []
         for name, stratum in COLUMNS.items():
-            part = [record for record in scored if stratum is None or stratum_of(record) == stratum]
+            part = [row for row in scored if stratum is None or row.stratum == stratum]
             found = _estimate(part, tasks, weighting, is_spl=name.startswith("SPL"))
             cells.append(NONE if found.value is None else rate(found.value, found.ci95))
         paper = PAPER[perception].get(agent)
@@ -70,24 +69,23 @@ def reweighted_table(runs: Sequence[RecordedRun], mix: str, perception: Percepti
 def _num_rooms(run: RecordedRun) -> dict[str, int]:
     """Return the number of rooms of each task's house; 0 where its map is not recorded."""
     with RunStore(run.run_dir) as store:
-        maps = {task: next(iter(store.maps(task)), None) for task in run.num_stages}
-        return {task: 0 if plan is None else len(plan.rooms) for task, plan in maps.items()}
+        return dict.fromkeys(run.num_stages, 0) | store.num_rooms()
 
 
 def _estimate(
-    records: Sequence[StageRecord], tasks: Sequence[str], weighting: Reweighting, *, is_spl: bool
+    stages: Sequence[StageMetrics], tasks: Sequence[str], weighting: Reweighting, *, is_spl: bool
 ) -> Estimate:
     """Return the weighted mean over the stages of some tasks."""
     index_of = {task: index for index, task in enumerate(tasks)}
-    indices = np.array([index_of[record.task_id] for record in records], np.int64)
+    indices = np.array([index_of[row.task_id] for row in stages], np.int64)
     weights = weighting.weights[indices]
     is_counted = weights > 0.0
-    chosen = [record for record, counts in zip(records, is_counted, strict=True) if counts]
+    chosen = [row for row, counts in zip(stages, is_counted, strict=True) if counts]
     if not chosen:
         return Estimate(None, None, 0, 0)
     success, spl = success_and_spl(chosen).T
     values = spl if is_spl else success
     strata = weighting.task_strata[indices][is_counted]
-    bootstrap = ClusterBootstrap([house_of(record) for record in chosen], strata=strata)
+    bootstrap = ClusterBootstrap([house_of(row) for row in chosen], strata=strata)
     sums = bootstrap.sums(np.column_stack([weights[is_counted] * values, weights[is_counted]]))
     return bootstrap.ratio(sums[:, 0], sums[:, 1], len(chosen))

@@ -11,9 +11,8 @@ from typing import Literal
 
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
-from evonav.evaluation.metrics.stage_metrics import stratum_of
-from evonav.evaluation.records.schema import StageRecord
-from evonav.report.run import RecordedRun
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.report.run import RecordedRun, RecordedStage
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, Interval, newcombe, power, wilson
@@ -167,13 +166,13 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
 def _far_table(run: RecordedRun) -> Table:
     """Split moved targets by distance: who stops at the old place of one that moved a little still succeeds."""
     rows = []
-    for agent, records in run.records_by_agent().items():
-        far: list[StageRecord] = []
-        near: list[StageRecord] = []
-        for record in records:
-            moved_m = _moved_m(record)
+    for agent in run.agents:
+        far: list[StageMetrics] = []
+        near: list[StageMetrics] = []
+        for key, outcome in run.outcomes.items():
+            moved_m = _moved_m(outcome) if key[0] == agent else None
             if moved_m is not None:
-                (far if moved_m > FAR_M else near).append(record)
+                (far if moved_m > FAR_M else near).append(outcome.row)
         rows.append((agent, _with_interval(rates(far)), _with_interval(rates(near))))
     note = (
         "SR % of the moved targets of Table 2, by the distance on the ground plane from the place in stage 1. Who "
@@ -184,10 +183,10 @@ def _far_table(run: RecordedRun) -> Table:
     return Table("Table 2 by how far the target moved", columns, tuple(rows), (note,))
 
 
-def _moved_m(record: StageRecord) -> float | None:
+def _moved_m(outcome: RecordedStage) -> float | None:
     """Return how far a moved target stands from its place in stage 1; `None` for others, and where it is unknown."""
-    first, now = record.target.first_position_m, record.target.position_m
-    if stratum_of(record) != "relocated" or first is None:
+    first, now = outcome.first_target_m, outcome.target_m
+    if outcome.row.stratum != "relocated" or first is None:
         return None
     return math.dist((first[0], first[2]), (now[0], now[2]))
 

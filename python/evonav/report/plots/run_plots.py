@@ -1,6 +1,6 @@
 """Plot a run: rates by kind of stage, differences between agents."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
 from evonav.report.compare.selection import agents_of
@@ -18,6 +18,8 @@ PLOTTED = (
 """Breakdowns with a plot: groups and metric."""
 TABLED = (("path-length", "success"), ("room-count", "success"), ("radius", "success"))
 """Breakdowns that have no table of their own elsewhere on the page."""
+Breakdowns = Mapping[tuple[str, str], Breakdown]
+"""Breakdowns by groups and metric."""
 _CAPTIONS = {
     "stratum": "First: stage 1. Moved: the target had moved since stage 1, at any time.",
     "mode": "What changed in the house just before the stage.",
@@ -27,23 +29,20 @@ _CAPTIONS = {
 }
 
 
-def run_breakdowns(run: RecordedRun, wanted: Sequence[tuple[str, str]] = TABLED) -> list[Breakdown]:
-    """Return breakdowns of a run, without those that have no group.
+def run_breakdowns(run: RecordedRun) -> Breakdowns:
+    """Return the breakdowns of a run that have a table or a plot, without those that have no group.
 
     Raises:
         StoreError: The run cannot be read.
     """
     agents = [one for one in agents_of(run) if any(row.is_scored for row in one.rows.values())]
-    found = [breakdown(agents, by, measure) for by, measure in wanted] if agents else []
-    return [one for one in found if one.groups]
+    wanted = dict.fromkeys((*TABLED, *PLOTTED)) if agents else ()
+    found = {(by, measure): breakdown(agents, by, measure) for by, measure in wanted}
+    return {key: one for key, one in found.items() if one.groups}
 
 
-def run_plots(run: RecordedRun) -> list[tuple[Plot, str]]:
-    """Return the plots of a run with their captions, in reading order; none of a run without a scored stage.
-
-    Raises:
-        StoreError: The run cannot be read.
-    """
+def run_plots(run: RecordedRun, breakdowns: Breakdowns) -> list[tuple[Plot, str]]:
+    """Return the plots of a run with their captions, in reading order; none of a run without a scored stage."""
     plots: list[tuple[Plot, str]] = []
     if len(run.pairs) > 0:
         caption = "On the stages that both scored; 95% intervals, bootstrap by house. Blue: ahead, as the table says."
@@ -54,6 +53,6 @@ def run_plots(run: RecordedRun) -> list[tuple[Plot, str]]:
             )
             plot = GapPlot(f"{name} differences, points", gaps, "the second is better", "the first is better")
             plots.append((plot, caption))
-    for one in run_breakdowns(run, PLOTTED):
+    for one in (breakdowns[key] for key in PLOTTED if key in breakdowns):
         plots.append((breakdown_plot(one), f"{_CAPTIONS[one.by]} 95% intervals, bootstrap by house."))
     return plots

@@ -25,8 +25,8 @@ def failure_groups(run: RecordedRun) -> list[dict[str, Any]]:
     found: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
     tracebacks = {(failure.agent, failure.task_id, failure.stage): failure.traceback for failure in run.failures}
     for key, outcome in run.outcomes.items():
-        error = outcome.record.error
-        if error is not None and outcome.record.state is EndState.ERRORED:
+        error = outcome.error
+        if error is not None and outcome.row.state == EndState.ERRORED:
             which = (error.kind.value.replace("_", " "), error.message)
             found.setdefault(which, []).append(key)
     return [

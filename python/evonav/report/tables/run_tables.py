@@ -7,23 +7,22 @@ from typing import Literal
 from evonav.counted import counted
 from evonav.evaluation.metrics.belief import belief_summary
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.evaluation.metrics.stage_metrics import DURING_STRATA
+from evonav.evaluation.records.changes import DURING_STRATA
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
-from evonav.report.plots.run_plots import run_breakdowns
+from evonav.report.plots.run_plots import TABLED, Breakdowns
 from evonav.report.run import RecordedRun
 from evonav.report.tables import table as tables
 from evonav.report.tables.numbers import NONE, percent, points, rate
 from evonav.statistics import MIN_CLUSTERS
 
 
-def run_tables(run: RecordedRun) -> list[tables.Table]:
+def run_tables(run: RecordedRun, breakdowns: Breakdowns) -> list[tables.Table]:
     """Return all tables of a run, in reading order."""
-    records = run.records_by_agent()
     return [
         tables.headline(run.summaries),
         tables.paired_table(run.pairs),
-        tables.stage_table(records),
+        tables.stage_table(run.rows_by_agent()),
         tables.relocation_table(run.summaries),
         tables.mode_table(run.summaries),
         *_during_tables(run),
@@ -31,7 +30,7 @@ def run_tables(run: RecordedRun) -> list[tables.Table]:
         effort_table(run),
         belief_table(run),
         failure_table(run),
-        *(breakdown_table(one) for one in run_breakdowns(run)),
+        *(breakdown_table(breakdowns[key]) for key in TABLED if key in breakdowns),
     ]
 
 
@@ -50,7 +49,7 @@ def effort_table(run: RecordedRun) -> tables.Table:
         if not scored:
             continue
         averages = (
-            sum(outcome.record.num_rounds for outcome in scored) / len(scored),
+            sum(outcome.row.num_rounds for outcome in scored) / len(scored),
             summary.mean_path_length_m or 0.0,
             sum(outcome.row.stale_path_m for outcome in scored) / len(scored),
             sum(outcome.row.num_stale_entries or 0 for outcome in scored) / len(scored),
@@ -68,8 +67,10 @@ def belief_table(run: RecordedRun) -> tables.Table:
     """Build the table of the probabilities that agents told as stages began; no row for an agent that tells none."""
     columns = ("Agent", "stages", "NLL", "Brier", "ECE", "rank", "entries", "NLL", "Brier", "ECE")
     rows = []
-    for agent, records in run.records_by_agent().items():
-        found = belief_summary(records, run.success_radius_m)
+    for agent in run.agents:
+        outcomes = (outcome for key, outcome in run.outcomes.items() if key[0] == agent)
+        beliefs = [(outcome.target_m, outcome.belief) for outcome in outcomes if outcome.belief]
+        found = belief_summary(beliefs, run.success_radius_m)
         place = (found.place_nll, found.place_brier, found.place_ece)
         presence = found.presence
         if found.num_placed == 0 and presence is None:
@@ -94,16 +95,16 @@ def failure_table(run: RecordedRun) -> tables.Table:
     for agent in run.agents:
         outcomes = [outcome for key, outcome in run.outcomes.items() if key[0] == agent]
         kinds = Counter(
-            outcome.record.error.kind.value.replace("_", " ")
+            outcome.error.kind.value.replace("_", " ")
             for outcome in outcomes
-            if outcome.record.error is not None and outcome.record.state is EndState.ERRORED
+            if outcome.error is not None and outcome.row.state == EndState.ERRORED
         )
-        scored = [outcome.record for outcome in outcomes if outcome.record.is_scored]
+        scored = [outcome.row for outcome in outcomes if outcome.row.is_scored]
         counts = (
             sum(outcome.row.num_failed_decisions or 0 for outcome in outcomes),
             sum(bool(outcome.row.num_failed_decisions) for outcome in outcomes),
-            sum(bool(record.failed_before) for record in scored),
-            sum(record.memory_lost_at is not None for record in scored),
+            sum(bool(row.num_failed_before) for row in scored),
+            sum(row.has_lost_memory for row in scored),
         )
         if kinds or any(counts):
             errored = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or NONE

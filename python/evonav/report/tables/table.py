@@ -18,9 +18,8 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
-from evonav.evaluation.metrics.stage_metrics import DURING_STRATA
-from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, Stage, rates
+from evonav.evaluation.records.changes import DURING_STRATA
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.numbers import NONE, points, rate
@@ -209,7 +208,7 @@ def mode_table(summaries: Sequence[AgentSummary]) -> Table:
     return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and later.",))
 
 
-def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
+def stage_table(records: Mapping[str, Sequence[Stage]]) -> Table:
     """Build the table of SR by stage index."""
     stages = sorted({record.stage for part in records.values() for record in part})
     cells = {
