@@ -98,7 +98,11 @@ def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
             seen[item.object_id] += 1
             polygon_m = first.setdefault(item.object_id, item.polygon_m)
             # Most objects stay to the bit: only others are compared by centimetres.
-            if polygon_m != item.polygon_m and outline(polygon_m) != outline(item.polygon_m):
+            if (
+                polygon_m is not item.polygon_m
+                and polygon_m != item.polygon_m
+                and outline(polygon_m) != outline(item.polygon_m)
+            ):
                 moved.add(item.object_id)
     return frozenset(name for name, num in seen.items() if name in moved or num != len(maps))
 

@@ -23,7 +23,7 @@ _NOT_SLUG = re.compile(r"[^A-Za-z0-9._-]+")
 
 def clean(text: str) -> str:
     """Return `text` with the characters replaced that no XML or HTML page may hold."""
-    return _NOT_XML.sub("\ufffd", text)
+    return text if text.isprintable() else _NOT_XML.sub("\ufffd", text)
 
 
 def escape(text: str) -> str:
@@ -43,9 +43,9 @@ def slug(name: str) -> str:
 def cm(point_m: Point) -> tuple[int, int]:
     """Return page coordinates of a point; the origin for one that is not finite or not on this planet."""
     x_m, z_m = point_m
-    if not (abs(x_m) < MAX_M and abs(z_m) < MAX_M):
-        return (0, 0)
-    return (round(100 * x_m), round(-100 * z_m))
+    if -MAX_M < x_m < MAX_M and -MAX_M < z_m < MAX_M:
+        return (round(100 * x_m), round(-100 * z_m))
+    return (0, 0)
 
 
 def polyline(points_cm: Sequence[tuple[int, int]], *, closed: bool = False) -> str:
@@ -74,8 +74,14 @@ def simplified(points_cm: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
     while todo:
         first, last = todo.pop()
         farthest, distance_cm = first, TOLERANCE_CM
+        (x, y), (end_x, end_y) = points_cm[first], points_cm[last]
+        dx, dy = end_x - x, end_y - y
+        length2 = dx * dx + dy * dy
         for i in range(first + 1, last):
-            d = _distance_to_segment(points_cm[i], points_cm[first], points_cm[last])
+            px, py = points_cm[i][0] - x, points_cm[i][1] - y
+            along = px * dx + py * dy
+            t = 0.0 if along <= 0 else 1.0 if along >= length2 else along / length2
+            d = math.hypot(px - t * dx, py - t * dy)
             if d > distance_cm:
                 farthest, distance_cm = i, d
         if farthest != first:
@@ -137,11 +143,3 @@ def text_lines(text: str, width: int, max_lines: int) -> list[str]:
 def join(parts: Iterable[str]) -> str:
     """Concatenate parts; it makes callers easier to read."""
     return "".join(parts)
-
-
-def _distance_to_segment(point: tuple[int, int], a: tuple[int, int], b: tuple[int, int]) -> float:
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    length2 = dx * dx + dy * dy
-    t = 0.0 if length2 == 0 else ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / length2
-    t = min(1.0, max(0.0, t))
-    return math.hypot(point[0] - a[0] - t * dx, point[1] - a[1] - t * dy)

@@ -123,28 +123,27 @@ class RecordedRun:
                 found.setdefault(agent, []).append(one.row.wall_s)
         return found
 
-    @property
+    @cached_property
     def rows_sha256(self) -> dict[str, str]:
         """Digest of each agent's records as stored; equal runs have equal digests."""
-        return self._digests[0]
-
-    @property
-    def episodes_sha256(self) -> dict[tuple[str, str], str]:
-        """Digest of the records of each (agent, task), which tells whether an episode's page shows these records."""
-        return self._digests[1]
+        found = {agent: hashlib.sha256() for agent in self.agents}
+        for agent, _, text in self._texts():
+            found[agent].update(text.encode() + b"\n")
+        return {agent: digest.hexdigest() for agent, digest in found.items()}
 
     @cached_property
-    def _digests(self) -> tuple[dict[str, str], dict[tuple[str, str], str]]:
-        agents = {agent: hashlib.sha256() for agent in self.agents}
-        episodes: dict[tuple[str, str], Any] = {}
+    def episodes_sha256(self) -> dict[tuple[str, str], str]:
+        """Digest of the records of each (agent, task), which tells whether an episode's page shows these records."""
+        found: dict[tuple[str, str], Any] = {}
+        for agent, task_id, text in self._texts():
+            found.setdefault((agent, task_id), hashlib.sha256()).update(text.encode())
+        return {key: digest.hexdigest() for key, digest in found.items()}
+
+    def _texts(self) -> Iterator[tuple[str, str, str]]:
+        """Yield agent, task and text of every record."""
         with RunStore(self.run_dir) as store, store.snapshot():
             for (agent, task_id, _), text in zip(sorted(store.states()), store.record_texts(), strict=True):
-                agents[agent].update(text.encode() + b"\n")
-                episodes.setdefault((agent, task_id), hashlib.sha256()).update(text.encode())
-        return (
-            {agent: digest.hexdigest() for agent, digest in agents.items()},
-            {key: digest.hexdigest() for key, digest in episodes.items()},
-        )
+                yield agent, task_id, text
 
     def rows_by_agent(self) -> dict[str, list[StageMetrics]]:
         """Return the rows of each agent."""

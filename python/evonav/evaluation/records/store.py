@@ -22,6 +22,7 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION
 from evonav.evaluation.records.encoded import EncodedStage, invalid_record
+from evonav.evaluation.records.floor_plan_json import FloorPlanReader
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
@@ -311,9 +312,10 @@ class RunStore:
         """Yield floor plans by task and stage."""
         wanted = {} if task_id is None else {"task_id": task_id}
         query = f"SELECT map FROM stage_maps {_where(wanted)} ORDER BY task_id, stage"  # noqa: S608
+        reader = FloorPlanReader()
         for (text,) in self._rows(query, tuple(wanted.values())):
             try:
-                yield FloorPlan.model_validate_json(text)
+                yield reader.read(text)
             except ValidationError as error:
                 raise StoreError(f"{self.path}: {error}") from error
 
