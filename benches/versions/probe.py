@@ -86,7 +86,9 @@ class Probe:
             return simulators[houses[number]].shortest_path(start_m, target_m)
 
         def load(number: int) -> None:
-            simulators[houses[number]].reset(texts[houses[number]])
+            simulator = simulators[houses[number]]
+            simulator.close()  # or the last house would be used again, with its graph
+            simulator.reset(texts[houses[number]])
 
         def length_m(number: int) -> float:
             return round(float(np.linalg.norm(np.diff(path(number), axis=0), axis=1).sum()), 3)

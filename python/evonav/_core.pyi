@@ -243,6 +243,9 @@ def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int6
 def encode_png(rgb: NDArray[np.uint8]) -> bytes:
     """Encode an `(H, W, 3)` image as PNG, without metadata."""
 
+def decode_png(file: bytes) -> NDArray[np.uint8]:
+    """Decode the `(H, W, 3)` image of a PNG file; `InvalidArgumentError` if it is damaged, or not RGB of 8 bits."""
+
 # memory
 
 @final

@@ -12,6 +12,7 @@ import pytest
 from evonav import _core
 from evonav.errors import HouseError, InvalidArgumentError, SimulationError
 from evonav.house import bundled_houses
+from evonav.world.appearance import Materials
 from evonav.world.check import check_simulator
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -112,6 +113,29 @@ def test_pose_that_is_not_free_moves_to_the_nearest_reachable_position() -> None
     assert simulator.is_free(effective.position_m)
     assert effective.yaw_rad == pytest.approx(1.0, abs=1e-6)
     assert simulator.reset(HOUSES[0], start) == start
+
+
+def test_the_last_house_is_not_loaded_again_and_is_itself_again_after_changes() -> None:
+    simulator = EmbeddedSimulator(SMALL)
+    start = simulator.reset(HOUSES[0])
+    core, view, objects, cells = simulator.core, simulator.render(), simulator.objects, simulator.occupancy().cells
+    simulator.set_appearance([Materials(seed=1)])
+    target = next(body for body in objects if body.kind == "object")
+    x_m, y_m, z_m = target.centre_m
+    move = {"id": target.id, "position_m": [x_m + 1.0, y_m, z_m], "rotation_deg": [0.0, 0.0, 0.0], "parent": None}
+    simulator.apply({"moves": [move]})
+    assert (simulator.occupancy().cells != cells).any()
+    assert simulator.reset(HOUSES[0]) == start
+    assert simulator.core is core
+    assert simulator.objects == objects
+    np.testing.assert_array_equal(simulator.render().rgb, view.rgb)
+    np.testing.assert_array_equal(simulator.occupancy().cells, cells)
+    simulator.reset(HOUSES[1])
+    assert simulator.objects != objects
+    with pytest.raises(HouseError, match=r"again.json"):
+        simulator.reset("{}", name="again.json")
+    simulator.reset(HOUSES[0])
+    assert simulator.core is not core
 
 
 def test_styles_differ_in_colours_alone() -> None:

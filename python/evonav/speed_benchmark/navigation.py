@@ -66,7 +66,9 @@ def measure(sampling: Sampling) -> Iterator[Row]:
         return float(np.linalg.norm(np.diff(corners_m, axis=0), axis=1).sum())
 
     def load(number: int) -> None:
-        queries[number].house.simulator.reset(queries[number].house.json)
+        house = queries[number].house
+        house.simulator.close()  # or the last house would be used again, with its graph
+        house.simulator.reset(house.json)
 
     peers: dict[str, Callable[[int], float]] = {}
     for name in (name for name in chosen if name in TITLES):

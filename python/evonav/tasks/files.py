@@ -1,9 +1,7 @@
 """Read, check and write the files of a task."""
 
 import struct
-import zlib
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.errors import TaskError
+from evonav.errors import InvalidArgumentError, TaskError
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
@@ -37,16 +35,13 @@ def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
     Raises:
         TaskError: The file is not a PNG, not RGB, or of another size.
     """
-    from PIL import Image  # generating tasks needs no decoder, and must start fast
-
     data = read_file(path)
     # Size, depth and colour type stand in the first chunk. They are checked first, so that huge images are not decoded.
     if data[:16] != b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" or data[16:26] != struct.pack(">IIBB", size_px, size_px, 8, 2):
         raise field_error(path, "IHDR", data[:26], f"expected an 8-bit RGB PNG image of {size_px}x{size_px} px")
     try:
-        with Image.open(BytesIO(data), formats=["PNG"]) as image:
-            pixels = np.array(image.convert("RGB"))
-    except (OSError, EOFError, ValueError, SyntaxError, struct.error, zlib.error) as error:
+        pixels = _core.decode_png(data)
+    except InvalidArgumentError as error:
         raise TaskError(f"{path}: not a complete PNG image: {error}") from error
     pixels.flags.writeable = False
     return pixels

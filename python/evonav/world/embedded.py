@@ -47,13 +47,18 @@ class EmbeddedSimulator:
         self.allow_unknown_assets = allow_unknown_assets
         self.intrinsics = self.config.intrinsics
         self._loaded: _core.EmbeddedSimulator | None = None
+        self._last: tuple[tuple[str, str], _core.EmbeddedSimulator] | None = None
+        """The JSON and the name of the house that was last loaded, and the house in the core."""
         self._house_name = "house"
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._objects: tuple[SceneObject, ...] | None = None
+        self._occupancy: OccupancyGrid | None = None
         self._appearance: tuple[Change, ...] = ()
 
     def reset(self, house: str | _core.House, pose: Pose | None = None, *, name: str | None = None) -> Pose:
         """Load a house in its own look; the agent stands at `pose`, or at the house's own start.
+
+        The house that was loaded last is not built again.
 
         If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
@@ -75,9 +80,12 @@ class EmbeddedSimulator:
             name = name or house.name
             house = house.to_json()
         self._house_name = name or "house"
-        core = core_of(house, self.config, name=self._house_name, allow_unknown_assets=self.allow_unknown_assets)
+        source = (house, self._house_name)
+        if self._last is None or self._last[0] != source:
+            core = core_of(house, self.config, name=self._house_name, allow_unknown_assets=self.allow_unknown_assets)
+            self._last = (source, core)
         self._appearance = ()
-        return self._enter(core, pose)
+        return self._enter(self._last[1], pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
         """Change the current house; only what moved is built again.
@@ -274,8 +282,11 @@ class EmbeddedSimulator:
         The body moves straight along the grid, beginning at the centre nearest to the start where it fits. The grid has
         the same shape for all arrangements of a house.
         """
-        cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
-        return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
+        if self._occupancy is None:
+            cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
+            cells.flags.writeable = False
+            self._occupancy = OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
+        return self._occupancy
 
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
         """Return all surfaces, for other renderers and for export.
@@ -288,8 +299,8 @@ class EmbeddedSimulator:
 
     def close(self) -> None:
         """Release the house; safe to call twice."""
-        self._loaded = None
-        self._objects = None
+        self._loaded = self._last = None
+        self._objects = self._occupancy = None
 
     def __copy__(self) -> "EmbeddedSimulator":
         """Return another simulator of the same house; both share it, since `apply` replaces the house."""
@@ -300,7 +311,7 @@ class EmbeddedSimulator:
     def __getstate__(self) -> dict[str, Any]:
         """Return house and pose; see the class."""
         house_json = self._loaded and self._loaded.house_json()
-        return self.__dict__ | {"_loaded": house_json, "_objects": None}
+        return self.__dict__ | {"_loaded": house_json, "_last": None, "_objects": None, "_occupancy": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Load the house again."""
@@ -319,7 +330,8 @@ class EmbeddedSimulator:
         return self._loaded
 
     def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
-        self._loaded, self._objects = core, None
+        if core is not self._loaded:
+            self._loaded, self._objects, self._occupancy = core, None, None
         start_m, yaw_rad, horizon_rad = core.start()
         self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad).canonical()
         if pose is not None:

@@ -48,7 +48,7 @@ mod _core {
         },
         resampling::draw_counts,
         sensors::{
-            encode_png, instance_areas, mask_extents, number_instances, renumber_masks,
+            decode_png, encode_png, instance_areas, mask_extents, number_instances, renumber_masks,
             visible_cells,
         },
         simulator::{

@@ -6,7 +6,8 @@ use evonav_core::{
     sensors::{instance_masks, png, visible_cells::visible_cells as cast_rays},
 };
 use numpy::{
-    PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
 };
 use pyo3::{prelude::*, types::PyBytes};
 
@@ -116,4 +117,11 @@ pub fn encode_png<'py>(
     };
     let file = py.detach(|| png::encode_png(bytes, [height_px, width_px]));
     Ok(PyBytes::new(py, &file.map_err(error::to_py)?))
+}
+
+/// Decode an RGB image from a PNG file.
+#[pyfunction]
+pub fn decode_png<'py>(py: Python<'py>, file: &[u8]) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    let (rgb, [height_px, width_px]) = py.detach(|| png::decode_png(file)).map_err(error::to_py)?;
+    arrays::image_of(py, rgb, [height_px, width_px, 3])
 }

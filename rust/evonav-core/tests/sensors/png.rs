@@ -2,8 +2,11 @@
 
 use std::io::Cursor;
 
-use evonav_core::{Error, sensors::png::encode_png};
-use png::{ColorType, Decoder};
+use evonav_core::{
+    Error,
+    sensors::png::{decode_png, encode_png},
+};
+use png::{BitDepth, ColorType, Decoder, Encoder};
 use proptest::{collection::vec, prelude::*};
 
 /// Decode a PNG file of RGB: its pixels and shape.
@@ -50,7 +53,8 @@ proptest! {
     #[test]
     fn every_pixel_is_decoded_as_it_was((rgb, shape) in image()) {
         let file = encode_png(&rgb, shape).unwrap();
-        prop_assert_eq!(decoded(&file), (rgb, shape));
+        prop_assert_eq!(decoded(&file), (rgb.clone(), shape));
+        prop_assert_eq!(decode_png(&file), Ok((rgb, shape)));
         let chunks = chunks(&file);
         prop_assert_eq!((chunks[0], chunks[chunks.len() - 1]), (&b"IHDR"[..], &b"IEND"[..]));
         prop_assert!(chunks[1..chunks.len() - 1].iter().all(|name| name == b"IDAT"));
@@ -63,6 +67,23 @@ fn bytes_that_are_not_of_the_shape_are_refused() {
         let found = encode_png(&vec![0; num_bytes], shape);
         assert!(
             matches!(&found, Err(Error::InvalidArgument { name, .. }) if name == "rgb"),
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
+fn files_of_other_kinds_and_parts_of_files_are_refused() {
+    let mut grey = Vec::new();
+    let mut encoder = Encoder::new(&mut grey, 2, 1);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.write_header().unwrap().write_image_data(&[0, 1]).unwrap();
+    let whole = encode_png(&[1, 2, 3, 4, 5, 6], [1, 2]).unwrap();
+    for file in [&grey[..], b"", b"text", &whole[..whole.len() - 12], &whole[..40]] {
+        let found = decode_png(file);
+        assert!(
+            matches!(&found, Err(Error::InvalidArgument { name, .. }) if name == "file"),
             "{found:?}"
         );
     }

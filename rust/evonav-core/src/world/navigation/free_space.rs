@@ -121,6 +121,11 @@ impl Navigation {
         self.obstacles.is_clear(point_m) && self.is_indoors(point_m)
     }
 
+    /// Return [`Self::is_free`] for one of several points near each other.
+    fn is_free_after(&self, point_m: Vec2, blocker: &Cell<u32>) -> bool {
+        self.obstacles.is_clear_after(point_m, blocker) && self.is_indoors(point_m)
+    }
+
     /// Return whether the agent can move straight from one point to the other without its swept
     /// body touching anything.
     pub fn try_move(&self, from_m: Vec2, to_m: Vec2) -> bool {
@@ -156,32 +161,32 @@ impl Navigation {
         Error::require("grid points", size[0] * size[1], "at most 2^26", |n| {
             n <= MAX_CELLS as f64
         })?;
-        let index = |cell: [i64; 2]| {
-            (cell[1] - low[1] as i64) as usize * size[0] as usize
-                + (cell[0] - low[0] as i64) as usize
-        };
+        let (low, cols) = (low.map(|bound| bound as i64), size[0] as usize);
+        let index =
+            |cell: [i64; 2]| (cell[1] - low[1]) as usize * cols + (cell[0] - low[0]) as usize;
+        let cell_at =
+            |index: usize| [(index % cols) as i64 + low[0], (index / cols) as i64 + low[1]];
         // Free points lie in the box of the floors grown by the slack, so their neighbours are on
         // the grid.
-        let mut state = vec![State::Unknown; size[0] as usize * size[1] as usize];
-        let mut queue = vec![[0_i64, 0]];
+        let mut state = vec![State::Unknown; cols * size[1] as usize];
         state[index([0, 0])] = State::Reached;
-        let mut next_in_queue = 0;
-        while let Some(&cell) = queue.get(next_in_queue) {
-            next_in_queue += 1;
+        let (mut open, blocker) = (vec![[0_i64, 0]], Cell::new(NONE));
+        while let Some(cell) = open.pop() {
             for step in [[1, 0], [0, 1], [-1, 0], [0, -1]] {
                 let next = [cell[0] + step[0], cell[1] + step[1]];
                 let (to_m, state) = (point_of(next), &mut state[index(next)]);
                 if *state == State::Unknown {
-                    *state = if self.is_free(to_m) { State::Free } else { State::Blocked };
+                    let is_free = self.is_free_after(to_m, &blocker);
+                    *state = if is_free { State::Free } else { State::Blocked };
                 }
                 if *state == State::Free && self.obstacles.is_clear_between(point_of(cell), to_m) {
                     *state = State::Reached;
-                    queue.push(next);
+                    open.push(next);
                 }
             }
         }
-        queue.sort_unstable_by_key(|&[x, z]| (z, x));
-        Ok(queue.into_iter().map(point_of).collect())
+        let reached = (0..state.len()).filter(|&index| state[index] == State::Reached);
+        Ok(reached.map(|index| point_of(cell_at(index))).collect())
     }
 
     /// Return the nearest of `reachable_m` to a point, the first of equals; `None` if there is
@@ -336,9 +341,7 @@ impl Navigation {
     fn graph(&self) -> &VisibilityGraph {
         self.graph.get_or_init(|| {
             let blocker = Cell::new(NONE);
-            let is_free = |point_m| {
-                self.obstacles.is_clear_after(point_m, &blocker) && self.is_indoors(point_m)
-            };
+            let is_free = |point_m| self.is_free_after(point_m, &blocker);
             let may_be_free = |centre_m, half_m| {
                 !self.obstacles.cover(centre_m, half_m, &blocker)
                     && !self.floors.iter().all(|(gist, _)| gist.is_apart_from(centre_m, half_m))
