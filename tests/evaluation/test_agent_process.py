@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import sys
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,7 @@ CONTAINED = {
     "unruly_agents:Misplaced": (ErrorKind.AGENT, "diagnostics.chosen_entry.centre_m.1 = nan: Input should be a finite"),
     "unruly_agents:Unlimited": (ErrorKind.AGENT, "entries.0.size_m.1 = inf: Input should be a finite number"),
     "unruly_agents:Unfocused": (ErrorKind.AGENT, "sensors.first_round.spacing_deg = nan: Input should be a finite"),
+    "unruly_agents:Amnesiac": (ErrorKind.AGENT, "RuntimeError: who am I? [unruly_agents:"),
     "unruly_agents:Mistaken": (ErrorKind.AGENT, "diagnostics.num_entries = 'many': Input should be a valid integer"),
 }
 """In any process: the agent goes on with the next stage."""
@@ -284,14 +286,49 @@ def acted(agent, observation):
     return agent.act()
 
 
+GOAL = Goal(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8))
+
+
+@contextmanager
+def begun(name):
+    with closing(AgentProcesses(AgentHosting(timeout_s=30.0))) as processes:
+        agent = RemoteAgent(processes, name, Component("evonav.decision.backends:text_match"), 0)
+        agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
+        agent.begin_stage(GOAL)
+        yield agent
+
+
 @pytest.fixture
 def echo():
-    processes = AgentProcesses(AgentHosting(timeout_s=30.0))
-    agent = RemoteAgent(processes, "unruly_agents:Echo", Component("evonav.decision.backends:text_match"), 0)
-    agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
-    agent.begin_stage(Goal(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8)))
-    yield agent
-    processes.close()
+    with begun("unruly_agents:Echo") as agent:
+        yield agent
+
+
+def test_entries_come_with_the_answer_before_them_where_they_can():
+    nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
+
+    def known(agent):
+        """Ids of entries, and the number of requests that it took to ask for them."""
+        before = agent._process._num_asked
+        return [entry.entry_id for entry in agent.entries()], agent._process._num_asked - before
+
+    with begun("unruly_agents:Counting") as agent:
+        assert known(agent) == ([0], 0)
+        assert known(agent) == ([0], 1)
+        agent.look(nothing, wants_entries=True)
+        agent.act()
+        assert agent.diagnostics().details == {"seen": []}
+        assert known(agent) == ([1], 0)
+        acted(agent, nothing)
+        assert known(agent) == ([2], 1)
+        agent.look(nothing, wants_entries=True)
+        agent.act()  # which is sound
+        with pytest.raises(AgentFailedError, match="RuntimeError: who am I"):
+            agent.entries()
+        agent.look(nothing, wants_entries=True)
+        agent.act()
+        agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
+        assert known(agent) == ([4], 1)  # not those of before
 
 
 def test_arrays_cross_the_border_whatever_their_layout_and_size(echo):

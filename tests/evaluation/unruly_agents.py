@@ -264,6 +264,29 @@ class Echo:
         return []
 
 
+class Counting(Echo):
+    """Remembers how many rounds it has acted, and cannot say so after the third."""
+
+    def __init__(self):
+        self.num_rounds = 0
+
+    def act(self, observation):
+        self.num_rounds += 1
+        return super().act(observation)
+
+    def entries(self):
+        if self.num_rounds == 3:
+            raise RuntimeError("who am I?")
+        return [EntryBelief(self.num_rounds, "Mug", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 1)]
+
+
+class Amnesiac(Explorer):
+    def entries(self):
+        if self.stage == 2:
+            raise RuntimeError("who am I?")
+        return []
+
+
 class Announcing(Explorer):
     """Writes its process's number and that of a child to the file named by TOY_PIDS, then hangs."""
 

@@ -34,11 +34,13 @@ def write_request(
     Args:
         number: Its number.
         operation: Its name.
-        arguments: Its arguments; those of `act` are an observation.
+        arguments: Its arguments; the first one of `act` is an observation.
         put: Copies arrays into the shared memory, and returns where they are.
     """
     if operation == "act":
-        content, arrays = _taken_apart(*arguments)
+        observation, *others = arguments
+        parts, arrays = _taken_apart(observation)
+        content: object = (parts, others)
     else:
         buffers: list[pickle.PickleBuffer] = []
         content = pickle.dumps(arguments, protocol=5, buffer_callback=buffers.append)
@@ -56,7 +58,8 @@ def read_request(request: bytes | bytearray, get: Callable[[Places], list[Any]])
     number, operation, places, content = pickle.loads(request)  # noqa: S301 - from the evaluator
     arrays = get(places)
     if operation == "act":
-        return number, operation, (_put_together(content, arrays),)
+        parts, others = content
+        return number, operation, (_put_together(parts, arrays), *others)
     return number, operation, pickle.loads(content, buffers=arrays)  # noqa: S301
 
 

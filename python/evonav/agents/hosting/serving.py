@@ -137,13 +137,7 @@ class _Server:
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
         """Execute a request; the answer to one that raises is a failure."""
-        try:
-            parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
-        except DecisionError as error:
-            return {"failure": _failed("decision", message_of(error), error)}
-        except Exception as error:
-            return {"failure": _failed("agent", describe(error), error)}
-        return parts
+        return _parts_or_failure("failure", lambda: getattr(self, f"do_{operation}")(*arguments))
 
     @property
     def agent(self) -> Agent:
@@ -173,27 +167,22 @@ class _Server:
         return self._sensors()
 
     def do_begin_stage(self, goal: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Goal`
-        """Begin a stage."""
+        """Begin a stage, and return the agent's object memory at once: it is always asked for then."""
         self.agent.begin_stage(goal)
-        return self._sensors()
+        return {**self._sensors(), **_parts_or_failure("entries_failure", self.do_entries)}
 
-    def do_act(self, observation: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Observation`
-        """Run a decision round, and return the action and the agent's diagnostics."""
-        agent = self.agent
-        parts = {"action": wire.write_action(agent.act(observation))}
-        if (explaining_agent := explaining(agent)) is not None:
-            try:
-                parts["diagnostics"] = wire.DIAGNOSTICS.write(explaining_agent.diagnostics())
-            except DecisionError as error:
-                parts["diagnostics_failure"] = _failed("decision", message_of(error), error)
-            except Exception as error:
-                parts["diagnostics_failure"] = _failed("agent", describe(error), error)
+    def do_act(self, observation: Any, wants_entries: bool) -> dict[str, bytes]:  # noqa: ANN401 - as on the wire
+        """Run a decision round, and return the action, the agent's diagnostics, and its object memory if wanted."""
+        parts = {"action": wire.write_action(self.agent.act(observation))}
+        parts |= _parts_or_failure("diagnostics_failure", self._diagnostics)
+        if wants_entries:
+            parts |= _parts_or_failure("entries_failure", self.do_entries)
         return parts
 
     def do_entries(self) -> dict[str, bytes]:
         """Return the object memory, if the agent explains itself."""
-        explaining_agent = explaining(self.agent)
-        return {} if explaining_agent is None else {"entries": wire.ENTRIES.write(list(explaining_agent.entries()))}
+        agent = explaining(self.agent)
+        return {} if agent is None else {"entries": wire.ENTRIES.write(list(agent.entries()))}
 
     def do_costs(self) -> dict[str, bytes]:
         """Return the decision model's costs since it was made, and this process's peak memory."""
@@ -203,8 +192,22 @@ class _Server:
             costs["agent_peak_rss_mb"] = peak_mb
         return {"costs": wire.COSTS.write(costs)}
 
+    def _diagnostics(self) -> dict[str, bytes]:
+        agent = explaining(self.agent)
+        return {} if agent is None else {"diagnostics": wire.DIAGNOSTICS.write(agent.diagnostics())}
+
     def _sensors(self) -> dict[str, bytes]:
         return {"sensors": wire.write_sensors(self.agent)}
+
+
+def _parts_or_failure(failure: str, parts: Callable[[], dict[str, bytes]]) -> dict[str, bytes]:
+    """Return the parts that a function returns, or the exception that it raises as a part of the name `failure`."""
+    try:
+        return parts()
+    except DecisionError as error:
+        return {failure: _failed("decision", message_of(error), error)}
+    except Exception as error:
+        return {failure: _failed("agent", describe(error), error)}
 
 
 def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) -> bytes:

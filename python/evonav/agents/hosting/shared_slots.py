@@ -45,7 +45,7 @@ class SharedSlots:
         """Return a request's arrays, which the agent may keep and change."""
         number, begin, end, size, of_arrays = places
         if size == 0:
-            return [place[0] if len(place) == 1 else _array(bytearray(), *place) for place in of_arrays]
+            return [_value(bytearray(), place) for place in of_arrays]
         slot = self._slots[number]
         slot.move(begin, end)
         if size >= LEAST_BYTES and sum(not one.is_in_use for one in self._slots) > 1:
@@ -55,8 +55,7 @@ class SharedSlots:
     def part(self) -> None:
         """Give this process and the child that it is about to fork bytes of their own in the slots that are in use."""
         for slot in self._slots:
-            if slot.is_in_use and not slot.is_parted:
-                slot.part()
+            slot.part()
 
 
 class _Slot:
@@ -76,11 +75,6 @@ class _Slot:
         """True if someone has an array in it."""
         return self._bytes is not None and self._bytes() is not None
 
-    @property
-    def is_parted(self) -> bool:
-        """True after `part`."""
-        return self._parted is not None
-
     def move(self, begin: int, end: int) -> None:
         """Map the bytes of the file, if others are mapped."""
         if (begin, end) != self._span:
@@ -92,17 +86,19 @@ class _Slot:
         assert self._map is not None
         everything = np.frombuffer(self._map, np.uint8)
         self._bytes = weakref.ref(everything)
-        return [place[0] if len(place) == 1 else _array(everything, *place) for place in places]
+        return [_value(everything, place) for place in places]
 
     def copied(self, places: Iterable[Place]) -> list[Any]:
         """Return arrays in memory of their own."""
         assert self._map is not None
-        return [place[0] if len(place) == 1 else _copy(_array(self._map, *place)) for place in places]
+        return [_copy(_value(self._map, place)) for place in places]
 
     def part(self) -> None:
         """Map the same bytes at the same address, so that writes are seen by this process alone; and use no others."""
-        assert self._map is not None
-        self._parted = None if self._bytes is None else self._bytes()
+        everything = None if self._bytes is None else self._bytes()
+        if everything is None or self._map is None or self._parted is not None:
+            return
+        self._parted = everything
         begin, end = self._span
         address = ctypes.addressof(ctypes.c_char.from_buffer(self._map))
         function = ctypes.CDLL(None, use_errno=True).mmap
@@ -114,21 +110,19 @@ class _Slot:
             raise OSError(ctypes.get_errno(), "mmap")
 
 
-def _array(
-    buffer: bytearray | mmap.mmap | NDArray[np.uint8],
-    kind: str,
-    shape: tuple[int, ...],
-    offset: int,
-    order: Order,
-    is_writable: bool,
-) -> NDArray[Any]:
+def _value(buffer: bytearray | mmap.mmap | NDArray[np.uint8], place: Place) -> Any:  # noqa: ANN401 - of any type
+    if len(place) == 1:
+        return place[0]
+    kind, shape, offset, order, is_writable = place
     array: NDArray[Any] = np.ndarray(shape, kind, buffer, offset, None, order)
     if not is_writable:
         array.flags.writeable = False
     return array
 
 
-def _copy(array: NDArray[Any]) -> NDArray[Any]:
-    copy = array.copy("K")
-    copy.flags.writeable = array.flags.writeable
+def _copy(value: Any) -> Any:  # noqa: ANN401 - of any type
+    if not isinstance(value, np.ndarray):
+        return value
+    copy = value.copy("K")
+    copy.flags.writeable = value.flags.writeable
     return copy

@@ -20,13 +20,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.convert import action_record, pose_record, sensing_record, with_places
 from evonav.evaluation.records.costs import Stopwatch
-from evonav.evaluation.records.schema import (
-    EndState,
-    ErrorKind,
-    MemoryRecord,
-    RoundRecord,
-    StageRecord,
-)
+from evonav.evaluation.records.schema import EndState, ErrorKind, MemoryRecord, RoundRecord, StageRecord
 from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
@@ -288,7 +282,7 @@ class Stage:
                 self._baseline.reveal_sighting(
                     Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
                 )
-            self._agent.look(observation)
+            self._agent.look(observation, wants_entries=self._wants_entries)
 
     def _answer(self) -> AgentAction:
         """Return the agent's action for what it was shown."""
@@ -302,12 +296,17 @@ class Stage:
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
         self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
-        if self._memory_at_start is not None and self._staleness.wants_entries:
+        if self._wants_entries:
             with attribute_errors(ErrorKind.AGENT):
                 self._beliefs = self._entries()
             self._staleness.take_entries(self._beliefs or ())
         if self._observer is not None:
             self._observer.round_ends(self._trace[-1])
+
+    @property
+    def _wants_entries(self) -> bool:
+        """True if the agent's entries are judged after the round."""
+        return self._memory_at_start is not None and self._staleness.wants_entries
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):

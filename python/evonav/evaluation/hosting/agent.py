@@ -44,8 +44,13 @@ class HostedAgent(ABC):
         """Start the search for a new goal."""
 
     @abstractmethod
-    def look(self, observation: Observation) -> None:
-        """Take the observation of a decision round. It may be dropped then: an agent may think for long."""
+    def look(self, observation: Observation, *, wants_entries: bool = False) -> None:
+        """Take the observation of a decision round. It may be dropped then: an agent may think for long.
+
+        Args:
+            observation: The observation.
+            wants_entries: Whether `entries` will be asked right after the round, and may be answered with it.
+        """
 
     @abstractmethod
     def act(self) -> AgentAction:
@@ -95,7 +100,7 @@ class LocalAgent(HostedAgent):
         self._num_bytes = 0
         self._agent.begin_stage(goal)
 
-    def look(self, observation: Observation) -> None:
+    def look(self, observation: Observation, *, wants_entries: bool = False) -> None:
         """Take the observation of a decision round."""
         self._observations = [observation]
 
@@ -148,8 +153,8 @@ class RemoteAgent(HostedAgent):
         self._sensors: SensorConfig | None = None
         self._lost_between: AgentFailedError | None = None
         """The loss of the process after a stage, by which the next one fails."""
-        self._last_parts: Mapping[str, bytes] = {}
-        """Parts of the answer to the last `act`."""
+        self._last_parts: dict[str, bytes] = {}
+        """Parts of the answer to the last `begin_stage` or `act`."""
         self._label = name
         self._cpu_s = 0.0
 
@@ -176,16 +181,18 @@ class RemoteAgent(HostedAgent):
         self._label = f"{self._name} {self._task_id or task.task_id}"
         self._describe(self._label)
         self._sense(self._ask("begin_task", task))
+        self._last_parts = {}
 
     def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
         self._num_bytes = 0
         self._describe(f"{self._label} stage {goal.stage}")
-        self._sense(self._ask("begin_stage", goal))
+        self._last_parts = self._ask("begin_stage", goal)
+        self._sense(self._last_parts)
 
-    def look(self, observation: Observation) -> None:
+    def look(self, observation: Observation, *, wants_entries: bool = False) -> None:
         """Take the observation of a decision round; its process has a copy then."""
-        self._send("act", observation)
+        self._send("act", observation, wants_entries)
 
     def act(self) -> AgentAction:
         """Decide what to do in the round."""
@@ -201,7 +208,11 @@ class RemoteAgent(HostedAgent):
 
     def entries(self) -> Sequence[EntryBelief] | None:
         """Return the object memory; None if the agent does not explain itself."""
-        text = self._ask("entries").get("entries")
+        failure, text = (self._last_parts.pop(name, None) for name in ("entries_failure", "entries"))
+        if failure is not None:
+            raise failure_of(failure, is_sandboxed=self._processes.hosting.is_sandboxed)
+        if text is None:
+            text = self._ask("entries").get("entries")
         return None if text is None else wire.ENTRIES.read(text)
 
     def costs(self) -> Mapping[str, float]:
@@ -224,6 +235,7 @@ class RemoteAgent(HostedAgent):
         if self._process is not None:
             self._processes.take_back(self._process)
         self._process = self._sensors = None
+        self._last_parts = {}
 
     def _make(self) -> None:
         if self._lost_between is not None:

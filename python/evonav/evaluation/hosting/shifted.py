@@ -166,9 +166,9 @@ class ShiftedAgent(HostedAgent):
         """Start the search for a new goal, which has no places."""
         self._agent.begin_stage(goal)
 
-    def look(self, observation: Observation) -> None:
+    def look(self, observation: Observation, *, wants_entries: bool = False) -> None:
         """Take the observation of a decision round."""
-        self._agent.look(self._shift.shifted_observation(observation))
+        self._agent.look(self._shift.shifted_observation(observation), wants_entries=wants_entries)
 
     def act(self) -> AgentAction:
         """Decide what to do in one decision round."""
