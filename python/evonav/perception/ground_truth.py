@@ -31,6 +31,10 @@ class GroundTruthPerception:
     max_box_fraction: float = 1.0
     """Largest part of the image that a mask's bounding box covers."""
     _objects: Sequence[SceneObject] = field(default=(), init=False, repr=False)
+    _is_detected: NDArray[np.bool_] = field(
+        default_factory=lambda: _are_detected(()), init=False, repr=False, compare=False
+    )
+    """True for each of the stage's objects that is detected."""
 
     @property
     def needs_rgb(self) -> bool:
@@ -39,11 +43,11 @@ class GroundTruthPerception:
 
     def begin_stage(self, scene: StageScene) -> None:
         """Store the stage's objects."""
-        self._objects = scene.objects
+        self.change_scene(scene)
 
     def change_scene(self, scene: StageScene) -> None:
         """Store the objects of the changed house."""
-        self._objects = scene.objects
+        self._objects, self._is_detected = scene.objects, _are_detected(scene.objects)
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return each frame as it is."""
@@ -89,7 +93,7 @@ class GroundTruthPerception:
             raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
         return _core.number_instances(
             frame.instances,
-            np.array([body.kind in DETECTED_KINDS for body in objects], np.bool_),
+            self._is_detected if objects is self._objects else _are_detected(objects),
             min_area_px=self.min_px(frame),
             max_box_fraction=self.max_box_fraction,
         )
@@ -97,3 +101,7 @@ class GroundTruthPerception:
     def min_px(self, frame: Frame) -> int:
         """Return the fewest pixels of a mask in a frame."""
         return max(self.min_area_px, round(self.min_area_fraction * frame.depth_m.size))
+
+
+def _are_detected(objects: Sequence[SceneObject]) -> NDArray[np.bool_]:
+    return np.array([body.kind in DETECTED_KINDS for body in objects], np.bool_)
