@@ -9,6 +9,7 @@ import html
 import math
 import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 
 Point = tuple[float, float]
 """`(x, z)` in metres, as in records."""
@@ -121,6 +122,7 @@ def cross(centre: Point, arm: float) -> str:
     return f"M{x - arm:.0f} {y - arm:.0f}l{2 * arm:.0f} {2 * arm:.0f}m0 {-2 * arm:.0f}l{-2 * arm:.0f} {2 * arm:.0f}"
 
 
+@lru_cache(maxsize=10_000)  # the same few thousand for all rounds and furniture of a report
 def title(text: str) -> str:
     """Return a tooltip, which a screen reader reads out too."""
     return f"<title>{escape(text)}</title>"

@@ -215,8 +215,9 @@ def _places(values: Sequence[Any] | NDArray[Any]) -> tuple[NDArray[np.int64], in
     return np.array([place_of[value] for value in values], np.int64), len(place_of)
 
 
-# The same houses are resampled for every agent and every measure: drawing takes ten times as long as summing.
-@lru_cache(maxsize=8)
+# The same houses are resampled for every agent and every measure, and for each of up to a dozen kinds of its stages:
+# drawing takes as long as summing several times.
+@lru_cache(maxsize=12)
 def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.uint8], ...]:
     """Draw how often each cluster is in each resample, with replacement and each stratum by itself.
 

@@ -28,10 +28,10 @@ from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
+from evonav.sweeps.layout import RUNS_NAME, SWEEP_NAME
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
 
-SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1
 _HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "episodes_at_once", "num_retries"}
 _HOW |= {"stage_timeout_s", "agent_timeout_s"}

@@ -26,6 +26,7 @@ much of the object) and `MATERIALS`. A comma comes before the extras if a suppor
 """
 
 import re
+from functools import lru_cache
 
 SIZES = ("small", "large")
 """Adjectives for the size of a target among the catalogue's assets of its category; the middle has none."""
@@ -51,6 +52,7 @@ _PLURALS = {"decor": "decor", "foil": "foil", "knife": "knives", "paper": "paper
 _UNCOUNTED = {"aluminum foil", "blinds", "boots", "bread", "lettuce", "room decor", "table top decor", "toilet paper"}
 
 
+@lru_cache(maxsize=1_000)
 def noun_of(category: str) -> str:
     """Return the noun of a ProcTHOR object or room type: `noun_of("DiningTable")` is `dining table`.
 

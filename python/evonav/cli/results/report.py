@@ -52,7 +52,7 @@ def report(
     A sweep gets a page for each run and one for all. With --text, nothing is written, and metrics that explain
     rates are printed: other definitions of success, stale entries, memory, costs.
     """
-    from evonav.sweeps.run import SWEEP_NAME
+    from evonav.sweeps.layout import SWEEP_NAME
 
     if not text and (agent is not None or md is not None):
         raise typer.BadParameter("--agent and --md are for --text; the page shows all agents")
@@ -93,8 +93,8 @@ def _report_sweep(
     """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
     from evonav.report import load_run
+    from evonav.sweeps.layout import RUNS_NAME
     from evonav.sweeps.page import write_sweep_page
-    from evonav.sweeps.run import RUNS_NAME
     from evonav.sweeps.summary import sweep_title
 
     rows = write_sweep_summary(sweep)
