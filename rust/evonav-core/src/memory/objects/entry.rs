@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::{Aabb, Vec3},
-    memory::objects::{ObjectMapConfig, cleaning::Patch, cloud::Cloud},
+    memory::objects::{ObjectMapConfig, cleaning::Patch, clouds::cloud::Cloud},
     sensors::unproject::Point,
 };
 
@@ -50,9 +50,12 @@ impl Entry {
         view: u64,
         config: &ObjectMapConfig,
     ) -> Self {
-        let Patch { points, blocks, .. } = &sighting.patch;
+        let Patch { points, blocks, is_one_cluster, .. } = &sighting.patch;
         let radius_m = config.overlap_radius_m as f32;
-        let cloud = Cloud::of_blocks(points, blocks, config.voxel_m, radius_m);
+        let mut cloud = Cloud::of_blocks(points, blocks, config.voxel_m, radius_m);
+        if *is_one_cluster && cloud.points().len() == points.len() {
+            cloud.know_one_cluster();
+        }
         Self {
             id,
             label_counts: vec![(sighting.label, 1)],

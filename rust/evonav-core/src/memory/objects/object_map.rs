@@ -10,11 +10,12 @@ use crate::{
     geometry::{Vec3, distance_2d_m},
     memory::objects::{
         Entry, ObjectMapConfig,
-        cleaning::{Patch, centroid_m, clean, denoise},
-        cloud::Cloud,
+        cleaning::{Patch, centroid_m, clean, denoise, is_within},
+        clouds::cloud::Cloud,
+        clouds::one_cluster::Density,
+        clouds::point_blocks::PointBlocks,
         depth_evidence::{DepthEvidence, EvidenceConfig, depth_evidence},
         entry::Sighting,
-        point_blocks::PointBlocks,
         sight_lines::{SightConfig, reach_m, visible_shares},
     },
     sensors::{
@@ -62,6 +63,7 @@ pub struct Comparison {
 #[derive(Debug, Clone)]
 pub struct ObjectMap {
     pub(super) config: ObjectMapConfig,
+    density: Density,
     pub(super) entries: Vec<Entry>,
     next_id: u64,
     stage: u32,
@@ -77,8 +79,10 @@ impl ObjectMap {
     /// As [`ObjectMapConfig::check`].
     pub fn new(config: ObjectMapConfig) -> Result<Self, Error> {
         config.check()?;
+        let radius_m = config.cluster_radius_m as f32;
         Ok(Self {
             config,
+            density: Density::new(config.voxel_m, radius_m, config.cluster_min_points),
             entries: Vec::new(),
             next_id: 1,
             stage: 1,
@@ -231,7 +235,10 @@ impl ObjectMap {
         let [x, _, z] = view.image.camera.position_m;
         let clouds = unproject_masks(view.image, num, config.max_points)?;
         let sightings = clouds.into_iter().enumerate().map(|(index, points)| {
-            let patch = clean(&points, config)?;
+            if !is_within(&points, [x, z], max_distance_m) {
+                return None;
+            }
+            let patch = clean(&points, config, &self.density)?;
             let [centre_x, _, centre_z] = patch.bounds_m.centre_m();
             let is_near = distance_2d_m([x, z], [centre_x, centre_z]) <= max_distance_m;
             is_near.then(|| Sighting {
@@ -314,7 +321,7 @@ impl ObjectMap {
         let config = self.config;
         // Entries that were not seen since the last clean-up have not changed.
         for entry in self.entries.iter_mut().filter(|entry| entry.has_grown) {
-            denoise(&mut entry.cloud, &config);
+            denoise(&mut entry.cloud, &config, &self.density);
         }
         self.entries.retain(|entry| {
             let [x, _, z] = entry.cloud.bounds_m().centre_m();
@@ -373,7 +380,7 @@ impl ObjectMap {
             let other = self.entries[gone].clone();
             update.merged.push([other.id, self.entries[staying].id]);
             self.entries[staying].absorb(other);
-            denoise(&mut self.entries[staying].cloud, &config);
+            denoise(&mut self.entries[staying].cloud, &config, &self.density);
         }
         let mut is_gone = is_gone.into_iter();
         self.entries.retain(|_| !is_gone.next().unwrap_or(false));

@@ -7,7 +7,7 @@
 use crate::{
     Error,
     geometry::{Aabb, Vec3},
-    memory::objects::voxels::{Voxel, VoxelIndex},
+    memory::objects::clouds::voxels::{Voxel, VoxelIndex},
     sensors::unproject::Point,
 };
 

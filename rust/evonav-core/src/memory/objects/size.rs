@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use crate::memory::objects::{Entry, ObjectMap, cloud::Cloud};
+use crate::memory::objects::{Entry, ObjectMap, clouds::cloud::Cloud};
 
 impl ObjectMap {
     /// Return the number of bytes that the map holds: entries, labels, features, points and the

@@ -4,7 +4,10 @@ use std::{borrow::Cow, sync::LazyLock};
 
 use crate::{
     grid::components::find,
-    memory::objects::voxels::{Voxel, VoxelIndex, bounds, voxel_of, voxels_of},
+    memory::objects::clouds::{
+        cells::{Cells, Step, steps_within},
+        voxels::{Voxel, bounds, voxel_of, voxels_of},
+    },
     sensors::unproject::Point,
 };
 
@@ -65,10 +68,7 @@ struct Grid<'a> {
     starts: Vec<u32>,
     /// Number of points of each cell.
     sizes: Vec<u32>,
-    voxels: Vec<Voxel>,
-    index: VoxelIndex,
-    /// Slot of each voxel in the index.
-    slots: Vec<usize>,
+    cells: Cells,
     /// Steps as in [`STEPS`].
     steps: Vec<Step>,
 }
@@ -105,37 +105,24 @@ impl Four {
     }
 }
 
-/// A step from one cell to another.
-#[derive(Debug, Clone, Copy)]
-struct Step {
-    voxels: Voxel,
-    /// Distance in the index.
-    stride: isize,
-}
-
 impl<'a> Grid<'a> {
     fn new(points: &'a [Point], radius_m: f32) -> Self {
         // The edge is slightly less than radius / sqrt(3), so that rounding cannot separate the
         // points of a cell.
         let inverse_edge = 3.0_f64.sqrt() * 1.0001 / f64::from(radius_m);
         let corners = bounds(points).unwrap_or_default().map(|at| voxel_of(at, inverse_edge));
-        let mut index = VoxelIndex::between(corners, REACH, points.len());
-        let num = points.len() / 4;
-        let (mut voxels, mut slots) = (Vec::with_capacity(num), Vec::with_capacity(num));
-        let mut sizes: Vec<u32> = Vec::with_capacity(num);
+        let mut cells = Cells::between(corners, REACH, points.len());
+        let mut sizes: Vec<u32> = Vec::with_capacity(points.len() / 4);
         let enter = |voxel: Voxel| {
-            let slot = index.slot(voxel);
-            let cell = index.entry_at(slot, voxel, voxels.len() as u32);
-            if cell as usize == voxels.len() {
-                voxels.push(voxel);
-                slots.push(slot);
+            let cell = cells.enter(voxel);
+            if cell == sizes.len() {
                 sizes.push(0);
             }
-            sizes[cell as usize] += 1;
-            cell
+            sizes[cell] += 1;
+            cell as u32
         };
         let cell_of: Vec<u32> = voxels_of(points, inverse_edge).into_iter().map(enter).collect();
-        let mut starts = Vec::with_capacity(voxels.len() + 1);
+        let mut starts = Vec::with_capacity(cells.num() + 1);
         let mut num_fours = 0;
         starts.push(0);
         for size in &sizes {
@@ -143,7 +130,7 @@ impl<'a> Grid<'a> {
             starts.push(num_fours);
         }
         let mut fours = vec![Four::EMPTY; num_fours as usize];
-        let mut num_placed = vec![0_u32; voxels.len()];
+        let mut num_placed = vec![0_u32; cells.num()];
         for (index, (&point, &cell)) in points.iter().zip(&cell_of).enumerate() {
             let place = &mut num_placed[cell as usize];
             let four = &mut fours[(starts[cell as usize] + *place / 4) as usize];
@@ -151,30 +138,18 @@ impl<'a> Grid<'a> {
             four.points[(*place % 4) as usize] = index as u32;
             *place += 1;
         }
-        let step = |&voxels: &Voxel| Step { voxels, stride: index.stride(voxels) };
-        let steps = STEPS.iter().map(step).collect();
+        let steps = STEPS.iter().map(|&step| cells.step(step)).collect();
         let radius2 = radius_m * radius_m;
-        Self { points, radius2, cell_of, fours, starts, sizes, voxels, index, slots, steps }
-    }
-
-    fn num_cells(&self) -> usize {
-        self.voxels.len()
+        Self { points, radius2, cell_of, fours, starts, sizes, cells, steps }
     }
 
     fn fours(&self, cell: usize) -> &[Four] {
         &self.fours[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// Return the cell that is a step away, if it has points.
-    fn beside(&self, cell: usize, step: Step) -> Option<usize> {
-        let beside = || [0, 1, 2].map(|i| self.voxels[cell][i].saturating_add(step.voxels[i]));
-        let slot = self.slots[cell].wrapping_add_signed(step.stride);
-        self.index.at(slot, beside).map(|other| other as usize)
-    }
-
     /// Return the cells that may hold neighbours of a cell's points, the nearest first.
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
-        self.steps.iter().filter_map(move |&step| self.beside(cell, step))
+        self.steps.iter().filter_map(move |&step| self.cells.beside(cell, step))
     }
 
     /// Take the points that are not core points out of their cells; return their indices,
@@ -185,7 +160,7 @@ impl<'a> Grid<'a> {
         // their neighbours.
         let mut lacking: Vec<([usize; 2], Point, u32)> = Vec::new();
         let min_points = u32::try_from(min_points).unwrap_or(u32::MAX);
-        for cell in (0..self.num_cells()).filter(|&cell| self.sizes[cell] < min_points) {
+        for cell in (0..self.cells.num()).filter(|&cell| self.sizes[cell] < min_points) {
             let (first, size) = (self.starts[cell] as usize, self.sizes[cell]);
             lacking.extend((0..size as usize).map(|i| {
                 let (four, place) = (first + i / 4, i % 4);
@@ -217,10 +192,10 @@ impl<'a> Grid<'a> {
     /// Join cells that have core points within the radius of each other; return the part of each
     /// cell. Cells without core points are parts of their own.
     fn parts(&self) -> Vec<u32> {
-        let mut part_of = vec![NO_PART; self.num_cells()];
+        let mut part_of = vec![NO_PART; self.cells.num()];
         let mut sizes = Vec::new();
         let mut left = Vec::new();
-        for first in 0..self.num_cells() {
+        for first in 0..self.cells.num() {
             if part_of[first] != NO_PART {
                 continue;
             }
@@ -231,7 +206,7 @@ impl<'a> Grid<'a> {
             while let Some(cell) = left.pop() {
                 sizes[part as usize] += 1;
                 for &step in &self.steps[..NUM_TOUCHING] {
-                    let Some(other) = self.beside(cell, step) else { continue };
+                    let Some(other) = self.cells.beside(cell, step) else { continue };
                     if part_of[other] == NO_PART && self.are_joined(cell, other) {
                         part_of[other] = part;
                         left.push(other);
@@ -259,9 +234,9 @@ impl<'a> Grid<'a> {
         let mut parents: Vec<u32> = (0..sizes.len() as u32).collect();
         let largest = (0..sizes.len()).max_by_key(|&part| sizes[part]);
         let outside = |&cell: &usize| Some(part_of[cell] as usize) != largest;
-        for cell in (0..self.num_cells()).filter(outside) {
+        for cell in (0..self.cells.num()).filter(outside) {
             for &step in &self.steps[NUM_TOUCHING..] {
-                let Some(other) = self.beside(cell, step) else { continue };
+                let Some(other) = self.cells.beside(cell, step) else { continue };
                 let (a, b) =
                     (find(&mut parents, part_of[cell]), find(&mut parents, part_of[other]));
                 if a != b && self.are_joined(cell, other) {
@@ -278,7 +253,7 @@ impl<'a> Grid<'a> {
         let mut labels = vec![0; self.points.len()];
         others.iter().for_each(|&other| labels[other as usize] = NOISE);
         if parts.iter().any(|&part| part != 0) {
-            let mut number_of = vec![NOISE; self.num_cells()];
+            let mut number_of = vec![NOISE; self.cells.num()];
             let mut num = 0;
             for (label, &cell) in labels.iter_mut().zip(&self.cell_of).filter(|(l, _)| **l == 0) {
                 let number = &mut number_of[parts[cell as usize] as usize];
@@ -323,11 +298,4 @@ const REACH: i32 = 2;
 const NUM_TOUCHING: usize = 26;
 
 /// Steps to the cells within [`REACH`], the shortest first.
-static STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {
-    let side = 2 * REACH + 1;
-    let step = |i: i32| [i / (side * side), i / side % side, i % side].map(|i| i - REACH);
-    let mut steps: Vec<Voxel> =
-        (0..side.pow(3)).map(step).filter(|&step| step != [0, 0, 0]).collect();
-    steps.sort_by_key(|step| step.iter().map(|i| i * i).sum::<i32>());
-    steps
-});
+static STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| steps_within(REACH));

@@ -142,11 +142,13 @@ impl VoxelIndex {
         }
     }
 
+    #[inline]
     pub(crate) fn get(&self, voxel: Voxel) -> Option<u32> {
         self.at(self.slot(voxel), || voxel)
     }
 
     /// Return the same as [`VoxelIndex::get`] for a voxel whose slot is known.
+    #[inline]
     pub(crate) fn at(&self, slot: usize, voxel: impl FnOnce() -> Voxel) -> Option<u32> {
         match self {
             Self::Dense { slots, .. } => {
@@ -157,6 +159,7 @@ impl VoxelIndex {
     }
 
     /// Return the slot of a voxel in the array; 0 if there is no array.
+    #[inline]
     pub(crate) fn slot(&self, voxel: Voxel) -> usize {
         match self {
             Self::Dense { corner, size, .. } => slot_of(voxel, corner, size),
@@ -165,6 +168,7 @@ impl VoxelIndex {
     }
 
     /// Return the distance from a voxel's slot to the slot of the voxel a step away.
+    #[inline]
     pub(crate) fn stride(&self, step: Voxel) -> isize {
         let Self::Dense { size, .. } = self else { return 0 };
         let [x, y, z] = step.map(|i| i as isize);

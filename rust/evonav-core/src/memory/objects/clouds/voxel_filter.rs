@@ -1,30 +1,38 @@
 //! Thin point clouds.
 
-use crate::{memory::objects::point_blocks::PointBlocks, sensors::unproject::Point};
+use crate::{memory::objects::clouds::point_blocks::PointBlocks, sensors::unproject::Point};
 
 /// Reduce points to one per voxel, the mean of the points inside, in the order of the voxels' first
 /// points. This is Open3D's `voxel_down_sample` with voxels aligned to the world instead of the
 /// cloud.
 pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
+    one_a_voxel(points, edge_m).0
+}
+
+/// Return the same as [`voxel_filter`], and its points by block: rounding takes no mean out of its
+/// voxel.
+pub(crate) fn one_a_voxel(points: &[Point], edge_m: f64) -> (Vec<Point>, PointBlocks) {
     const ALONE: u32 = u32::MAX;
     let PointBlocks { blocks, spots } = PointBlocks::new(points, 1.0 / edge_m);
     let num_voxels: u32 = blocks.iter().map(|(_, bits)| bits.count_ones()).sum();
     if num_voxels as usize == points.len() {
-        return points.to_vec();
+        return (points.to_vec(), PointBlocks { blocks, spots });
     }
     // The voxels still to be met in each block, and number of the average of the others.
     let mut left: Vec<u64> = blocks.iter().map(|&(_, bits)| bits).collect();
     let mut numbers = vec![[0_u32; 64]; blocks.len()];
     let mut averages: Vec<Point> = Vec::with_capacity(num_voxels as usize);
+    let mut spots_of_averages = Vec::with_capacity(num_voxels as usize);
     // Of the voxels with several points: sum, number of points, and number of the average.
     let mut sums: Vec<([f64; 3], f64, u32)> = Vec::new();
     let mut sum_of: Vec<u32> = Vec::with_capacity(num_voxels as usize);
-    for (&point, spot) in points.iter().zip(&spots) {
+    for (&point, &spot) in points.iter().zip(&spots) {
         let average = &mut numbers[spot.block()][spot.place()];
         if left[spot.block()] & spot.bit() != 0 {
             left[spot.block()] ^= spot.bit();
             *average = averages.len() as u32;
             averages.push(point);
+            spots_of_averages.push(spot);
             sum_of.push(ALONE);
             continue;
         }
@@ -42,5 +50,5 @@ pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     for (sum, count, average) in sums {
         averages[average as usize] = sum.map(|value| (value / count) as f32);
     }
-    averages
+    (averages, PointBlocks { blocks, spots: spots_of_averages })
 }

@@ -1,7 +1,12 @@
 //! Points by block of voxels.
 
+use std::cell::OnceCell;
+
 use crate::{
-    memory::objects::voxels::{Voxel, VoxelIndex, bounds, clamped, voxel_of, voxels_of},
+    memory::objects::clouds::{
+        blocks::{Blocks, block_of, place},
+        voxels::{Voxel, VoxelIndex, bounds, clamped, voxel_of, voxels_of},
+    },
     sensors::unproject::Point,
 };
 
@@ -64,58 +69,58 @@ impl PointBlocks {
         }
         Self { blocks, spots }
     }
-}
 
-/// Return the block of a voxel.
-pub(crate) fn block_of(voxel: Voxel) -> Voxel {
-    clamped(voxel).map(|i| i >> 2)
-}
-
-/// Return the place of a voxel in its block: 0 to 63, z first.
-#[inline(always)]
-pub(crate) fn place(voxel: Voxel) -> usize {
-    let [x, y, z] = voxel.map(|i| (i & 3) as usize);
-    x << 4 | y << 2 | z
-}
-
-/// Return the bits of a block's voxels that lie in the box between two voxels, these included.
-#[inline(always)]
-pub(crate) fn bits_between(block: Voxel, [low, high]: [Voxel; 2]) -> u64 {
-    // The bits of a block's voxels that have one of the first coordinates along an axis.
-    const FIRST: [[u64; 5]; 3] = [
-        [0, 0xffff, 0xffff_ffff, 0xffff_ffff_ffff, u64::MAX],
-        [0, 0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff, u64::MAX],
-        [0, 0x1111_1111_1111_1111, 0x3333_3333_3333_3333, 0x7777_7777_7777_7777, u64::MAX],
-    ];
-    let mut bits = u64::MAX;
-    for axis in 0..3 {
-        let corner = block[axis] << 2;
-        let before = (low[axis] - corner).clamp(0, 4) as usize;
-        let until = (high[axis] + 1 - corner).clamp(0, 4) as usize;
-        bits &= FIRST[axis][until] & !FIRST[axis][before];
+    /// Return the points by block.
+    pub(crate) fn of<'a>(&'a self, points: &'a [Point]) -> LinkedBlocks<'a> {
+        LinkedBlocks { points, blocks: self, links: OnceCell::new() }
     }
-    bits
 }
 
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
+/// The points of [`PointBlocks`] by block.
+pub(crate) struct LinkedBlocks<'a> {
+    points: &'a [Point],
+    blocks: &'a PointBlocks,
+    /// A point of each block, and the next one in the same block of each point; see [`chain`].
+    links: OnceCell<(Vec<u32>, Vec<u32>)>,
+}
 
-    use super::*;
+impl LinkedBlocks<'_> {
+    fn linked(&self) -> (Vec<u32>, Vec<u32>) {
+        let mut firsts = vec![END; self.blocks.blocks.len()];
+        let link = |(index, spot): (usize, &Spot)| {
+            std::mem::replace(&mut firsts[spot.block()], index as u32)
+        };
+        let next = self.blocks.spots.iter().enumerate().map(link).collect();
+        (firsts, next)
+    }
+}
 
-    fn voxel() -> impl Strategy<Value = Voxel> {
-        [-9..9, -9..9, -9..9]
+impl Blocks for LinkedBlocks<'_> {
+    fn blocks(&self) -> &[(Voxel, u64)] {
+        &self.blocks.blocks
     }
 
-    proptest! {
-        #[test]
-        fn bits_are_those_of_the_voxels_in_the_box(
-            block in [-2..2, -2..2, -2..2], low in voxel(), high in voxel(), step in [0..4, 0..4, 0..4],
-        ) {
-            let voxel = [0, 1, 2].map(|i| 4 * block[i] + step[i]);
-            let is_between = (0..3).all(|i| (low[i]..=high[i]).contains(&voxel[i]));
-            let bits = bits_between(block, [low, high]);
-            prop_assert_eq!(bits >> place(voxel) & 1 == 1, is_between);
-        }
+    fn points(&self, block: usize) -> impl Iterator<Item = Point> {
+        let (firsts, next) = self.links.get_or_init(|| self.linked());
+        chain(next, firsts[block]).map(|index| self.points[index as usize])
     }
+
+    fn new_points(&self, block: usize) -> impl Iterator<Item = Point> {
+        self.points(block)
+    }
+
+    fn has_old(&self, _: usize) -> bool {
+        false
+    }
+}
+
+/// The end of a chain.
+pub(crate) const END: u32 = u32::MAX;
+
+/// Return an index, the next one, the one next to that and so on.
+#[inline]
+pub(crate) fn chain(next: &[u32], first: u32) -> impl Iterator<Item = u32> {
+    let is_index = |&index: &u32| index != END;
+    let following = move |&index: &u32| Some(next[index as usize]).filter(is_index);
+    std::iter::successors(Some(first).filter(is_index), following)
 }

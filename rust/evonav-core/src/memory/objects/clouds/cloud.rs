@@ -5,9 +5,10 @@ use std::ops::Range;
 use crate::{
     geometry::Aabb,
     grid::bits::ones,
-    memory::objects::{
+    memory::objects::clouds::{
+        blocks::{Blocks, bits_between, block_at, block_of, cube_of, place},
         dbscan::distance2,
-        point_blocks::{PointBlocks, bits_between, block_of, place},
+        point_blocks::{END, PointBlocks, chain},
         voxels::{HALF, Voxel, VoxelTable, clamped, floor},
     },
     sensors::unproject::Point,
@@ -23,8 +24,10 @@ pub struct Cloud {
     /// Index in `cubes` of each cube of 4 x 4 x 4 blocks with points.
     index: VoxelTable,
     cubes: Vec<Cube>,
-    /// The next point in the same block of each point.
+    /// The next point in the same block of each point, which is older.
     next: Vec<u32>,
+    /// Number of points, the first ones, that are known to be one cluster.
+    num_old: usize,
 }
 
 /// The blocks of a cube, by their [`place`].
@@ -38,8 +41,6 @@ struct Cube {
     /// A point of each block; `next` leads to the others.
     firsts: [u32; 64],
 }
-
-const END: u32 = u32::MAX;
 
 impl Cloud {
     /// Create a cloud from the first point of each voxel.
@@ -66,6 +67,7 @@ impl Cloud {
             index: VoxelTable::with_capacity(blocks.blocks.len() / 8),
             cubes: Vec::new(),
             next: Vec::with_capacity(points.len()),
+            num_old: 0,
         };
         cloud.merge_blocks(points, blocks);
         cloud
@@ -169,16 +171,28 @@ impl Cloud {
         is_enough(self.num_near(points, blocks, is_decided))
     }
 
+    /// Return the points by block.
+    pub(crate) fn blocks(&self) -> CloudBlocks<'_> {
+        let (mut blocks, mut firsts) = (Vec::new(), Vec::new());
+        for cube in &self.cubes {
+            for place in ones(cube.blocks) {
+                blocks.push((block_at(cube.voxel, place), cube.bits[place]));
+                firsts.push(cube.firsts[place]);
+            }
+        }
+        CloudBlocks { cloud: self, blocks, firsts }
+    }
+
+    /// Note that all points are one cluster.
+    pub(crate) fn know_one_cluster(&mut self) {
+        self.num_old = self.points.len();
+    }
+
     /// Return whether one of a block's points is nearer to a point than the radius.
     fn has_near(&self, first: u32, point: Point) -> bool {
-        let mut index = first;
-        while index != END {
-            if distance2(self.points[index as usize], point) < self.radius_m * self.radius_m {
-                return true;
-            }
-            index = self.next[index as usize];
-        }
-        false
+        let radius2 = self.radius_m * self.radius_m;
+        chain(&self.next, first)
+            .any(|index| distance2(self.points[index as usize], point) < radius2)
     }
 
     /// Return the bounds grown by the radius.
@@ -221,6 +235,39 @@ impl Cloud {
             }
         }
         num
+    }
+}
+
+/// The points of a [`Cloud`] by block.
+pub(crate) struct CloudBlocks<'a> {
+    cloud: &'a Cloud,
+    blocks: Vec<(Voxel, u64)>,
+    /// A point of each block.
+    firsts: Vec<u32>,
+}
+
+impl CloudBlocks<'_> {
+    fn indices(&self, block: usize) -> impl Iterator<Item = usize> {
+        chain(&self.cloud.next, self.firsts[block]).map(|index| index as usize)
+    }
+}
+
+impl Blocks for CloudBlocks<'_> {
+    fn blocks(&self) -> &[(Voxel, u64)] {
+        &self.blocks
+    }
+
+    fn points(&self, block: usize) -> impl Iterator<Item = Point> {
+        self.indices(block).map(|index| self.cloud.points[index])
+    }
+
+    fn new_points(&self, block: usize) -> impl Iterator<Item = Point> {
+        let new = self.indices(block).take_while(|&index| index >= self.cloud.num_old);
+        new.map(|index| self.cloud.points[index])
+    }
+
+    fn has_old(&self, block: usize) -> bool {
+        self.cloud.num_old > 0 && self.indices(block).any(|index| index < self.cloud.num_old)
     }
 }
 
@@ -306,17 +353,6 @@ impl<'a> Finder<'a> {
         }
         self.found[number] = Some((near, begin..self.around.len()));
     }
-}
-
-/// Return the cube of a block.
-fn cube_of(block: Voxel) -> Voxel {
-    block.map(|i| i >> 2)
-}
-
-/// Return the block at a place in a cube.
-fn block_at(cube: Voxel, place: usize) -> Voxel {
-    let steps = [place >> 4, place >> 2 & 3, place & 3];
-    [0, 1, 2].map(|i| (cube[i] << 2) + steps[i] as i32)
 }
 
 #[cfg(test)]
