@@ -268,7 +268,7 @@ class RemoteAgent(HostedAgent):
         self._use(operation, lambda process: process.send(operation, *arguments))
 
     def _answer(self, operation: str) -> dict[str, bytes]:
-        return self._use(operation, AgentProcess.answer)
+        return self._use(operation, lambda process: process.answer())
 
     def _use(self, operation: str, call: Callable[[AgentProcess], T]) -> T:
         """Call something of the process while other episodes compute, and add up its CPU time."""
