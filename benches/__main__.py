@@ -4,6 +4,7 @@ What follows the names, from the first option on, is the sections' own (`configu
 """
 
 import importlib
+import subprocess
 import sys
 from contextlib import nullcontext
 from itertools import takewhile
@@ -42,16 +43,24 @@ def main() -> None:
     if not set(names) <= SECTIONS.keys() or (options and not names):
         known = "\n".join(f"  {name:14} {title}" for name, title in sorted(SECTIONS.items()))
         sys.exit(f"usage: python -m benches [NAME ... [OPTION ...]]\n{known}")
+    if len(names) == 1:
+        _run(names[0], options)
+        return
+    # Each in a process of its own, or a section's memory would be that of the peers of those before it.
     for name in names or sorted(SECTIONS.keys() - ON_REQUEST):
-        module = importlib.import_module(f"{'evonav.speed_benchmark' if name in PRODUCT else 'benches'}.{name}")
-        if options and not hasattr(module, "configure"):
-            sys.exit(f"{name} takes no options")
-        if options:
-            module.configure(options)
-        # Or peers with threads of their own would be charged for all of them.
-        with nullcontext() if name in ON_ALL_CORES else one_core():
-            rows = list(module.measure(Sampling())) if name in PRODUCT else module.run()
-        sys.stdout.write(write_section(SECTIONS[name], module.NOTES, rows) + "\n")
+        subprocess.run([sys.executable, "-m", "benches", name, *options], check=True)
+
+
+def _run(name: str, options: list[str]) -> None:
+    module = importlib.import_module(f"{'evonav.speed_benchmark' if name in PRODUCT else 'benches'}.{name}")
+    if options and not hasattr(module, "configure"):
+        sys.exit(f"{name} takes no options")
+    if options:
+        module.configure(options)
+    # Or peers with threads of their own would be charged for all of them.
+    with nullcontext() if name in ON_ALL_CORES else one_core():
+        rows = list(module.measure(Sampling())) if name in PRODUCT else module.run()
+    sys.stdout.write(write_section(SECTIONS[name], module.NOTES, rows) + "\n")
 
 
 if __name__ == "__main__":
