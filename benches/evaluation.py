@@ -122,9 +122,7 @@ def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Pa
         nonlocal looked_s
         if time.monotonic() - looked_s >= EVERY_S:
             looked_s = time.monotonic()
-            for worker, grandchildren in descendants().items():
-                done.worker_mb = max(done.worker_mb, peak_mb(worker))
-                done.agent_mb = max(done.agent_mb, *map(peak_mb, grandchildren), 0.0)
+            done.worker_mb = max(done.worker_mb, *map(peak_mb, workers()), 0.0)
 
     began_s, cpu_s = time.monotonic(), time.process_time()
     evaluate([agent], tasks, run_dir, config=RunConfig(), num_workers=num_workers, on_progress=look)
@@ -132,6 +130,7 @@ def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Pa
     with RunStore(run_dir) as store:
         done.texts = list(store.record_texts())
         done.cpu_s += sum(cpu_s for _, cpu_s in store.timings().values())
+        done.agent_mb = max(costs["agent_peak_rss_mb"] for costs in store.costs().values())
         if failures := store.failures():
             raise AssertionError(failures[0])
     done.num_stages = len(done.texts)
@@ -140,16 +139,14 @@ def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Pa
     return done
 
 
-def descendants() -> dict[int, list[int]]:
-    """Children of this process that have children: workers and their agents."""
+def workers() -> list[int]:
+    """Children of this process that have children, which are their fork servers."""
     parents: dict[int, int] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with suppress(OSError, IndexError):
                 parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-    workers = [child for child, parent in parents.items() if parent == os.getpid()]
-    found = {worker: [child for child, parent in parents.items() if parent == worker] for worker in workers}
-    return {worker: agents for worker, agents in found.items() if agents}
+    return [child for child, parent in parents.items() if parent == os.getpid() and child in parents.values()]
 
 
 def peak_mb(pid: int) -> float:
