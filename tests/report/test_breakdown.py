@@ -1,5 +1,7 @@
 import csv
 import io
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,7 @@ from made_up_run import lettered_run, record_run, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.errors import InvalidArgumentError
+from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
@@ -41,6 +43,23 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
     assert breakdown(sides, "room-count").groups == ("2-3",)
     assert breakdown(sides, "path-length").groups == ("2-4 m",)
     assert breakdown(sides, "earlier-stages", "spl").cells["1", "fu"].value == pytest.approx(0.8 / 9)
+
+
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        ("json_remove(map, '$.rooms')", "rooms = None: expected an array"),
+        ("json_set(map, '$.rooms', 5)", "rooms = integer: expected an array"),
+        ("substr(map, 2)", "malformed JSON"),
+    ],
+)
+def test_rooms_are_not_counted_in_a_damaged_floor_plan(run: Path, damage: str, told: str) -> None:
+    sides = read_compared_agents([str(run)])
+    with closing(sqlite3.connect(run / "records.sqlite")) as database:
+        database.execute(f"UPDATE stage_maps SET map = {damage}")
+        database.commit()
+    with pytest.raises(StoreError, match=told):
+        breakdown(sides, "room-count")
 
 
 def test_any_field_groups_and_any_number_is_measured(run: Path) -> None:

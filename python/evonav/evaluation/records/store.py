@@ -10,7 +10,7 @@ import os
 import shutil
 import sqlite3
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -255,8 +255,7 @@ class RunStore:
 
         Without a write-ahead log, on a network file system, there is no snapshot: a reader would block the writer.
         """
-        ((mode,),) = self._rows("PRAGMA journal_mode", ())
-        if mode != "wal":
+        if list(self._rows("PRAGMA journal_mode")) != [("wal",)]:
             yield
             return
         self._db.execute("BEGIN")
@@ -272,8 +271,7 @@ class RunStore:
     def _texts(self, column: str, agent: str | None, task_id: str | None) -> Iterator[str]:
         wanted = {name: value for name, value in (("agent", agent), ("task_id", task_id)) if value is not None}
         query = f"SELECT {column} FROM stages {_where(wanted)} ORDER BY agent, task_id, stage"  # noqa: S608
-        for (text,) in self._rows(query, tuple(wanted.values())):
-            yield text
+        return (text for (text,) in self._rows(query, tuple(wanted.values())))
 
     def record(self, agent: str, task_id: str, stage: int) -> StageRecord:
         """Return one whole record.
@@ -321,8 +319,11 @@ class RunStore:
 
     def num_rooms(self) -> dict[str, int]:
         """Return the number of rooms of each task's house, by its first stored floor plan."""
-        query = "SELECT task_id, json_array_length(map, '$.rooms'), min(stage) FROM stage_maps GROUP BY task_id"
-        return {task_id: num for task_id, num, _ in self._rows(query)}
+        rooms = "json_type(map, '$.rooms'), json_array_length(map, '$.rooms')"
+        rows = self._query(f"SELECT task_id, min(stage), {rooms} FROM stage_maps GROUP BY task_id")  # noqa: S608
+        if wrong := [f"{task_id}/{stage}: rooms = {kind}" for task_id, stage, kind, _ in rows if kind != "array"]:
+            raise StoreError(f"{self.path}: floor plan of {wrong[0]}: expected an array")
+        return {row[0]: row[3] for row in rows}
 
     def timings(self) -> dict[tuple[str, str, int], tuple[float, float]]:
         """Return wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
@@ -390,10 +391,9 @@ def _why_no_run(run_dir: Path) -> str:
     return f"no run here ({FILE_NAME} not found)"
 
 
-def _where(columns: Iterable[str]) -> str:
+def _where(columns: Collection[str]) -> str:
     """Return the condition that columns have given values; SQLite looks those up that begin a table's key."""
-    conditions = " AND ".join(f"{column} = ?" for column in columns)
-    return f"WHERE {conditions}" if conditions else ""
+    return "WHERE " + " AND ".join(f"{column} = ?" for column in columns) if columns else ""
 
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON

@@ -1,6 +1,10 @@
 //! The place in a room where its name stands best.
 
-use crate::geometry::{Vec2, polygon_contains};
+use crate::geometry::{
+    Vec2, bounds_2d_m, distance_2d_m,
+    outline::{edges, point_segment_m},
+    polygon_contains,
+};
 
 /// A box `[left, low, right, high]` in metres.
 pub type Rect = [f64; 4];
@@ -23,10 +27,8 @@ pub type Rect = [f64; 4];
 /// # Complexity
 /// O(num^2 (N + B)) time for N corners and B boxes.
 pub fn label_point(polygon_m: &[Vec2], num: usize, taken_m: &[Rect], size_m: Vec2) -> Vec2 {
-    let corners = || polygon_m.iter().copied();
-    let low = corners().fold([f64::INFINITY; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
-    let high = corners().fold([f64::NEG_INFINITY; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-    let sum = corners().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let [low, high] = bounds_2d_m(polygon_m.iter().copied());
+    let sum = polygon_m.iter().fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
     let middle = sum.map(|total| total / polygon_m.len() as f64);
     let place = |axis: usize, step: usize| {
         let share = (step as f64 + 0.5) / num as f64;
@@ -40,9 +42,10 @@ pub fn label_point(polygon_m: &[Vec2], num: usize, taken_m: &[Rect], size_m: Vec
         let point = [place(0, index % num), place(1, index / num)];
         let mut score = f64::NEG_INFINITY;
         if polygon_contains(polygon_m, point) {
-            let gap_m = gap_m(point, polygon_m);
+            let gaps_m = edges(polygon_m).map(|edge| point_segment_m(point, edge));
+            let gap_m = gaps_m.fold(f64::INFINITY, f64::min);
             // Among points that are about as good, the one nearest to the middle looks right.
-            score = gap_m - 0.15 * length([point[0] - middle[0], point[1] - middle[1]]);
+            score = gap_m - 0.15 * distance_2d_m(point, middle);
             if covers {
                 let covered: f64 = taken_m.iter().map(|taken| overlap_m2(point, half, taken)).sum();
                 let covered = covered / (size_m[0] * size_m[1]);
@@ -57,23 +60,6 @@ pub fn label_point(polygon_m: &[Vec2], num: usize, taken_m: &[Rect], size_m: Vec
         }
     }
     best
-}
-
-/// Return the distance of a point from the nearest edge.
-fn gap_m(point: Vec2, polygon_m: &[Vec2]) -> f64 {
-    let next = polygon_m.iter().cycle().skip(1);
-    let gaps = polygon_m.iter().zip(next).map(|(a, b)| {
-        let edge = [b[0] - a[0], b[1] - a[1]];
-        let length2 = (edge[0] * edge[0] + edge[1] * edge[1]).max(1e-12);
-        let t = ((point[0] - a[0]) * edge[0] + (point[1] - a[1]) * edge[1]) / length2;
-        let t = t.clamp(0.0, 1.0);
-        length([point[0] - (a[0] + t * edge[0]), point[1] - (a[1] + t * edge[1])])
-    });
-    gaps.fold(f64::INFINITY, f64::min)
-}
-
-fn length([x, z]: Vec2) -> f64 {
-    (x * x + z * z).sqrt()
 }
 
 /// Return the area that a label around a point shares with a box.

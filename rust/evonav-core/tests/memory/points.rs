@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use evonav_core::{
-    memory::objects::{
-        clouds::cloud::Cloud, clouds::dbscan::dbscan, clouds::voxel_filter::voxel_filter,
-    },
+    memory::objects::clouds::{cloud::Cloud, dbscan::dbscan, voxel_filter::voxel_filter},
     sensors::unproject::{MaskedDepth, Point},
 };
 use proptest::{collection::vec, prelude::*};

@@ -5,9 +5,11 @@ use std::borrow::Cow;
 use crate::{
     geometry::{Aabb, Vec3, distance_2d_m},
     memory::objects::{
-        ObjectMapConfig, clouds::cloud::Cloud, clouds::dbscan::largest_cluster,
-        clouds::one_cluster::Density, clouds::point_blocks::PointBlocks,
-        clouds::voxel_filter::one_a_voxel, clouds::voxels::bounds,
+        ObjectMapConfig,
+        clouds::{
+            cloud::Cloud, dbscan::largest_cluster, one_cluster::Density, point_blocks::PointBlocks,
+            voxel_filter::one_a_voxel, voxels::bounds,
+        },
     },
     sensors::unproject::Point,
 };
