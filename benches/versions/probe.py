@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -85,10 +86,10 @@ class Probe:
             start_m, target_m = map(tuple, ends[number])
             return simulators[houses[number]].shortest_path(start_m, target_m)
 
+        names = map(str, count())  # a house of a known name would be used again, with its graph
+
         def load(number: int) -> None:
-            simulator = simulators[houses[number]]
-            simulator.close()  # or the last house would be used again, with its graph
-            simulator.reset(texts[houses[number]])
+            simulators[houses[number]].reset(texts[houses[number]], name=next(names))
 
         def length_m(number: int) -> float:
             return round(float(np.linalg.norm(np.diff(path(number), axis=0), axis=1).sum()), 3)

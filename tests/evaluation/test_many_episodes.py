@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -34,6 +35,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
+from evonav.evaluation.run.worker import WorkerConfig, WorkerContext
 from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import serving
@@ -92,6 +94,22 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
     assert all(number > 1 for number in most.values())
     assert all(one == found["1-1"] for one in found.values())
     assert len(found["1-1"][0]) == (3 + 3 if backend == "bundled" else 18 + 18)
+
+
+@pytest.mark.parametrize("is_in_process", [False, True])
+def test_episodes_share_a_task_unless_their_agents_could_change_it(is_in_process):
+    hosting = AgentHosting(is_in_process=is_in_process)
+    config = WorkerConfig(Backend(tasks=Component("pathlib:Path")), ProtocolConfig(), hosting)
+    with closing(WorkerContext(config, lambda: None)) as context:
+        first = context.task("one")
+        assert first.spec == Path("one")
+        assert (context.task("one") is first) is not is_in_process
+        assert context.task("two").spec == Path("two")
+        assert (context.task("one") is first) is not is_in_process
+        context.task("two")
+        known = weakref.ref(first)
+        del first
+        assert known() is None
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Arrays in memory that two processes share: they arrive as they are, and what an agent keeps never changes."""
 
+import mmap
 import os
 import subprocess
 import sys
@@ -58,10 +59,10 @@ ROUNDS = st.lists(
 )
 
 
-@given(ROUNDS, st.integers(0, 2**32 - 1))
-def test_arrays_arrive_as_they_are_and_belong_to_the_agent(rounds, seed):
+@given(ROUNDS, st.integers(0, 2**32 - 1), st.booleans())
+def test_arrays_arrive_as_they_are_and_belong_to_the_agent(rounds, seed, saves_memory):
     rng = np.random.default_rng(seed)
-    with closing(SharedBlock()) as block:
+    with closing(SharedBlock(saves_memory=saves_memory)) as block:
         slots, kept = SharedSlots(block.descriptor), []
         for wanted in rounds:
             sent = [one.array(rng) for one in wanted]
@@ -139,6 +140,16 @@ def test_slots_grow(sides):
         assert (array[0], array[-1], array.size) == (number, number, size)
         del array
         answer(sides)
+
+
+@pytest.mark.skipif(not hasattr(mmap, "MADV_REMOVE"), reason="only Linux gives back a part of a file's memory")
+def test_memory_that_a_smaller_request_leaves_is_given_back():
+    with closing(SharedBlock(saves_memory=True)) as block:
+        sides = block, SharedSlots(block.descriptor)
+        for size in (LARGE, 40 * LARGE, 3 * LARGE, 3 * LARGE - 1, 41 * LARGE, LARGE):
+            assert shown(sides, size % 7, size)[-1] == size % 7
+            answer(sides)
+            assert 0 <= os.fstat(block.descriptor).st_blocks * 512 - size * 4 < 2 * mmap.PAGESIZE, size
 
 
 FORKING = """

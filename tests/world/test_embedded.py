@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, get_args
@@ -135,7 +136,26 @@ def test_the_last_house_is_not_loaded_again_and_is_itself_again_after_changes() 
     with pytest.raises(HouseError, match=r"again.json"):
         simulator.reset("{}", name="again.json")
     simulator.reset(HOUSES[0])
-    assert simulator.core is not core
+    assert simulator.core is core
+
+
+def test_simulators_share_a_house_as_long_as_one_of_them_has_it() -> None:
+    first, second, other = (
+        EmbeddedSimulator(SMALL),
+        EmbeddedSimulator(SMALL),
+        EmbeddedSimulator(replace(SMALL, width_px=90)),
+    )
+    for simulator in (first, second, other):
+        simulator.reset(HOUSES[0])
+    assert first.core is second.core is not other.core
+    assert EmbeddedSimulator(SMALL, allow_unknown_assets=True).reset(HOUSES[0]) == first.pose
+    second.set_appearance([Materials(seed=1)])
+    assert first.core is not second.core
+    house = weakref.ref(first.core)
+    first.close()
+    assert house() is not None
+    second.close()
+    assert house() is None
 
 
 def test_styles_differ_in_colours_alone() -> None:

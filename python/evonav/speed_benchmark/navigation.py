@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,10 +66,11 @@ def measure(sampling: Sampling) -> Iterator[Row]:
         corners_m = query.house.simulator.shortest_path(query.start_m, query.target_m)
         return float(np.linalg.norm(np.diff(corners_m, axis=0), axis=1).sum())
 
+    names = map(str, count())  # a house of a known name would be used again, with its graph
+
     def load(number: int) -> None:
         house = queries[number].house
-        house.simulator.close()  # or the last house would be used again, with its graph
-        house.simulator.reset(house.json)
+        house.simulator.reset(house.json, name=next(names))
 
     peers: dict[str, Callable[[int], float]] = {}
     for name in (name for name in chosen if name in TITLES):

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 _Position = tuple[float, float, float]
+_LOADED: WeakValueDictionary[tuple[str, str, SimulatorConfig, bool], _core.EmbeddedSimulator] = WeakValueDictionary()
+"""Houses that are in use in this process, by JSON, name and settings: episodes of a task share them."""
 
 
 class EmbeddedSimulator:
@@ -47,8 +50,8 @@ class EmbeddedSimulator:
         self.allow_unknown_assets = allow_unknown_assets
         self.intrinsics = self.config.intrinsics
         self._loaded: _core.EmbeddedSimulator | None = None
-        self._last: tuple[tuple[str, str], _core.EmbeddedSimulator] | None = None
-        """The JSON and the name of the house that was last loaded, and the house in the core."""
+        self._last: _core.EmbeddedSimulator | None = None
+        """The house that was last loaded, before changes."""
         self._house_name = "house"
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._objects: tuple[SceneObject, ...] | None = None
@@ -58,7 +61,7 @@ class EmbeddedSimulator:
     def reset(self, house: str | _core.House, pose: Pose | None = None, *, name: str | None = None) -> Pose:
         """Load a house in its own look; the agent stands at `pose`, or at the house's own start.
 
-        The house that was loaded last is not built again.
+        A house that this simulator or another one in this process has loaded last is not built again.
 
         If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
@@ -80,12 +83,10 @@ class EmbeddedSimulator:
             name = name or house.name
             house = house.to_json()
         self._house_name = name or "house"
-        source = (house, self._house_name)
-        if self._last is None or self._last[0] != source:
-            core = core_of(house, self.config, name=self._house_name, allow_unknown_assets=self.allow_unknown_assets)
-            self._last = (source, core)
+        config, allows_all = self.config, self.allow_unknown_assets
+        self._last = core_of(house, config, name=self._house_name, allow_unknown_assets=allows_all)
         self._appearance = ()
-        return self._enter(self._last[1], pose)
+        return self._enter(self._last, pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
         """Change the current house; only what moved is built again.
@@ -345,24 +346,27 @@ class EmbeddedSimulator:
 def core_of(
     house_json: str, config: SimulatorConfig, *, name: str, allow_unknown_assets: bool
 ) -> _core.EmbeddedSimulator:
-    """Load a house in the Rust core, with a simulator's camera, body and style.
+    """Load a house in the Rust core, with a simulator's camera, body and style, or take the one that somebody has.
 
     Raises:
         HouseError: The house is malformed or contains an unknown asset.
         InvalidArgumentError: A number of the configuration is out of range, or there is no such style.
     """
-    return _core.EmbeddedSimulator(
-        house_json,
-        name=name,
-        image_px=(config.width_px, config.height_px),
-        vertical_fov_rad=config.intrinsics.vertical_fov_rad,
-        clip_m=(config.near_m, config.far_m),
-        camera_height_m=config.camera_height_m,
-        agent_radius_m=config.agent_radius_m,
-        agent_height_m=config.agent_height_m,
-        allow_unknown_assets=allow_unknown_assets,
-        style=config.style,
-    )
+    source = (house_json, name, config, allow_unknown_assets)
+    if (core := _LOADED.get(source)) is None:
+        core = _LOADED[source] = _core.EmbeddedSimulator(
+            house_json,
+            name=name,
+            image_px=(config.width_px, config.height_px),
+            vertical_fov_rad=config.intrinsics.vertical_fov_rad,
+            clip_m=(config.near_m, config.far_m),
+            camera_height_m=config.camera_height_m,
+            agent_radius_m=config.agent_radius_m,
+            agent_height_m=config.agent_height_m,
+            allow_unknown_assets=allow_unknown_assets,
+            style=config.style,
+        )
+    return core
 
 
 def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:

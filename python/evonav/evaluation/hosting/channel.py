@@ -6,8 +6,9 @@ import tempfile
 import threading
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 import numpy as np
 
@@ -21,16 +22,31 @@ _LEAST_SLOT_BYTES = 1 << 22
 """Sizes are powers of two from here on, so that few slots outgrow their place; only what is written takes memory."""
 
 
-class _Slot(NamedTuple):
+@dataclass(slots=True)
+class _Slot:
     begin: int
     map: mmap.mmap
+    num_used: int = 0
+    """Number of bytes from its beginning on that may take memory."""
+
+    def give_back(self, size: int) -> None:
+        """Give back the memory of all but the first bytes, which are read as zeros from now on."""
+        size = -(-size // mmap.PAGESIZE) * mmap.PAGESIZE
+        if self.num_used > size:
+            self.map.madvise(mmap.MADV_REMOVE, size, self.num_used - size)
+        self.num_used = size
 
 
 class SharedBlock:
     """Memory that the evaluator writes and another process can read."""
 
-    def __init__(self) -> None:
-        """Create an empty block."""
+    def __init__(self, *, saves_memory: bool = False) -> None:
+        """Create an empty block.
+
+        Args:
+            saves_memory: Give back what the next arrays in a slot do not need, which takes time (Linux).
+        """
+        self._saves_memory = saves_memory and hasattr(mmap, "MADV_REMOVE")
         if hasattr(os, "memfd_create"):
             import fcntl
 
@@ -62,6 +78,8 @@ class SharedBlock:
         slot = self._slot(size)
         for array, offset, order in inside:
             np.ndarray(array.shape, array.dtype, slot.map, offset, None, order)[...] = array
+        if self._saves_memory:
+            slot.give_back(size)
         return self.free, slot.begin, slot.begin + len(slot.map), size, places
 
     def _slot(self, size: int) -> _Slot:
@@ -69,6 +87,8 @@ class SharedBlock:
         slot = self._slots[self.free]
         if slot is None or len(slot.map) < size:
             if slot is not None:
+                if self._saves_memory:
+                    slot.give_back(0)
                 slot.map.close()
             begin, size = self._end, max(_LEAST_SLOT_BYTES, 1 << (size - 1).bit_length())
             self._end += size

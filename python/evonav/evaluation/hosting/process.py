@@ -94,6 +94,8 @@ class AgentHosting:
     """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
     scratch: str | None = None
     """Folder for the folders in which processes in a sandbox may write; default: the system's for temporary files."""
+    saves_memory: bool = False
+    """Give back shared memory that an observation leaves unused, since many episodes wait at once."""
     is_debugged: bool = False
     """Open Python's debugger where an agent raises; only in the evaluator's own process, on a terminal."""
 
@@ -129,7 +131,7 @@ class AgentProcess:
         self._hosting = hosting
         self._closing = threading.RLock()
         self._ends = ExitStack()
-        self._block = SharedBlock()
+        self._block = SharedBlock(saves_memory=hosting.saves_memory)
         self._ends.callback(self._block.close)
         self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
         if self._scratch is not None:

@@ -22,6 +22,7 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from dataclasses import asdict, dataclass, replace
 from inspect import GEN_CLOSED, getgeneratorstate
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from pydantic import TypeAdapter
 
@@ -123,6 +124,13 @@ class Turns:
         self._lock.acquire(timeout=timeout_s)
 
 
+@dataclass(frozen=True)
+class LoadedTask:
+    """A task in memory, which the episodes of several agents share."""
+
+    spec: EpisodeSpec
+
+
 class WorkerContext:
     """Runs episodes of one configuration, and keeps simulators and agents' processes, which are slow to start."""
 
@@ -149,7 +157,18 @@ class WorkerContext:
         self._own_cpu_s = time.process_time if hosting.is_in_process else time.thread_time
         self._idle: list[Simulator] = []
         self._busy: list[Simulator] = []
+        self._tasks: WeakValueDictionary[str, LoadedTask] = WeakValueDictionary()
+        self._last_task: LoadedTask | None = None
+        """The task that was asked for last: the next episode is often another agent's in it."""
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting, waiting)
+
+    def task(self, path: str) -> LoadedTask:
+        """Return the task in a folder. It is read for each agent in this process alone, which could change arrays."""
+        if (found := self._tasks.get(path)) is None:
+            found = LoadedTask(self.config.backend.tasks.create(Path(path)))
+            if not self.config.hosting.is_in_process:
+                self._tasks[path] = self._last_task = found
+        return found
 
     @contextmanager
     def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Iterator[Iterator[StageOutcome]]:
@@ -278,8 +297,8 @@ class EpisodeWork:
             job, num_left = EpisodeJob(**json.loads(head)), _Retries(context.config.num_retries)
             try:
                 shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
-                task = context.config.backend.tasks.create(Path(job.path))
-                spec = replace(task, opaque_id=job.opaque_id, shift_m=shift_m)
+                task = context.task(job.path)
+                spec = replace(task.spec, opaque_id=job.opaque_id, shift_m=shift_m)
                 is_whole = False
                 while not is_whole:
                     is_whole = True

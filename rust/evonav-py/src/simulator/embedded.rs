@@ -40,11 +40,15 @@ type MapSpec = ((usize, usize), Vec2);
 /// Id, category, kind, centre and size of a body.
 type BodyRecord = (String, String, &'static str, Vec3, Vec3);
 
-#[pyclass(name = "EmbeddedSimulator", module = "evonav._core", frozen)]
+/// Working memory of the renderer that no thread uses, for the views of all simulators.
+static BUFFERS: Mutex<Vec<FrameBuffer>> = Mutex::new(Vec::new());
+
+/// Largest image, in pixels, whose working memory is used again.
+const MAX_REUSED_PX: usize = 1 << 20;
+
+#[pyclass(name = "EmbeddedSimulator", module = "evonav._core", frozen, weakref)]
 pub struct PyEmbeddedSimulator {
     pub core: Arc<EmbeddedSimulator>,
-    /// Working memory of the renderer. A second thread that finds it in use creates its own.
-    buffer: Mutex<FrameBuffer>,
 }
 
 /// `evonav.world.camera.CameraView`.
@@ -73,7 +77,7 @@ impl CameraView {
 
 impl From<EmbeddedSimulator> for PyEmbeddedSimulator {
     fn from(core: EmbeddedSimulator) -> Self {
-        Self { core: Arc::new(core), buffer: Mutex::default() }
+        Self { core: Arc::new(core) }
     }
 }
 
@@ -301,16 +305,22 @@ impl PyEmbeddedSimulator {
 
 impl PyEmbeddedSimulator {
     fn images<'py>(&self, py: Python<'py>, view: &View, want: Want) -> PyResult<Images<'py>> {
+        let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
         let (depth, colours, ids) = py
             .detach(|| {
-                let mut spare = FrameBuffer::default();
-                let mut shared = self.buffer.try_lock().ok();
-                let buffer = shared.as_deref_mut().unwrap_or(&mut spare);
-                self.core.render(view, want, buffer)?;
-                Ok(buffer.take())
+                // Nobody waits here: after a fork, the thread that holds the lock may not exist.
+                let free = BUFFERS.try_lock().ok().and_then(|mut buffers| buffers.pop());
+                let mut buffer = free.unwrap_or_default();
+                self.core.render(view, want, &mut buffer)?;
+                let images = buffer.take();
+                if height * width <= MAX_REUSED_PX
+                    && let Ok(mut buffers) = BUFFERS.try_lock()
+                {
+                    buffers.push(buffer);
+                }
+                Ok(images)
             })
             .map_err(error::to_py)?;
-        let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
         let depth = arrays::image_of(py, depth, shape)?;
         let of_colours = || arrays::image_of(py, colours, [height, width, 3]);
         let colours = want.rgb.is_some().then(of_colours).transpose()?;
