@@ -134,13 +134,40 @@ class Options:
 
 def settings_options(name: str) -> Options:
     """Return the options that the argument of a command with this name has."""
-    from evonav.evaluation.run import settings
-    from evonav.evaluation.run.decision_resources import SpendingSettings
+    return _run_options(name) or _part_options()[name]
+
+
+def _run_options(name: str) -> Options | None:
+    """Return the options of workers and limits, without what the models of a run's parts import."""
     from evonav.evaluation.run.run_settings import RunSettings
 
     run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
     pool = ("workers", "engine", "ray_address")
     evaluators = (*pool, "episodes_at_once", "worker_gpus")
+    return {
+        "workers": Options(RunSettings, fields=("workers",)),
+        "pool": Options(RunSettings, WORKER_PANEL, fields=pool),
+        "run": Options(
+            RunSettings,
+            WORKER_PANEL,
+            names=run_names,
+            fields=(
+                *evaluators,
+                "num_retries",
+                "isolation",
+                "agent_timeout_s",
+                "agent_memory_mb",
+                "shift_coordinates",
+            ),
+        ),
+        "changes": Options(RunSettings, WORKER_PANEL, fields=evaluators, overrides=True),
+    }.get(name)
+
+
+def _part_options() -> Mapping[str, Options]:
+    from evonav.evaluation.run import settings
+    from evonav.evaluation.run.decision_resources import SpendingSettings
+
     return {
         "decisions": Options(
             settings.DecisionSettings,
@@ -170,23 +197,7 @@ def settings_options(name: str) -> Options:
         ),
         "perception": Options(settings.PerceptionSettings, "Perception", {"make": "perception"}),
         "models": Options(settings.PerceptionSettings, "Perception", fields=("models", "device")),
-        "workers": Options(RunSettings, fields=("workers",)),
-        "pool": Options(RunSettings, WORKER_PANEL, fields=pool),
-        "run": Options(
-            RunSettings,
-            WORKER_PANEL,
-            names=run_names,
-            fields=(
-                *evaluators,
-                "num_retries",
-                "isolation",
-                "agent_timeout_s",
-                "agent_memory_mb",
-                "shift_coordinates",
-            ),
-        ),
-        "changes": Options(RunSettings, WORKER_PANEL, fields=evaluators, overrides=True),
-    }[name]
+    }
 
 
 def with_settings(*names: str, hidden: tuple[str, ...] = ()) -> Callable[[Callable[..., None]], Callable[..., None]]:
