@@ -254,6 +254,8 @@ def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(
     run.max_rounds, run.num_stages = 3, 2
     with serving(changing()) as stub:
         first = run("first", stub.url, num_workers=2)
+    # Workers that have ended leave all that they stored in the file itself.
+    assert sum(log.stat().st_size for log in run.folder.glob("exchanges.sqlite-wal")) == 0
     assert sum(counters(text)["invalid_answers"] for text in first) > 0
     assert run("again", None, num_workers=0) == first
     # Both agents begin with the same question: they were told the same.

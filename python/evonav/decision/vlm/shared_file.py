@@ -4,7 +4,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from evonav.errors import StoreError
@@ -65,6 +65,16 @@ class SharedFile:
             yield
         except (sqlite3.Error, OSError, ValueError) as error:
             raise StoreError(f"{self.path}: {self._what}: {error}") from error
+
+
+def fold_log(path: Path) -> None:
+    """Move the contents of a file's write-ahead log into the file, and empty the log.
+
+    The last process that closes a file does that, but not one that is killed. A missing file, and one that another
+    process uses at this moment, stays as it is.
+    """
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as db:
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
 
 
 def _switch_to_wal(db: sqlite3.Connection) -> None:

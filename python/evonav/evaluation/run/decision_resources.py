@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
+from evonav.component import Component
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.settings_model import SettingError, Settings
@@ -68,3 +69,12 @@ class DecisionResources:
     def of_run(cls, run_dir: Path, spending: SpendingSettings, num_askers: int) -> "DecisionResources":
         """Return the resources of a run that has a spending log of its own."""
         return cls(run_dir, run_dir / LEDGER_NAME, spending, num_askers=num_askers)
+
+
+def fold_logs(decision: Component[Any]) -> None:
+    """Make the files of a run's answers and costs whole, after the processes that wrote to them have ended."""
+    from evonav.decision.vlm.shared_file import fold_log
+
+    for key in ("cache", "ledger"):
+        if (path := decision.host_options.get(key)) is not None:
+            fold_log(Path(path))

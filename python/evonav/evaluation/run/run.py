@@ -22,6 +22,7 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_names, check_sandbox
+from evonav.evaluation.run.decision_resources import fold_logs
 from evonav.evaluation.run.program import PROGRAM
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress as Progress  # also for those who import it from here
@@ -167,6 +168,8 @@ def evaluate_all(
                 while schedule.fill(pool):
                     for index, stage in schedule.take(pool.next_answer()):
                         on_progress(index, runs[index].progress(stage))
+            for request in requests:
+                fold_logs(request.config.backend.decision)
         return [run.summaries or run.summarise() for run in runs]
 
 
