@@ -114,5 +114,8 @@ fn is_right_or_straight(hull: &[Vec2], point: Vec2) -> bool {
     let [.., a, b] = hull else { return false };
     let along = [point[0] - a[0], point[1] - a[1]];
     let cross = along[0] * (b[1] - a[1]) - along[1] * (b[0] - a[0]);
-    cross >= -MERGE_M * along[0].hypot(along[1])
+    // Mostly the length, which takes longer than the rest, does not matter; it is less than twice
+    // the sum.
+    let clear = 2.0 * MERGE_M * (along[0].abs() + along[1].abs());
+    cross >= 0.0 || (cross > -clear && cross >= -MERGE_M * along[0].hypot(along[1]))
 }

@@ -297,7 +297,7 @@ fn check_slope(
             && around.all(|aside| {
                 let out_m = dot(aside, normal);
                 let aside: Vec3 = std::array::from_fn(|k| aside[k] - out_m * normal[k]);
-                light.sun_at(add(point_m, aside)) == 1.0
+                light.sun_at(mesh, add(point_m, aside)) == 1.0
             });
         if is_sunny {
             num_sunny += 1;
@@ -379,7 +379,7 @@ fn maps_of_any_width_show_the_sun() {
                 |px: usize, size_px: usize| (px as f64 + 0.5 - 0.5 * size_px as f64) * 6.0 / 32.0;
             let point_m =
                 [centre_m[0] + metres(column, width_px), 0.0, centre_m[2] - metres(row, 64)];
-            let reach = light.sun_at(point_m);
+            let reach = light.sun_at(&mesh, point_m);
             if reach == 0.0 || reach == 1.0 {
                 lights[reach as usize].push(f64::from(frame.rgb[3 * index + 1]));
             }

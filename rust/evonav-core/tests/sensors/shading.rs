@@ -9,7 +9,9 @@ use evonav_core::{
     house::House,
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Light, Style, Want, render_lit},
+        raster::{
+            FrameBuffer, Light, Style, Want, relight, render_lit, render_rows_of, render_view,
+        },
         ray_caster::RayCaster,
     },
     world::{
@@ -97,7 +99,7 @@ impl Sunny {
             return Ok(None);
         }
         let Some(is_sunny) = self.is_sunny(point_m) else { return Ok(None) };
-        let found = self.light.sun_at(point_m);
+        let found = self.light.sun_at(&self.mesh, point_m);
         let expected = if is_sunny { 1.0 } else { 0.0 };
         prop_assert!((found - expected).abs() < 1e-6, "{found} at {point_m:?}, not {expected}");
         Ok(Some(is_sunny))
@@ -188,4 +190,43 @@ fn pictures_do_not_depend_on_what_was_seen_before() {
         threads.into_iter().rev().map(|thread| thread.join().expect("a picture")).collect()
     });
     assert_eq!(pictures, forwards);
+}
+
+/// A picture that is lit after another style was drawn is the one that is lit at once, and rows with
+/// an instance have the colours that they have when all rows do.
+#[test]
+fn pictures_are_the_same_when_they_are_lit_later() {
+    let (house, scene) = house();
+    let mesh = SceneMesh::build(&scene);
+    let light = Light::build(&house, &scene, &mesh);
+    let centre_m = Aabb::of_points(mesh.triangles().flat_map(|t| t.vertices_m)).centre_m();
+    let want = |style| Want { rgb: Some(style), instances: true };
+    let (mut frame, mut num_left_out) = (FrameBuffer::default(), 0);
+    for index in 0..6 {
+        let camera = Camera {
+            width_px: 90,
+            height_px: 70,
+            vertical_fov_rad: 1.4,
+            position_m: [centre_m[0], 1.5, centre_m[2]],
+            yaw_rad: f64::from(index) * std::f64::consts::FRAC_PI_3,
+            horizon_rad: 0.3,
+        };
+        let view = View::from(camera);
+        let [mut flat, mut lit] = [FrameBuffer::default(), FrameBuffer::default()];
+        render_view(&mesh, &view, want(Style::Outlined), &mut flat).expect("a valid view");
+        render_lit(&mesh, Some(&light), &view, want(Style::Default), &mut lit).expect("valid");
+        let instance = flat.instances[35 * 90 + 45];
+        render_rows_of(&mesh, &view, instance, &mut frame).expect("a valid view");
+        for (row, instances) in frame.instances.chunks_exact(90).enumerate() {
+            let pixels = 270 * row..270 * (row + 1);
+            if instances.contains(&instance) {
+                assert_eq!(frame.rgb[pixels.clone()], flat.rgb[pixels], "row {row}");
+            } else {
+                num_left_out += 1;
+            }
+        }
+        relight(&mesh, &light, &view, &mut frame);
+        assert_eq!(frame.take(), lit.take());
+    }
+    assert!(num_left_out > 0);
 }

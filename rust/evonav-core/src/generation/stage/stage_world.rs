@@ -15,7 +15,9 @@ use crate::{
     rng::Stream,
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Light, Style, Want, render_lit, visible_px},
+        raster::{
+            FrameBuffer, Light, Style, Want, relight, render_rows_of, render_view, visible_px,
+        },
     },
     world::{
         layout::{Layout, rounding::round_to},
@@ -189,16 +191,24 @@ impl StageWorld {
             let Some(path_m) = self.navigation.shortest_path(start_m, position) else {
                 return Ok(Err(GoalRejection::Unreachable));
             };
+            let view = View::from(camera);
+            let style = parameters.reference_style;
             // Words for colours come from flat ones, so they are the same whatever the image's style.
-            self.draw(&camera, Style::Outlined, frame)?;
+            let instance = body as i32 + 1;
+            match style {
+                Style::Outlined => self.draw(&view, style, frame)?,
+                _ => render_rows_of(&self.mesh, &view, instance, frame)?,
+            }
             let appearance = appearance_of(
                 &self.layout.items[index].asset,
                 self.house.objects[index].condition(),
                 frame,
-                body as i32 + 1,
+                instance,
             );
-            if parameters.reference_style != Style::Outlined {
-                self.draw(&camera, parameters.reference_style, frame)?;
+            match style {
+                Style::Outlined => {}
+                Style::Plain => self.draw(&view, style, frame)?,
+                Style::Default => relight(&self.mesh, self.light(), &view, frame),
             }
             let image = std::mem::take(&mut frame.rgb);
             return Ok(Ok(Reference { pose, visible_px, appearance, image, path_m }));
@@ -206,13 +216,13 @@ impl StageWorld {
         Ok(Err(GoalRejection::NotVisible))
     }
 
-    /// Draw colours and instances, in the light of the house where the style wants it.
-    fn draw(&self, camera: &Camera, style: Style, frame: &mut FrameBuffer) -> Result<(), Error> {
-        let light = (style == Style::Default).then(|| {
-            self.light.get_or_init(|| Light::build(&self.house, &self.layout.scene, &self.mesh))
-        });
-        let want = Want { rgb: Some(style), instances: true };
-        render_lit(&self.mesh, light, &View::from(*camera), want, frame)
+    /// Draw flat colours and instances.
+    fn draw(&self, view: &View, style: Style, frame: &mut FrameBuffer) -> Result<(), Error> {
+        render_view(&self.mesh, view, Want { rgb: Some(style), instances: true }, frame)
+    }
+
+    fn light(&self) -> &Light {
+        self.light.get_or_init(|| Light::build(&self.house, &self.layout.scene, &self.mesh))
     }
 }
 

@@ -21,6 +21,9 @@ pub(super) struct Canvas {
     pub tags: Vec<[u32; LANES]>,
     /// Rows, and blocks of a row, on which is drawn.
     drawn: [Range<usize>; 2],
+    /// First row and block that are stored, and the number of blocks of a row that are.
+    first_stored: [usize; 2],
+    blocks_stored: usize,
     /// First pixel of the current polygon in each row; `right` has the one after its last.
     left: Vec<u32>,
     right: Vec<u32>,
@@ -35,9 +38,34 @@ impl Canvas {
         self.nearness.resize(num_blocks, [empty; LANES]);
         self.tags.clear();
         self.tags.resize(num_blocks, [0; LANES]);
-        self.left.resize(height_px, 0);
-        self.right.resize(height_px, 0);
+        self.store_all();
         self.draw_within(0..height_px, 0..self.blocks_per_row());
+    }
+
+    /// Clear some rows and blocks, and store and draw only these until the canvas is cleared again:
+    /// `nearness` and `tags` hold nothing else. Their pixels get the same values as when the whole
+    /// canvas is drawn.
+    pub fn clear_window(
+        &mut self,
+        [width_px, height_px]: [usize; 2],
+        empty: f32,
+        rows: Range<usize>,
+        blocks: Range<usize>,
+    ) {
+        (self.width_px, self.height_px) = (width_px, height_px);
+        self.nearness.clear();
+        self.nearness.resize(rows.len() * blocks.len(), [empty; LANES]);
+        self.tags.clear();
+        self.tags.resize(rows.len() * blocks.len(), [0; LANES]);
+        self.store_all();
+        (self.first_stored, self.blocks_stored) = ([rows.start, blocks.start], blocks.len());
+        self.draw_within(rows, blocks);
+    }
+
+    fn store_all(&mut self) {
+        (self.first_stored, self.blocks_stored) = ([0, 0], self.blocks_per_row());
+        self.left.resize(self.height_px, 0);
+        self.right.resize(self.height_px, 0);
     }
 
     /// Clear some rows and blocks, and draw only on them until the canvas is cleared again. Their
@@ -53,8 +81,7 @@ impl Canvas {
         let num_blocks = self.blocks_per_row() * height_px;
         self.nearness.resize(num_blocks, [empty; LANES]);
         self.tags.resize(num_blocks, [0; LANES]);
-        self.left.resize(height_px, 0);
-        self.right.resize(height_px, 0);
+        self.store_all();
         for row in rows.clone() {
             let first = self.row_blocks(row).start;
             self.nearness[first + blocks.start..first + blocks.end].fill([empty; LANES]);
@@ -99,11 +126,15 @@ impl Canvas {
     #[inline(always)]
     fn fill_polygon(&mut self, corners_px: &[Vec2], plane: Vec3, tag: u32) {
         let rows = self.scan(corners_px);
-        let blocks_per_row = self.blocks_per_row();
-        let (first, pixels) = (rows.start, rows.start * blocks_per_row..rows.end * blocks_per_row);
+        if rows.is_empty() {
+            return;
+        }
+        let ([first_row, first_block], stride) = (self.first_stored, self.blocks_stored);
+        let pixels = (rows.start - first_row) * stride..(rows.end - first_row) * stride;
+        let first = rows.start;
         let ends = self.left[rows.clone()].iter().zip(&self.right[rows]);
-        let nearness = self.nearness[pixels.clone()].chunks_exact_mut(blocks_per_row);
-        let tags = self.tags[pixels].chunks_exact_mut(blocks_per_row);
+        let nearness = self.nearness[pixels.clone()].chunks_exact_mut(stride);
+        let tags = self.tags[pixels].chunks_exact_mut(stride);
         let [_, drawn] = &self.drawn;
         let step = plane[0] as f32;
         for ((row, (&left, &right)), (nearness, tags)) in
@@ -128,7 +159,8 @@ impl Canvas {
                 first_drawn: (first - blocks.start) as i32,
                 last: blocks.len() as i32 - 1,
             };
-            span.draw(&mut nearness[first..end], &mut tags[first..end]);
+            let stored = first - first_block..end - first_block;
+            span.draw(&mut nearness[stored.clone()], &mut tags[stored]);
         }
     }
 

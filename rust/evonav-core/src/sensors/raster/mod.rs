@@ -11,6 +11,6 @@ mod style;
 mod visible_px;
 
 pub use light::Light;
-pub use render::{FrameBuffer, Want, render, render_lit, render_view};
+pub use render::{FrameBuffer, Want, relight, render, render_lit, render_rows_of, render_view};
 pub use style::Style;
 pub use visible_px::visible_px;

@@ -100,6 +100,53 @@ pub fn render_lit(
     want: Want,
     out: &mut FrameBuffer,
 ) -> Result<(), Error> {
+    let lens = draw_solid(mesh, view, want, out)?;
+    match want.rgb {
+        Some(Style::Default) => light_up(mesh, light, view, &lens, out),
+        Some(flat) => {
+            out.shader.shade_flat(flat, &lens, &out.canvas, |_| true, &mut out.rgb);
+        }
+        None => {}
+    }
+    Ok(())
+}
+
+/// Render one view in [`Style::Outlined`] with instances as [`render_view`], but only the colours
+/// of rows that show an instance; those of other rows stay as they were.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] as [`View::check`].
+pub fn render_rows_of(
+    mesh: &SceneMesh,
+    view: &View,
+    instance: i32,
+    out: &mut FrameBuffer,
+) -> Result<(), Error> {
+    let want = Want { rgb: Some(Style::Outlined), instances: true };
+    let lens = draw_solid(mesh, view, want, out)?;
+    let FrameBuffer { shader, canvas, instances, rgb, .. } = out;
+    let row_of = |row: usize| &instances[row * canvas.width_px..][..canvas.width_px];
+    let shows_it = |row: usize| row_of(row).contains(&instance);
+    shader.shade_flat(Style::Outlined, &lens, canvas, shows_it, rgb);
+    Ok(())
+}
+
+/// Render the last view again in [`Style::Default`], with the light of the house: the same colours
+/// as by [`render_lit`], while depth and instances are there already.
+///
+/// # Arguments
+/// * `out` - holds the view in another style.
+pub fn relight(mesh: &SceneMesh, light: &Light, view: &View, out: &mut FrameBuffer) {
+    light_up(mesh, Some(light), view, &Lens::new(view), out);
+}
+
+/// Draw the solid parts, and make images of depth and instances of them.
+fn draw_solid(
+    mesh: &SceneMesh,
+    view: &View,
+    want: Want,
+    out: &mut FrameBuffer,
+) -> Result<Lens, Error> {
     view.check()?;
     let lens = Lens::new(view);
     let Camera { width_px, height_px, .. } = view.camera;
@@ -110,17 +157,22 @@ pub fn render_lit(
     }
     draw_parts(mesh, &mesh.parts, &lens, want, out, |_| true);
     evonav_simd::compute(Resolve { mesh, lens: &lens, want, out });
-    if let Some(style) = want.rgb {
-        if style == Style::Default {
-            draw_parts(mesh, &mesh.trim, &lens, want, out, |_| true);
-            see_through(mesh, view, &lens, want, out);
-        }
-        out.shader.shade(style, mesh, light, &lens, &out.canvas, &mut out.rgb);
-        if style == Style::Default {
-            out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
-        }
-    }
-    Ok(())
+    Ok(lens)
+}
+
+/// Draw what colours alone show over the solid parts, and light all of it.
+fn light_up(
+    mesh: &SceneMesh,
+    light: Option<&Light>,
+    view: &View,
+    lens: &Lens,
+    out: &mut FrameBuffer,
+) {
+    let want = Want { rgb: Some(Style::Default), instances: false };
+    draw_parts(mesh, &mesh.trim, lens, want, out, |_| true);
+    see_through(mesh, view, lens, want, out);
+    out.shader.shade_lit(mesh, light, lens, &out.canvas, &mut out.rgb);
+    out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
 }
 
 /// Draw what is behind glass in its place.

@@ -119,7 +119,7 @@ impl Baker {
         let size = [columns, rows];
         // Out of doors, the sun is looked up everywhere.
         if space.is_some() {
-            self.keep_sunny(&mut points[first as usize..], size, origin_m, axes, size_m);
+            self.keep_sunny(mesh, &mut points[first as usize..], size, origin_m, axes, size_m);
         }
         let size = size.map(|num| num as u16);
         let space = space.map(|index| index as u32);
@@ -140,6 +140,7 @@ impl Baker {
     /// looked up there.
     fn keep_sunny(
         &self,
+        mesh: &SceneMesh,
         lit: &mut [[f32; 4]],
         [columns, rows]: [usize; 2],
         origin_m: Vec3,
@@ -161,7 +162,7 @@ impl Baker {
                 });
                 let lanes: [[f32; LANES]; 3] =
                     std::array::from_fn(|axis| points_m.map(|point_m| point_m[axis] as f32));
-                for (lane, is_met) in self.sun.meets(&lanes).into_iter().enumerate() {
+                for (lane, is_met) in self.sun.meets(mesh, &lanes).into_iter().enumerate() {
                     if is_met {
                         let column =
                             (share(first + lane, samples[0]) * (columns - 1) as f64) as usize;

@@ -115,8 +115,12 @@ fn clearance_m(
     }
     let floor = (lens.horizon_m() - BELOW_M) as f32;
     // Looking up with yaw 0, the image's rows run towards +z.
-    let rows = (0..height_px).flat_map(|row| &canvas.row(row)[..width_px]);
-    rows.map(|nearness| (floor - nearness).max(0.0)).collect()
+    let mut clearance_m = Vec::with_capacity(width_px * height_px);
+    for row in 0..height_px {
+        let cells = &canvas.row(row)[..width_px];
+        clearance_m.extend(cells.iter().map(|nearness| (floor - nearness).max(0.0)));
+    }
+    clearance_m
 }
 
 /// Average over squares of `2 reach + 1` cells; the border is continued.

@@ -1,8 +1,8 @@
 //! The light in a house: what falls on each surface, computed once for a house and its state.
 //!
 //! Sunlight comes through windows and open doors and is looked up pixel by pixel in a map of
-//! shadows. All other light is smooth: it is computed at a few points of each face when the face is
-//! first seen, and interpolated.
+//! shadows, which is drawn where it is first looked at. All other light is smooth: it is computed at
+//! a few points of each face when the face is first seen, and interpolated.
 
 mod baker;
 mod coarse;
@@ -36,8 +36,8 @@ pub struct Light {
 }
 
 impl Light {
-    /// Find the sources of light in a house and the shadows of its sun; the rest is computed when a
-    /// face is first seen.
+    /// Find the sources of light in a house and its dark corners; the rest is computed when a face is
+    /// first seen.
     ///
     /// # Arguments
     /// * `scene`, `mesh` - of the house.
@@ -48,7 +48,7 @@ impl Light {
         let sources = sources::Sources::of(house, scene);
         let bounds = mesh.parts.iter().fold(Aabb::EMPTY, |all, part| all.union(part.aabb));
         let contact = contact::Contact::of(scene, mesh, &bounds);
-        let sun = Arc::new(Sun::build(sources.sun_direction(), mesh, &bounds));
+        let sun = Arc::new(Sun::new(sources.sun_direction(), mesh, &bounds));
         let field = Field::new(scene, mesh, sources, contact, Arc::clone(&sun));
         Self { field, sun, sunlight: SUNLIGHT }
     }
@@ -85,7 +85,10 @@ impl Light {
     }
 
     /// Return the share of the sun, 0 to 1, that reaches a point of a surface that faces it.
-    pub fn sun_at(&self, point_m: Vec3) -> f32 {
-        self.sun.reaches(&point_m.map(|x| [x as f32; LANES]))[0]
+    ///
+    /// # Arguments
+    /// * `mesh` - the mesh of the light.
+    pub fn sun_at(&self, mesh: &SceneMesh, point_m: Vec3) -> f32 {
+        self.sun.reaches(mesh, &point_m.map(|x| [x as f32; LANES]))[0]
     }
 }

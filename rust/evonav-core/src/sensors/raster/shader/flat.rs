@@ -83,10 +83,18 @@ impl Flat {
         self.faces[index + 1] = LitFace { rgb, facing: facing as f32 };
     }
 
-    /// Fill `rgb` from a drawn canvas.
-    pub fn shade(&mut self, canvas: &Canvas, optics: Optics, has_lines: bool, rgb: &mut [u8]) {
+    /// Fill rows of `rgb` from a drawn canvas.
+    pub fn shade(
+        &mut self,
+        canvas: &Canvas,
+        optics: Optics,
+        has_lines: bool,
+        is_wanted: impl Fn(usize) -> bool,
+        rgb: &mut [u8],
+    ) {
         let shades = Shades { corner: CORNER_SHADE, line: has_lines.then_some(LINE_SHADE) };
-        for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
+        let rows = rgb.chunks_exact_mut(3 * canvas.width_px).enumerate();
+        for (row, pixels) in rows.filter(|(row, _)| is_wanted(*row)) {
             self.bends.darken(canvas, row, optics, shades);
             if let Optics::Orthographic { .. } = optics {
                 self.level_facing(canvas, row);

@@ -243,7 +243,8 @@ impl Shot<'_> {
                     self.nearness.get(first + lane).map_or(0.0, |w| horizon_m - w)
                 }),
             };
-            let reach = light.sun.reaches(&self.rays.points([first, self.row], &depth_m));
+            let points_m = self.rays.points([first, self.row], &depth_m);
+            let reach = light.sun.reaches(self.mesh, &points_m);
             if reach == [0.0; LANES] {
                 continue;
             }

@@ -45,20 +45,27 @@ impl Shader {
         }
     }
 
-    /// Fill `rgb` from a drawn canvas whose tags are indices of faces plus 1.
-    pub fn shade(
+    /// Fill rows of `rgb` in a flat style from a drawn canvas whose tags are indices of faces plus 1.
+    pub fn shade_flat(
         &mut self,
         style: Style,
+        lens: &Lens,
+        canvas: &Canvas,
+        is_wanted: impl Fn(usize) -> bool,
+        rgb: &mut [u8],
+    ) {
+        self.flat.shade(canvas, lens.optics, style == Style::Outlined, is_wanted, rgb);
+    }
+
+    /// Fill `rgb` in [`Style::Default`] from such a canvas.
+    pub fn shade_lit(
+        &mut self,
         mesh: &SceneMesh,
         light: Option<&Light>,
         lens: &Lens,
         canvas: &Canvas,
         rgb: &mut [u8],
     ) {
-        match style {
-            Style::Outlined => self.flat.shade(canvas, lens.optics, true, rgb),
-            Style::Plain => self.flat.shade(canvas, lens.optics, false, rgb),
-            Style::Default => self.lit.shade(mesh, light, lens, canvas, rgb),
-        }
+        self.lit.shade(mesh, light, lens, canvas, rgb);
     }
 }
