@@ -61,11 +61,9 @@ impl BitGrid {
             row_words[first] |= (u64::MAX >> (64 - (end - start))) << (start % 64);
             return;
         }
-        for (index, word) in row_words.iter_mut().enumerate().take(last + 1).skip(first) {
-            let low = if index == first { start % 64 } else { 0 };
-            let high = if index == last { (end - 1) % 64 } else { 63 };
-            *word |= (u64::MAX >> (63 - (high - low))) << low;
-        }
+        row_words[first] |= u64::MAX << (start % 64);
+        row_words[first + 1..last].fill(u64::MAX);
+        row_words[last] |= u64::MAX >> (63 - (end - 1) % 64);
     }
 
     /// Set all bits to 0.
@@ -153,13 +151,11 @@ impl BitGrid {
         let next = if shift == 0 { 0 } else { at(word + 1) << (64 - shift) };
         at(word) >> shift | next
     }
+}
 
-    /// Return the number of 1 bits among the 5 x 5 cells around a cell.
-    pub(crate) fn count_5x5(&self, row: usize, col: usize) -> u32 {
-        let rows = row.saturating_sub(2)..=row + 2;
-        let window = |r: usize| (self.window(r, col as i64 - 2) & 0b11111) as u32;
-        rows.fold(0_u32, |bits, r| bits << 5 | window(r)).count_ones()
-    }
+/// Return the sum and carry of three bits, 64 at once.
+pub(crate) fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
+    (a ^ b ^ c, (a & b) | (c & (a ^ b)))
 }
 
 /// Return the cells above, left, right and below; some may be off the grid.

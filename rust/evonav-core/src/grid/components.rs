@@ -56,26 +56,28 @@ impl Components {
     }
 
     fn joined(grid: &BitGrid, reach: u32) -> Self {
-        let mut runs: Vec<Run> = Vec::new();
-        let mut parents: Vec<u32> = Vec::new();
+        let mut runs: Vec<Run> = Vec::with_capacity(2 * grid.rows());
+        let mut parents: Vec<u32> = Vec::with_capacity(2 * grid.rows());
         let mut above = 0..0;
         for row in 0..grid.rows() {
-            let first = runs.len();
-            push_runs(grid.row(row), row as u32, &mut runs);
+            let (words, first) = (grid.row(row), runs.len());
+            if words.iter().fold(0, |any, word| any | word) != 0 {
+                push_runs(words, row as u32, &mut runs);
+            }
             parents.extend(first as u32..runs.len() as u32);
             join_rows(&runs, above, first..runs.len(), reach, &mut parents);
             above = first..runs.len();
         }
-        // Roots are the first runs of their components, so labels ascend with them.
+        // Roots are the first runs of their components, so labels ascend with them, and parents
+        // come before their children.
         let mut labels = vec![0; runs.len()];
         let mut num = 0;
-        for index in 0..runs.len() {
-            let root = find(&mut parents, index as u32) as usize;
-            if root == index {
+        for (index, &parent) in parents.iter().enumerate() {
+            if parent as usize == index {
                 labels[index] = num;
                 num += 1;
             } else {
-                labels[index] = labels[root];
+                labels[index] = labels[parent as usize];
             }
         }
         Self { runs, labels, num: num as usize }
@@ -162,14 +164,15 @@ fn join_rows(
     while !above.is_empty() && !here.is_empty() {
         let (a, b) = (runs[above.start], runs[here.start]);
         if a.start < b.end + reach && b.start < a.end + reach {
-            let (a, b) = (find(parents, above.start as u32), find(parents, here.start as u32));
-            parents[a.max(b) as usize] = a.min(b);
+            // Most runs meet the first time, or have the same parent.
+            if parents[above.start] != parents[here.start] {
+                let (a, b) = (find(parents, above.start as u32), find(parents, here.start as u32));
+                parents[a.max(b) as usize] = a.min(b);
+            }
         }
-        if a.end <= b.end {
-            above.start += 1;
-        } else {
-            here.start += 1;
-        }
+        let is_above_first = usize::from(a.end <= b.end);
+        above.start += is_above_first;
+        here.start += 1 - is_above_first;
     }
 }
 

@@ -11,3 +11,4 @@ mod occupancy;
 mod points;
 mod sight_lines;
 mod snapshots;
+mod viewpoints;

@@ -1,6 +1,9 @@
 //! The occupancy map and its frontiers against plain twins, cell by cell.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    sync::Arc,
+};
 
 use evonav_core::{
     Error,
@@ -13,14 +16,14 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 
-type Cell = [i32; 2];
+pub(super) type Cell = [i32; 2];
 
 /// The frontiers of a map without a history.
 fn extract(
     map: &OccupancyMap,
     agent_m: [f64; 2],
     config: &FrontierConfig,
-) -> Result<Vec<Frontier>, Error> {
+) -> Result<Vec<Arc<Frontier>>, Error> {
     Frontiers::default().update(map, agent_m, config).map(<[_]>::to_vec)
 }
 
@@ -33,7 +36,7 @@ fn neighbours4([row, col]: Cell) -> [Cell; 4] {
 }
 
 /// Breadth-first components in the order of their first cells.
-fn components_naive(cells: &BTreeSet<Cell>) -> Vec<BTreeSet<Cell>> {
+pub(super) fn components_naive(cells: &BTreeSet<Cell>) -> Vec<BTreeSet<Cell>> {
     let mut left = cells.clone();
     let mut components = Vec::new();
     while let Some(first) = left.pop_first() {
@@ -240,6 +243,33 @@ proptest! {
             let cells: Vec<Cell> = region.iter().copied().collect();
             let span = span_rad(&map, agent_m, &cells) / config.max_span_rad;
             prop_assert!(num_parts <= span as usize + 1 && (num_parts > 1) == (span > 1.0), "{span}");
+            // Every cell lies nearest to the mean angle of its own part, where no cut is behind the agent.
+            let angle = |cell: &Cell| {
+                let centre = map.spec().centre_m(cell.map(|i| i as usize));
+                (centre[0] - agent_m[0]).atan2(centre[1] - agent_m[1])
+            };
+            let parts = frontiers.iter().filter(|f| region.contains(&f.cells[0]));
+            let parts: Vec<Vec<f64>> = parts.map(|f| f.cells.iter().map(angle).collect()).collect();
+            let means = parts.iter().map(|part| part.iter().sum::<f64>() / part.len() as f64);
+            let means: Vec<f64> = means.collect();
+            let is_cut = [-1.0, 1.0].map(|side| parts.iter().flatten().any(|a| side * a > 1.57)) == [true; 2];
+            for (part, own) in parts.iter().zip(&means).filter(|_| !is_cut) {
+                let is_own = |a: &f64| means.iter().all(|other| (a - own).abs() <= (a - other).abs() + 1e-9);
+                prop_assert!(part.iter().all(is_own), "{parts:?}");
+            }
+        }
+    }
+
+    /// New frontiers leave out the cells of those that stay.
+    #[test]
+    fn no_cell_belongs_to_two_frontiers(seed in any::<u64>(), side in 20..90_usize) {
+        let config = FrontierConfig { min_cells: 3, min_border_cells: 0, ..Default::default() };
+        let mut frontiers = Frontiers::default();
+        for num_steps in 1..16 {
+            let (map, agent_m) = walked(seed, num_steps, side);
+            let list = frontiers.update(&map, agent_m, &config).unwrap();
+            let cells: Vec<Cell> = list.iter().flat_map(|f| f.cells.iter().copied()).collect();
+            prop_assert_eq!(cells.iter().collect::<BTreeSet<_>>().len(), cells.len());
         }
     }
 

@@ -1,5 +1,7 @@
 //! `evonav_core::memory`. Shapes, units and errors: `_core.pyi`.
 
+use std::sync::Arc;
+
 use evonav_core::{
     grid::GridSpec,
     memory::{
@@ -17,7 +19,7 @@ type Cells<'py> = Bound<'py, PyArray2<i32>>;
 
 /// A frontier: a place from which to explore.
 #[pyclass(frozen, module = "evonav._core")]
-pub struct Frontier(frontiers::Frontier);
+pub struct Frontier(Arc<frontiers::Frontier>);
 
 #[pymethods]
 impl Frontier {

@@ -5,6 +5,8 @@
 //! rules are those of 3D-Mem (Yang et al., CVPR 2025), with two differences: no random numbers are
 //! drawn, and a region's direction is the circular mean, which needs no handling of wrap-around.
 
+use std::sync::Arc;
+
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
@@ -22,7 +24,7 @@ use crate::{
 /// The frontiers of a map, whose ids persist from one update to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Frontiers {
-    list: Vec<Frontier>,
+    list: Vec<Arc<Frontier>>,
     next_id: u64,
     /// Whether the list contains borders because there are no regions
     /// ([`FrontierConfig::min_border_cells`]).
@@ -34,7 +36,7 @@ pub struct Frontiers {
 
 impl Frontiers {
     /// Return the frontiers of the last update, by ascending id.
-    pub fn list(&self) -> &[Frontier] {
+    pub fn list(&self) -> &[Arc<Frontier>] {
         &self.list
     }
 
@@ -63,7 +65,7 @@ impl Frontiers {
         map: &OccupancyMap,
         agent_m: Vec2,
         config: &FrontierConfig,
-    ) -> Result<&[Frontier], Error> {
+    ) -> Result<&[Arc<Frontier>], Error> {
         let seeds: Vec<[i32; 2]> = self
             .list
             .iter()
@@ -82,7 +84,7 @@ impl Frontiers {
         for region in fresh {
             let place = if found.is_last_resort { place_at_border } else { place };
             let frontier = place(map, &found.edges, agent_m, region, self.next_id, config);
-            self.list.push(frontier);
+            self.list.push(Arc::new(frontier));
             self.next_id += 1;
         }
         Ok(&self.list)
@@ -95,20 +97,18 @@ impl Frontiers {
         let is_standing = self.last_agent_m.is_some_and(|last| distance_2d_m(last, agent_m) < 0.1);
         self.num_stands = if is_standing { self.num_stands + 1 } else { 0 };
         let (reached_m, around_m) = if is_standing { (0.8, 1.0) } else { (0.3, 0.5) };
-        let given_up =
-            self.given_up.get_or_insert_with(|| BitGrid::new(map.spec().rows, map.spec().cols));
-        let far_m = |f: &&Frontier| distance_2d_m(f.position_m, agent_m);
+        let far_m = |f: &&Arc<Frontier>| distance_2d_m(f.position_m, agent_m);
         let nearest = self.list.iter().min_by(|a, b| far_m(a).total_cmp(&far_m(b)));
-        if let Some(nearest) = nearest.filter(|_| self.num_stands >= 2) {
-            let cells = nearest.cells.iter();
-            cells.for_each(|cell| given_up.insert(cell[0] as usize, cell[1] as usize));
-        }
+        let nearest = nearest.filter(|_| self.num_stands >= 2);
         let reached = self.list.iter().filter(|f| self.is_last_resort && far_m(f) < reached_m);
-        for cell in reached.flat_map(|frontier| &frontier.cells) {
-            let cell = cell.map(|i| i as usize);
-            if distance_2d_m(map.spec().centre_m(cell), agent_m) < around_m {
-                given_up.insert(cell[0], cell[1]);
-            }
+        let is_around = |cell: &&[i32; 2]| {
+            distance_2d_m(map.spec().centre_m(cell.map(|i| i as usize)), agent_m) < around_m
+        };
+        let hidden = reached.flat_map(|frontier| &frontier.cells).filter(is_around);
+        for cell in nearest.into_iter().flat_map(|frontier| &frontier.cells).chain(hidden) {
+            let [rows, cols] = [map.spec().rows, map.spec().cols];
+            let given_up = self.given_up.get_or_insert_with(|| BitGrid::new(rows, cols));
+            given_up.insert(cell[0] as usize, cell[1] as usize);
         }
     }
 }
@@ -116,13 +116,13 @@ impl Frontiers {
 /// Compare old frontiers with regions: return the frontiers that stay, and the regions that become
 /// new ones.
 fn reconcile(
-    old: Vec<Frontier>,
+    old: Vec<Arc<Frontier>>,
     regions: Vec<Region>,
     config: &FrontierConfig,
-) -> (Vec<Frontier>, Vec<Region>) {
+) -> (Vec<Arc<Frontier>>, Vec<Region>) {
     let mut is_taken = vec![false; regions.len()];
     let mut is_staying = vec![false; old.len()];
-    let overlaps_of = |frontier: &Frontier| {
+    let overlaps_of = |frontier: &Arc<Frontier>| {
         let overlap = |region: &Region| {
             if frontier.span.meets(&region.span) {
                 Overlap::new(&frontier.cells, &region.cells)
@@ -164,13 +164,14 @@ fn reconcile(
             parts.iter().for_each(|&i| is_staying[i] = true);
         }
     }
-    let staying: Vec<Frontier> =
+    let staying: Vec<Arc<Frontier>> =
         old.into_iter().zip(is_staying).filter(|(_, keep)| *keep).map(|(f, _)| f).collect();
-    let is_covered = |cell: &[i32; 2]| staying.iter().any(|f| f.cells.binary_search(cell).is_ok());
     let fresh = regions.into_iter().zip(is_taken).filter(|(_, taken)| !taken).filter_map(
         |(Region { mut cells, span }, _)| {
             let num_before = cells.len();
-            cells.retain(|cell| !is_covered(cell));
+            for frontier in staying.iter().filter(|frontier| frontier.span.meets(&span)) {
+                cells.retain(|cell| frontier.cells.binary_search(cell).is_err());
+            }
             if cells.len() == num_before {
                 return Some(Region { cells, span });
             }

@@ -9,7 +9,7 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::{
         GridSpec,
-        bits::BitGrid,
+        bits::{BitGrid, add3},
         components::{Components, Run},
         dilate::dilate_disk,
     },
@@ -139,24 +139,31 @@ fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitG
     // Unexplored cells of the rows above, here and below, with a word of none on both sides.
     let mut unexplored = [(); 3].map(|()| vec![0_u64; num_words + 2]);
     let fill = |words: &mut [u64], row: usize| {
-        let explored = explored.row(row);
-        for (word, mask) in masks.iter().enumerate() {
-            words[word + 1] = explored.get(word).map_or(0, |bits| !bits & mask);
+        words.fill(0);
+        for ((word, bits), mask) in words[1..].iter_mut().zip(explored.row(row)).zip(&masks) {
+            *word = !bits & mask;
         }
     };
-    fill(&mut unexplored[2], 0);
-    for row in 0..rows {
+    let has_cells = |row: &usize| island.row(*row).iter().any(|&word| word != 0);
+    let Some(first) = (0..rows).find(has_cells) else { return (inner, edges) };
+    let last = (first..rows).rfind(has_cells).unwrap_or(first);
+    if first > 0 {
+        fill(&mut unexplored[1], first - 1);
+    }
+    fill(&mut unexplored[2], first);
+    for row in first..=last {
         unexplored.rotate_left(1);
         fill(&mut unexplored[2], row + 1);
-        let [above, here, below] = &unexplored;
-        for word in 0..num_words {
-            let candidates = island.row(row)[word];
+        let [above, here, below] = unexplored.each_ref().map(|words| words.windows(3));
+        let around = above.zip(here).zip(below);
+        let cells = island.row(row).iter().zip(inner.row_mut(row)).zip(edges.row_mut(row));
+        for (((&candidates, inner), edges), ((above, here), below)) in cells.zip(around) {
             if candidates == 0 {
                 continue;
             }
             // The word, and the word shifted so that each bit is its left or its right neighbour.
             let neighbours = |words: &[u64]| {
-                let [before, here, after] = [word, word + 1, word + 2].map(|i| words[i]);
+                let [before, here, after] = [words[0], words[1], words[2]];
                 [here << 1 | before >> 63, here, here >> 1 | after << 63]
             };
             let [left, _, right] = neighbours(here);
@@ -168,16 +175,11 @@ fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitG
             let (twos, fours_a) = add3([twos_a, twos_b, twos_c]);
             let (twos, fours_b) = (twos ^ carry, twos & carry);
             let (fours, eights) = (fours_a ^ fours_b, fours_a & fours_b);
-            inner.row_mut(row)[word] = candidates & eights;
-            edges.row_mut(row)[word] = candidates & fours & !(twos & ones);
+            *inner = candidates & eights;
+            *edges = candidates & fours & !(twos & ones);
         }
     }
     (inner, edges)
-}
-
-/// Return the sum and carry of three bits, 64 at once.
-fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
-    (a ^ b ^ c, (a & b) | (c & (a ^ b)))
 }
 
 /// Split a region that spans a wide angle around the agent, by k-centres on the angle.
@@ -195,9 +197,7 @@ fn split_wide(
         return;
     }
     let angles = unwrapped_angles(map, agent_m, &region.cells);
-    let (low, high) = angles
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &a| (low.min(a), high.max(a)));
+    let (low, high) = extremes(&angles);
     if high - low <= max_span_rad {
         regions.push(region);
         return;
@@ -296,6 +296,12 @@ fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad
     high.atan() - low.atan() <= max_span_rad
 }
 
+/// Return the least and the largest of some angles.
+fn extremes(angles: &[f64]) -> (f64, f64) {
+    let widen = |(low, high): (f64, f64), &angle: &f64| (low.min(angle), high.max(angle));
+    angles.iter().fold((f64::INFINITY, f64::NEG_INFINITY), widen)
+}
+
 /// Return the angles of cells seen from the agent (0 along +z, growing towards +x), unwrapped at
 /// the widest gap so that neighbours do not differ by a turn.
 fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec<f64> {
@@ -311,14 +317,22 @@ fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Ve
     if angles.iter().any(|a| is_near_cut(a) && *a < 0.0)
         && angles.iter().any(|a| is_near_cut(a) && *a > 0.0)
     {
-        let mut sorted = angles.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let across = sorted[0] + TAU - sorted[sorted.len() - 1];
-        let mut widest = (across, -PI);
-        for pair in sorted.windows(2) {
-            if pair[1] - pair[0] > widest.0 {
-                widest = (pair[1] - pair[0], pair[1]);
+        let (low, high) = extremes(&angles);
+        // The least and the largest angle of equal parts, as many as angles: the widest gap is
+        // wider than a part.
+        let mut parts = vec![(f64::INFINITY, f64::NEG_INFINITY); angles.len()];
+        let per_rad = angles.len() as f64 / (high - low);
+        for &angle in &angles {
+            let part = ((angle - low) * per_rad) as usize;
+            let (least, most) = &mut parts[part.min(angles.len() - 1)];
+            (*least, *most) = (least.min(angle), most.max(angle));
+        }
+        let (mut widest, mut before) = ((low + TAU - high, -PI), high);
+        for (least, most) in parts.into_iter().filter(|(least, most)| least <= most) {
+            if least - before > widest.0 {
+                widest = (least - before, least);
             }
+            before = most;
         }
         for angle in &mut angles {
             if *angle < widest.1 {
@@ -341,14 +355,23 @@ fn k_means_limits(values: &[f64], low: f64, high: f64, num_parts: usize) -> Vec<
             break;
         }
         limits = middle;
-        let mut sums = vec![(0.0, 0.0); num_parts];
-        for &value in values {
-            let sum = &mut sums[limits.partition_point(|&limit| limit <= value)];
-            *sum = (sum.0 + value, sum.1 + 1.0);
-        }
-        for (mean, (sum, count)) in centres.iter_mut().zip(sums) {
-            if count > 0.0 {
-                *mean = sum / count;
+        for (part, centres) in centres.chunks_mut(2).enumerate() {
+            let low = if part == 0 { f64::NEG_INFINITY } else { limits[2 * part - 1] };
+            let [middle, high] =
+                [2 * part, 2 * part + 1].map(|i| limits.get(i).copied().unwrap_or(f64::INFINITY));
+            // Two sums at a time, which stay in registers.
+            let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+            for &value in values {
+                let is_in = [low <= value && value < middle, middle <= value && value < high];
+                for ((sum, count), is_in) in sums.iter_mut().zip(&mut counts).zip(is_in) {
+                    *sum += if is_in { value } else { 0.0 };
+                    *count += if is_in { 1.0 } else { 0.0 };
+                }
+            }
+            for ((mean, sum), count) in centres.iter_mut().zip(sums).zip(counts) {
+                if count > 0.0 {
+                    *mean = sum / count;
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
-    grid::bits::{BitGrid, ones},
+    grid::bits::{BitGrid, add3, ones},
     memory::{
         frontiers::{
             Frontier, FrontierConfig,
@@ -38,8 +38,15 @@ pub(crate) fn place(
     let mut ranked: Vec<(f64, f64, [usize; 2])> = Vec::with_capacity(NUM_RANKED + 1);
     for cell in candidates {
         let centre_m = map.spec().centre_m(cell);
+        let [x, z] = [0, 1].map(|i| centre_m[i] - agent_m[i]);
+        let along_m = x * ahead[0] + z * ahead[1];
+        // Most cells surely lie worse than the fifth.
+        let about_m = (x * x + z * z).sqrt();
+        let is_worse = |fifth: &(f64, f64, [usize; 2])| along_m < (fifth.0 - HAIR) * about_m;
+        if about_m > 1e-9 && ranked.get(NUM_RANKED - 1).is_some_and(is_worse) {
+            continue;
+        }
         let distance_m = distance_2d_m(centre_m, agent_m);
-        let along_m = (centre_m[0] - agent_m[0]) * ahead[0] + (centre_m[1] - agent_m[1]) * ahead[1];
         let share = along_m / distance_m.max(1e-9);
         // Cells come in order, so that an equal one stays behind those before it.
         let place = ranked.partition_point(|other| other.0.total_cmp(&share).is_ge());
@@ -84,22 +91,59 @@ fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]], span: &Span) -> Vec<[usize;
     }
     let (low, high) = (span.low.map(|i| (i - 2).max(0) as usize), span.high.map(|i| i as usize));
     let rows = low[0]..(high[0] + 3).min(edges.rows());
-    let mut region = BitGrid::new(rows.len(), edges.cols());
-    for cell in cells {
-        region.insert(cell[0] as usize - low[0], cell[1] as usize);
+    let blocks = low[1] / 64..(high[1] + 3).min(edges.cols()).div_ceil(64);
+    // The region's words, and the number of its cells among the five of a row around each cell, in
+    // binary: ones, twos, fours. Two rows of none lie above and below, a word of none at the end.
+    let stride = blocks.len() + 1;
+    let mut region = vec![0_u64; (rows.len() + 4) * stride + 1];
+    let (mut at, mut bits) = (0, 0);
+    for &[row, col] in cells {
+        let (row, col) = (row as usize - low[0] + 2, col as usize - 64 * blocks.start);
+        let index = row * stride + col / 64 + 1;
+        if index != at {
+            region[at] |= bits;
+            (at, bits) = (index, 0);
+        }
+        bits |= 1 << (col % 64);
     }
+    region[at] |= bits;
+    let across = |index: usize| {
+        let [before, here, after] = [index, index + 1, index + 2].map(|i| region[i]);
+        let left = [here << 1 | before >> 63, here << 2 | before >> 62];
+        let right = [here >> 1 | after << 63, here >> 2 | after << 62];
+        let (ones, twos_a) = add3([here, left[0], left[1]]);
+        let (ones, twos_b) = add3([ones, right[0], right[1]]);
+        [ones, twos_a ^ twos_b, twos_a & twos_b]
+    };
     let mut found = Vec::new();
     for row in rows {
-        for first in (low[1]..high[1] + 3).step_by(64) {
-            let width = (high[1] + 3 - first).min(64) as u32;
-            let bits = edges.window(row, first as i64) & (u64::MAX >> (64 - width));
-            let beside = ones(bits)
-                .map(|bit| [row, first + bit])
-                .filter(|&[row, col]| (2..=12).contains(&region.count_5x5(row - low[0], col)));
-            found.extend(beside);
+        for (word, &bits) in blocks.clone().zip(&edges.row(row)[blocks.clone()]) {
+            if bits == 0 {
+                continue;
+            }
+            let first = (row - low[0]) * stride + word - blocks.start;
+            let beside = bits & is_beside([0, 1, 2, 3, 4].map(|k| across(first + k * stride)));
+            found.extend(ones(beside).map(|bit| [row, 64 * word + bit]));
         }
     }
     found
+}
+
+/// Return the bits for which five numbers, in binary, have a sum of 2 to 12, 64 at once.
+fn is_beside(rows: [[u64; 3]; 5]) -> u64 {
+    let [[a, b, c, d, e], twos, fours] = [0, 1, 2].map(|place| rows.map(|row| row[place]));
+    let (ones, carry_a) = add3([a, b, c]);
+    let (ones, carry_b) = add3([ones, d, e]);
+    let (sum_a, carry_c) = add3([twos[0], twos[1], twos[2]]);
+    let (sum_b, carry_d) = add3([twos[3], twos[4], carry_a]);
+    let (twos, carry_e) = add3([sum_a, sum_b, carry_b]);
+    let (sum_a, eight_a) = add3([fours[0], fours[1], fours[2]]);
+    let (sum_b, eight_b) = add3([fours[3], fours[4], carry_c]);
+    let (sum, eight_c) = add3([sum_a, sum_b, carry_d]);
+    let (fours, eight_d) = (sum ^ carry_e, sum & carry_e);
+    let (sum, sixteens) = add3([eight_a, eight_b, eight_c]);
+    let (eights, sixteens) = (sum ^ eight_d, sixteens | sum & eight_d);
+    !sixteens & ((eights & !(fours & (twos | ones))) | (!eights & (fours | twos)))
 }
 
 /// Move a point away from the nearest obstacle while its clearance grows and it stays on free
@@ -132,29 +176,38 @@ fn nearest_blocked(map: &OccupancyMap, point_m: Vec2, within_m: f64) -> Option<(
     let spec = map.spec();
     let [row, col] = spec.cell_of(point_m)?;
     let reach = (within_m / spec.cell_m).ceil().min((spec.rows + spec.cols) as f64) as usize;
-    let rows = row.saturating_sub(reach)..(row + reach + 1).min(spec.rows);
     let first = col as i64 - reach as i64;
-    let mut nearest: Option<(Vec2, f64)> = None;
+    let mut nearest: Option<([usize; 2], f64)> = None;
     // Lengths are computed for cells alone whose squares may be the least.
     let mut most_m2 = within_m * within_m * (1.0 + HAIR);
-    for r in rows {
+    // Rows from the middle outwards: above and below in turn.
+    for turn in 0..=2 * reach {
+        let far = turn.div_ceil(2);
+        let r = if turn % 2 == 0 { row + far } else { row.wrapping_sub(far) };
+        let z = spec.centre_m([r, 0])[1] - point_m[1];
+        if r >= spec.rows || z * z > most_m2 {
+            continue;
+        }
         for w in (0..=2 * reach as i64).step_by(64) {
             let width = (2 * reach as i64 + 1 - w).min(64) as u32;
             let bits = map.blocked().window(r, first + w) & (u64::MAX >> (64 - width));
             for bit in ones(bits) {
-                let centre_m = spec.centre_m([r, (first + w + bit as i64) as usize]);
-                let [x, z] = [0, 1].map(|i| centre_m[i] - point_m[i]);
+                let cell = [r, (first + w + bit as i64) as usize];
+                let centre_m = spec.centre_m(cell);
+                let x = centre_m[0] - point_m[0];
                 if x * x + z * z > most_m2 {
                     continue;
                 }
                 let distance_m = distance_2d_m(centre_m, point_m);
-                let least_m = nearest.map_or(within_m, |(_, least_m)| least_m);
-                if distance_m < least_m {
-                    nearest = Some((centre_m, distance_m));
+                let is_first = nearest.map_or(distance_m < within_m, |(other, least_m)| {
+                    distance_m < least_m || distance_m == least_m && cell < other
+                });
+                if is_first {
+                    nearest = Some((cell, distance_m));
                     most_m2 = (x * x + z * z) * (1.0 + HAIR);
                 }
             }
         }
     }
-    nearest
+    nearest.map(|(cell, distance_m)| (spec.centre_m(cell), distance_m))
 }
