@@ -2,7 +2,7 @@
 
 use crate::{
     Error,
-    geometry::Vec2,
+    geometry::{Vec2, distance_2d_m},
     grid::{
         GridSpec,
         bits::BitGrid,
@@ -225,20 +225,24 @@ impl OccupancyMap {
     pub fn distances_m(&self, start_m: Vec2, targets_m: &[Vec2]) -> Result<Vec<f64>, Error> {
         Error::require_finite("start_m", &start_m)?;
         Error::require_finite("targets_m", targets_m.as_flattened())?;
+        let Some(own) = self.spec.cell_of(start_m) else {
+            return Ok(vec![f64::INFINITY; targets_m.len()]);
+        };
         let cells: Vec<_> = targets_m.iter().map(|&target_m| self.spec.cell_of(target_m)).collect();
         let mut start = BitGrid::new(self.spec.rows, self.spec.cols);
-        if let Some([row, col]) = self.spec.cell_of(start_m) {
-            start.insert(row, col);
-        }
+        start.insert(own[0], own[1]);
         let ends: Vec<_> = cells.iter().flatten().copied().collect();
         let window = Window { first: [0, 0], shape: [self.spec.rows, self.spec.cols] };
         let field = march(&self.free, &start, window, Until::All(&ends));
-        let cells_from_start =
-            |cell: Option<[usize; 2]>| cell.map_or(f32::INFINITY, |c| field.at(c));
-        Ok(cells
-            .into_iter()
-            .map(|cell| f64::from(cells_from_start(cell)) * self.spec.cell_m)
-            .collect())
+        // The front bends most beside its start, and is up to 1% ahead of itself from there on.
+        let cells_from_start = |cell: [usize; 2]| {
+            let straight = distance_2d_m(cell.map(|i| i as f64), own.map(|i| i as f64));
+            f64::from(field.at(cell)).max(straight)
+        };
+        let length_m = |cell: Option<[usize; 2]>| {
+            cell.map_or(f64::INFINITY, |cell| cells_from_start(cell) * self.spec.cell_m)
+        };
+        Ok(cells.into_iter().map(length_m).collect())
     }
 
     /// Return one value per cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
