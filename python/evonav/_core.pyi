@@ -518,6 +518,9 @@ class EmbeddedSimulator:
         """Return the number of materials and assets from which the look's materials were drawn."""
 
     def house_json(self) -> str: ...
+    def room_of(self, x_m: float, z_m: float) -> str | None:
+        """Return the id of the room that contains a point, as `House.room_of`."""
+
     def bodies(self) -> list[tuple[str, str, str, tuple[float, float, float], tuple[float, float, float]]]:
         """Return id, category, kind, centre and size of the box of each body, in instance order."""
 
@@ -593,9 +596,9 @@ class BatchSimulator:
         slot: int,
         simulator: EmbeddedSimulator,
         pose: Pose,
-        labels: NDArray[np.uint8],
+        labels: NDArray[np.uint8] | None,
     ) -> None:
-        """Put an agent into a house; `labels` `(bodies,)` is the label of each body's pixels, 0 for none."""
+        """Put an agent into a house; `labels` `(bodies,)` is the label of each body's pixels, 0 or `None` for none."""
 
     def aim(self, slot: int, field: GeodesicField | None) -> None:
         """Set the goal of an agent, to which its distances are; without a goal they are `inf`."""

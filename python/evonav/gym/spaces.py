@@ -91,8 +91,9 @@ def action_space(config: NavConfig) -> spaces.Space[Any]:
 def with_masks(infos: Infos, num_envs: int) -> Infos:
     """Return infos that every one of B environments has, with the masks that Gymnasium puts beside them."""
     masked: Infos = {}
+    all_of = np.ones(num_envs, np.bool_)
     for name, values in infos.items():
-        masked[name], masked[f"_{name}"] = values, np.ones(num_envs, np.bool_)
+        masked[name], masked[f"_{name}"] = values, all_of.copy()
     return masked
 
 

@@ -15,7 +15,6 @@ from evonav.evaluation.episode.motion import Planner
 from evonav.gym.config import NavConfig
 from evonav.gym.sources import TaskSource
 from evonav.gym.spaces import body_labels
-from evonav.house import House
 from evonav.tasks.manifest import Task
 from evonav.world.appearance import Change
 from evonav.world.embedded import EmbeddedSimulator
@@ -30,8 +29,8 @@ class World:
 
     simulator: EmbeddedSimulator
     """A simulator whose agent must not move; `entered` returns one for an agent."""
-    house: House
-    labels: NDArray[np.uint8]
+    labels: NDArray[np.uint8] | None
+    """Labels of the bodies, if they are observed."""
     num_bytes: int
 
     def entered(self, look: Sequence[Change] = ()) -> EmbeddedSimulator:
@@ -61,7 +60,7 @@ class StageWorld:
     ) -> list[tuple[float, float]]:
         """Return the evaluator's path to the target, from one to the nearest free point of the house: oracle data."""
         room_id = self.task.oracle(self.stage).target.room_id
-        return Planner(simulator).into_room_m(path_m, self.target_m, self.world.house, room_id)
+        return Planner(simulator).into_room_m(path_m, self.target_m, simulator.core, room_id)
 
 
 class WorldLoader:
@@ -125,9 +124,5 @@ class WorldLoader:
         # Finds all edges of the house's visibility graph, which later paths and distances use.
         _core.GeodesicField(simulator.core, (start.x_m, start.z_m))
         self.num_built += 1
-        return World(
-            simulator,
-            House(house_json, name=name),
-            body_labels(simulator.core.bodies()),
-            BYTES_PER_HOUSE_BYTE * len(house_json),
-        )
+        labels = body_labels(simulator.core.bodies()) if self._config.has("semantic") else None
+        return World(simulator, labels, BYTES_PER_HOUSE_BYTE * len(house_json))

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
-from evonav.house import House
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, OccupancyGrid, Simulator
 
@@ -116,6 +116,14 @@ MAX_TRIES = 16
 """Free cells that are tried for an agent that no path leads from."""
 
 
+class Rooms(Protocol):
+    """Knows a house's rooms: `House`, and the core's simulator of one."""
+
+    def room_of(self, x_m: float, z_m: float) -> str | None:
+        """Return the id of the room whose floor contains the point."""
+        ...
+
+
 class Planner:
     """The simulator's shortest paths, to the nearest reachable place where a point itself is cut off.
 
@@ -137,7 +145,7 @@ class Planner:
             corners = self._path_near(target_m)
         return [(float(x), float(z)) for x, _, z in corners]
 
-    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: House | None, room_id: str) -> list[Point2]:
+    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: Rooms | None, room_id: str) -> list[Point2]:
         """Return corners to the free point of a target's room that is nearest to the target.
 
         Args:

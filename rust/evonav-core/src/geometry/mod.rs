@@ -76,13 +76,15 @@ impl Aabb {
 }
 
 /// Add two vectors.
+#[inline]
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| a[i] + b[i])
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Subtract `b` from `a`.
+#[inline]
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
-    std::array::from_fn(|i| a[i] - b[i])
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Transpose a rotation, which inverts it.
@@ -91,8 +93,11 @@ pub fn transposed(matrix: &Mat3) -> Mat3 {
 }
 
 /// Rotate a vector: `rotation * vector`.
+#[inline]
 pub fn rotate(rotation: &Mat3, vector: Vec3) -> Vec3 {
-    std::array::from_fn(|i| (0..3).map(|j| rotation[i][j] * vector[j]).sum())
+    let [x, y, z] = vector;
+    let along = |row: &Vec3| row[0] * x + row[1] * y + row[2] * z;
+    [along(&rotation[0]), along(&rotation[1]), along(&rotation[2])]
 }
 
 /// Compose two rotations: `a * b` applies `b` first, then `a`.

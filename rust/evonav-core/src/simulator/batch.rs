@@ -267,13 +267,11 @@ impl Batch {
         let thread = thread % self.frames.len();
         // The content is overwritten, so a thread that panicked has left nothing that matters.
         let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
+        frame.empty_depth_m = Some(self.config.empty_depth_m);
         let want = slot.world.want(images.rgb.is_some(), images.labels.is_some());
         slot.world.render(&slot.world.view(&slot.pose), want, &mut frame)?;
         if let Some(depth_m) = images.depth_m {
-            let empty_m = self.config.empty_depth_m;
-            for (out, &depth) in depth_m.iter_mut().zip(&frame.depth_m) {
-                *out = if depth.is_finite() { depth } else { empty_m };
-            }
+            depth_m.copy_from_slice(&frame.depth_m);
         }
         if let Some(rgb) = images.rgb {
             rgb.copy_from_slice(&frame.rgb);

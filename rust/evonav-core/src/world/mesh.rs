@@ -58,6 +58,20 @@ pub(crate) struct PartMesh {
     pub is_pane: bool,
 }
 
+/// The parts of a body, which are consecutive, and the box around them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct BodyParts {
+    pub parts: Range<usize>,
+    pub aabb: Aabb,
+}
+
+/// Parts that are drawn together: the solid ones, or those that only colours show.
+#[derive(Clone, Copy)]
+pub(crate) struct Layer<'a> {
+    pub parts: &'a [PartMesh],
+    pub bodies: &'a [BodyParts],
+}
+
 /// All surfaces of a scene, in the order of its bodies and their parts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SceneMesh {
@@ -70,6 +84,8 @@ pub struct SceneMesh {
     pub(crate) parts: Vec<PartMesh>,
     /// The parts that only colours show; their faces come after all others.
     pub(crate) trim: Vec<PartMesh>,
+    solid_bodies: Vec<BodyParts>,
+    trim_bodies: Vec<BodyParts>,
     num_solid_faces: usize,
     num_bodies: usize,
 }
@@ -114,7 +130,19 @@ impl SceneMesh {
                 mesh.trim.extend(part);
             }
         }
+        mesh.solid_bodies = by_body(&mesh.parts);
+        mesh.trim_bodies = by_body(&mesh.trim);
         mesh
+    }
+
+    /// Return the solid parts.
+    pub(crate) fn solid_layer(&self) -> Layer<'_> {
+        Layer { parts: &self.parts, bodies: &self.solid_bodies }
+    }
+
+    /// Return the parts that only colours show.
+    pub(crate) fn trim_layer(&self) -> Layer<'_> {
+        Layer { parts: &self.trim, bodies: &self.trim_bodies }
     }
 
     /// Return the number of bodies of the scene from which the mesh was built.
@@ -229,6 +257,17 @@ impl SceneMesh {
         });
         self.corners.extend_from_slice(polygon);
     }
+}
+
+fn by_body(parts: &[PartMesh]) -> Vec<BodyParts> {
+    let mut first = 0;
+    let of_body = |parts: &[PartMesh]| {
+        let aabb = parts.iter().fold(Aabb::EMPTY, |all, part| all.union(part.aabb));
+        let range = first..first + parts.len();
+        first = range.end;
+        BodyParts { parts: range, aabb }
+    };
+    parts.chunk_by(|a, b| a.body == b.body).map(of_body).collect()
 }
 
 /// Return the unit normal (towards the side from which the polygon runs clockwise) and twice the

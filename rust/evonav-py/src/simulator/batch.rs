@@ -90,9 +90,13 @@ impl PyBatchSimulator {
         slot: usize,
         simulator: &PyEmbeddedSimulator,
         pose: PyPose,
-        labels: PyReadonlyArray1<'_, u8>,
+        labels: Option<PyReadonlyArray1<'_, u8>>,
     ) -> PyResult<()> {
-        let (world, labels) = (Arc::clone(&simulator.core), Arc::from(labels.as_slice()?));
+        let world = Arc::clone(&simulator.core);
+        let labels = match &labels {
+            Some(labels) => Arc::from(labels.as_slice()?),
+            None => vec![0; world.bodies().len()].into(),
+        };
         let agent = Slot::new(world, pose.pose(), labels);
         self.core.place(slot, agent).map_err(error::to_py)
     }

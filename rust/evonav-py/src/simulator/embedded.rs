@@ -163,6 +163,11 @@ impl PyEmbeddedSimulator {
         self.core.house().to_json()
     }
 
+    fn room_of(&self, x_m: f64, z_m: f64) -> Option<&str> {
+        let house = self.core.house();
+        Some(house.rooms[house.room_of([x_m, z_m])?].id.as_str())
+    }
+
     fn bodies(&self) -> Vec<BodyRecord> {
         self.core.bodies().iter().map(body_record).collect()
     }

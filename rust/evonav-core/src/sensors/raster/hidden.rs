@@ -39,6 +39,7 @@ impl Hidden {
     ///
     /// # Arguments
     /// * `nearest_m` - smallest planar depth of the part's box.
+    #[inline(always)]
     pub fn hides(
         &mut self,
         canvas: &Canvas,
@@ -66,6 +67,7 @@ impl Hidden {
     }
 
     /// Return whether all drawn pixels of some columns and rows are nearer than a bound.
+    #[inline(always)]
     fn is_nearer(
         &mut self,
         canvas: &Canvas,
@@ -77,20 +79,26 @@ impl Hidden {
         let rows = rows.start.max(drawn_rows.start)..rows.end.min(drawn_rows.end);
         let first = (columns.start / LANES).max(drawn_blocks.start);
         let end = columns.end.div_ceil(LANES).min(drawn_blocks.end);
-        rows.is_empty()
-            || (rows.start / TILE_ROWS..rows.end.div_ceil(TILE_ROWS)).all(|tile_row| {
-                (first..end).all(|block| {
-                    let least = &mut self.least[tile_row * canvas.blocks_per_row() + block];
+        if rows.is_empty() {
+            return true;
+        }
+        for tile_row in rows.start / TILE_ROWS..rows.end.div_ceil(TILE_ROWS) {
+            for block in first..end {
+                let least = &mut self.least[tile_row * canvas.blocks_per_row() + block];
+                if *least < bound {
+                    *least = least_nearness(canvas, tile_row, block);
                     if *least < bound {
-                        *least = least_nearness(canvas, tile_row, block);
+                        return false;
                     }
-                    *least >= bound
-                })
-            })
+                }
+            }
+        }
+        true
     }
 }
 
 /// Return the least nearness of a tile's pixels on which is drawn.
+#[inline(always)]
 fn least_nearness(canvas: &Canvas, tile_row: usize, block: usize) -> f32 {
     let [drawn, _] = canvas.drawn();
     let first = (tile_row * TILE_ROWS).max(drawn.start);

@@ -6,9 +6,9 @@ use crate::{
     geometry::{Aabb, Mat3, Vec2, Vec3, rotate, sub},
     sensors::{
         camera::{Camera, View},
-        raster::canvas::LANES,
+        raster::{canvas::LANES, frustum::Frustum},
     },
-    world::mesh::{Face, PartMesh, dot},
+    world::mesh::{Face, Layer, dot},
 };
 
 /// Working memory: parts in view, vertices of the current part and corners of the current face.
@@ -40,9 +40,7 @@ pub(super) struct Lens {
     pub optics: Optics,
     centre_px: Vec2,
     pub clip_m: Vec2,
-    /// Inward normals of near plane, far plane and the image's borders, and the smallest `normal .
-    /// p` of points in view.
-    frustum: [(Vec3, f64); 6],
+    frustum: Frustum,
 }
 
 impl Lens {
@@ -74,9 +72,11 @@ impl Lens {
             optics,
             centre_px: [u, v],
             clip_m: view.clip_m,
-            frustum: [([0.0; 3], 0.0); 6],
+            frustum: Frustum::default(),
         };
-        lens.frustum = local.map(|(normal, least)| (lens.to_world(normal), least));
+        for (index, (normal, least)) in local.into_iter().enumerate() {
+            lens.frustum.set(index, lens.to_world(normal), least);
+        }
         lens
     }
 
@@ -100,7 +100,7 @@ impl Lens {
             ([0.0, -focal_px, high[1]], 0.0),
         ];
         for (index, (normal, least)) in local.into_iter().enumerate() {
-            self.frustum[index + 1] = (self.to_world(normal), least);
+            self.frustum.set(index + 1, self.to_world(normal), least);
         }
     }
 
@@ -118,6 +118,7 @@ impl Lens {
         }
     }
 
+    #[inline(always)]
     pub fn to_image(&self, local_m: Vec3) -> Vec2 {
         let scale = match self.optics {
             Optics::Perspective { focal_px } => focal_px / local_m[2],
@@ -127,28 +128,29 @@ impl Lens {
     }
 
     /// Return whether a part of the box may be in view.
+    #[inline(always)]
     pub fn may_see(&self, aabb: &Aabb) -> bool {
-        let (centre, size) = (sub(aabb.centre_m(), self.eye_m), aabb.size_m());
-        self.frustum.iter().all(|(n, least)| {
-            let reach: f64 = (0..3).map(|k| 0.5 * size[k] * n[k].abs()).sum();
-            dot(*n, centre) + reach >= *least
-        })
+        self.frustum.may_contain(sub(aabb.centre_m(), self.eye_m), aabb.size_m())
     }
 
-    /// Collect the parts in view, nearest first.
-    pub fn collect_visible(&self, parts: &[PartMesh], visible: &mut Vec<(f64, u32)>) {
+    /// Collect the parts in view, nearest first. Where the box of a body is not in view, its parts are
+    /// not looked at.
+    #[inline(always)]
+    pub fn collect_visible(&self, layer: Layer<'_>, visible: &mut Vec<(f64, u32)>) {
         visible.clear();
-        visible.extend(
-            parts
-                .iter()
-                .enumerate()
-                .filter(|(_, part)| self.may_see(&part.aabb))
-                .map(|(i, part)| (self.nearest_m(&part.aabb), i as u32)),
-        );
+        for body in layer.bodies.iter().filter(|body| self.may_see(&body.aabb)) {
+            for index in body.parts.clone() {
+                let aabb = &layer.parts[index].aabb;
+                if body.parts.len() == 1 || self.may_see(aabb) {
+                    visible.push((self.nearest_m(aabb), index as u32));
+                }
+            }
+        }
         visible.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
     /// Return the smallest planar depth of the box.
+    #[inline(always)]
     fn nearest_m(&self, aabb: &Aabb) -> f64 {
         let forward = self.axes[2];
         let corner: Vec3 =
@@ -158,23 +160,33 @@ impl Lens {
 
     /// Return the columns and rows of pixels that may show a box in front of the camera of a
     /// perspective view, with one more on each side for rounding; they may lie out of the image.
+    #[inline(always)]
     pub fn box_px(&self, aabb: &Aabb) -> [Range<usize>; 2] {
-        let [low, high] = [aabb.min_m, aabb.max_m].map(|corner| sub(corner, self.eye_m));
-        let (mut low_px, mut high_px) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for corner in 0..8 {
-            let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-            let point_px = self.to_image(rotate(&self.axes, [at(0), at(1), at(2)]));
-            for axis in 0..2 {
-                low_px[axis] = low_px[axis].min(point_px[axis]);
-                high_px[axis] = high_px[axis].max(point_px[axis]);
+        let (Optics::Perspective { focal_px: scale }
+        | Optics::Orthographic { pixels_per_m: scale }) = self.optics;
+        let (low, high) = (sub(aabb.min_m, self.eye_m), sub(aabb.max_m, self.eye_m));
+        // Corners in the camera's frame: sums of a term for each axis of the box.
+        let mut local = [[0.0; 8]; 3];
+        for (local, axis) in local.iter_mut().zip(&self.axes) {
+            for (corner, local) in local.iter_mut().enumerate() {
+                for i in 0..3 {
+                    let side = if corner >> i & 1 == 0 { low } else { high };
+                    *local += axis[i] * side[i];
+                }
             }
         }
-        // Conversions of numbers below 0 give 0.
-        [0, 1].map(|axis| (low_px[axis] - 1.0) as usize..(high_px[axis] + 2.0) as usize)
+        let [mut u_px, mut v_px, z] = local;
+        for i in 0..8 {
+            let scale = scale / z[i];
+            u_px[i] = self.centre_px[0] + scale * u_px[i];
+            v_px[i] = self.centre_px[1] + scale * v_px[i];
+        }
+        [range_px(&u_px), range_px(&v_px)]
     }
 
     /// Transform a part's vertices to the camera's frame and the image; return whether the near
     /// plane cuts the part.
+    #[inline(always)]
     pub fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
         scratch.local_m.clear();
         scratch.projected_px.clear();
@@ -194,6 +206,7 @@ impl Lens {
     ///
     /// `None` for a face that is turned away, or so nearly edge-on that no pixel centre can be
     /// inside.
+    #[inline(always)]
     pub fn nearness_plane(&self, face: &Face) -> Option<(Vec3, f64)> {
         let height_m = dot(face.normal, self.eye_m) - face.offset_m;
         let (a, b, at_centre, facing) = match self.optics {
@@ -281,6 +294,21 @@ impl Lens {
             horizon_m: (!is_perspective).then_some(self.horizon_m() as f32),
         }
     }
+}
+
+/// Return the pixels between the least and the greatest of some places, with one more on each side.
+#[inline(always)]
+fn range_px(places_px: &[f64; 8]) -> Range<usize> {
+    let (mut low_px, mut high_px) = (*places_px, *places_px);
+    for half in [4, 2, 1] {
+        for i in 0..half {
+            let (low, high) = (low_px[i + half], high_px[i + half]);
+            low_px[i] = if low < low_px[i] { low } else { low_px[i] };
+            high_px[i] = if high > high_px[i] { high } else { high_px[i] };
+        }
+    }
+    // Conversions of numbers below 0 give 0.
+    (low_px[0] - 1.0) as usize..(high_px[0] + 2.0) as usize
 }
 
 /// World points of pixels, from their depth.

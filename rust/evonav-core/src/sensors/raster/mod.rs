@@ -1,6 +1,7 @@
 //! Depth, instance and colour images of a scene: a scanline z-buffer on one thread.
 
 mod canvas;
+mod frustum;
 mod hidden;
 mod lens;
 mod light;

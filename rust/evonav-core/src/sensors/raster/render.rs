@@ -21,7 +21,7 @@ use crate::{
             style::Style,
         },
     },
-    world::mesh::{PartMesh, SceneMesh},
+    world::mesh::{Layer, PartMesh, SceneMesh},
 };
 
 /// The images to render besides depth.
@@ -33,11 +33,20 @@ pub struct Want {
     pub instances: bool,
 }
 
+impl Want {
+    /// Return whether it matters which surface a pixel shows.
+    fn has_tags(self) -> bool {
+        self.rgb.is_some() || self.instances
+    }
+}
+
 /// The images of one view, row-major, and working memory to render the next one without allocating.
 #[derive(Debug, Clone, Default)]
 pub struct FrameBuffer {
-    /// Planar depth in metres, `(H, W)`; infinite where nothing is.
+    /// Planar depth in metres, `(H, W)`; where nothing is, `empty_depth_m`.
     pub depth_m: Vec<f32>,
+    /// Depth of pixels where nothing is; infinite if there is none.
+    pub empty_depth_m: Option<f32>,
     /// Body index + 1 of each pixel, `(H, W)`; 0 where nothing is. Empty if not rendered.
     pub instances: Vec<i32>,
     /// Colours, sRGB, `(H, W, 3)`. Empty if not rendered.
@@ -151,11 +160,11 @@ fn draw_solid(
     let lens = Lens::new(view);
     let Camera { width_px, height_px, .. } = view.camera;
     // Nothing beyond the far plane is nearer than an empty pixel.
-    out.canvas.clear(width_px, height_px, lens.far_nearness());
+    out.canvas.clear(width_px, height_px, lens.far_nearness(), want.has_tags());
     if let Some(style) = want.rgb {
         out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
-    draw_parts(mesh, &mesh.parts, &lens, want, out, |_| true);
+    Draw { mesh, layer: mesh.solid_layer(), lens: &lens, want, has_panes: true }.onto(out);
     evonav_simd::compute(Resolve { mesh, lens: &lens, want, out });
     Ok(lens)
 }
@@ -169,7 +178,7 @@ fn light_up(
     out: &mut FrameBuffer,
 ) {
     let want = Want { rgb: Some(Style::Default), instances: false };
-    draw_parts(mesh, &mesh.trim, lens, want, out, |_| true);
+    Draw { mesh, layer: mesh.trim_layer(), lens, want, has_panes: true }.onto(out);
     see_through(mesh, view, lens, want, out);
     out.shader.shade_lit(mesh, light, lens, &out.canvas, &mut out.rgb);
     out.panes.cover(&out.canvas, &lens.rays(), &mut out.rgb);
@@ -182,60 +191,91 @@ fn see_through(mesh: &SceneMesh, view: &View, lens: &Lens, want: Want, out: &mut
     if !all.any(|part| part.is_pane && lens.may_see(&part.aabb)) {
         return;
     }
+    let layers = [mesh.solid_layer(), mesh.trim_layer()];
     let FrameBuffer { canvas, panes, .. } = out;
     let Some((rows, blocks)) = panes.clear(mesh, lens.far_nearness(), canvas) else { return };
     let mut narrow = Lens::new(view);
     let columns = blocks.start * LANES..(blocks.end * LANES).min(out.canvas.width_px);
     narrow.narrow(&columns, &rows, view.clip_m[1]);
     out.canvas.draw_within(rows, blocks);
-    for parts in [&mesh.parts, &mesh.trim] {
-        draw_parts(mesh, parts, &narrow, want, out, |part| !part.is_pane);
+    for layer in layers {
+        Draw { mesh, layer, lens: &narrow, want, has_panes: false }.onto(out);
     }
 }
 
-/// Draw some of the parts in view, nearest first, without those that others hide.
-pub(super) fn draw_parts(
-    mesh: &SceneMesh,
-    parts: &[PartMesh],
-    lens: &Lens,
-    want: Want,
-    out: &mut FrameBuffer,
-    is_drawn: impl Fn(&PartMesh) -> bool,
-) {
-    lens.collect_visible(parts, &mut out.scratch.visible);
-    out.hidden.begin(&out.canvas);
-    for index in 0..out.scratch.visible.len() {
-        let (nearest_m, part) = out.scratch.visible[index];
-        let part = &parts[part as usize];
-        if is_drawn(part) && !out.hidden.hides(&out.canvas, mesh, part, lens, nearest_m) {
-            draw_part(mesh, part, lens, want, out);
-        }
-    }
+/// Draws the parts in view, nearest first, without those that others hide.
+#[derive(Clone, Copy)]
+pub(super) struct Draw<'a> {
+    pub mesh: &'a SceneMesh,
+    pub layer: Layer<'a>,
+    pub lens: &'a Lens,
+    pub want: Want,
+    /// Whether glass is drawn.
+    pub has_panes: bool,
 }
 
-fn draw_part(mesh: &SceneMesh, part: &PartMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
-    let FrameBuffer { canvas, shader, scratch, .. } = out;
-    let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
-    for index in part.faces.clone() {
-        let face = &mesh.faces[index];
-        let Some((plane, facing)) = lens.nearness_plane(face) else { continue };
-        let Scratch { local_m, projected_px, clipped_m, polygon_px, .. } = scratch;
-        polygon_px.clear();
-        let corners = mesh.corners_of(face);
-        if is_clipped {
-            clip_near(corners.iter().map(|&i| local_m[i as usize]), lens.clip_m[0], clipped_m);
-            if clipped_m.len() < 3 {
-                continue;
-            }
-            polygon_px.extend(clipped_m.iter().map(|&p| lens.to_image(p)));
+impl Draw<'_> {
+    pub fn onto(self, out: &mut FrameBuffer) {
+        if self.want.has_tags() {
+            evonav_simd::compute(DrawOnto::<true> { draw: self, out });
         } else {
-            polygon_px.extend(corners.iter().map(|&i| projected_px[i as usize]));
+            evonav_simd::compute(DrawOnto::<false> { draw: self, out });
         }
-        let tag = if want.rgb.is_some() { index as u32 } else { face.body } + 1;
-        if let Some(style) = want.rgb {
-            shader.note(style, mesh, index, facing);
+    }
+
+    #[inline(always)]
+    fn part<const HAS_TAGS: bool>(self, part: &PartMesh, out: &mut FrameBuffer) {
+        let Self { mesh, lens, want, .. } = self;
+        let FrameBuffer { canvas, shader, scratch, .. } = out;
+        let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
+        for index in part.faces.clone() {
+            let face = &mesh.faces[index];
+            let Some((plane, facing)) = lens.nearness_plane(face) else { continue };
+            let Scratch { local_m, projected_px, clipped_m, polygon_px, .. } = scratch;
+            polygon_px.clear();
+            let corners = mesh.corners_of(face);
+            if is_clipped {
+                clip_near(corners.iter().map(|&i| local_m[i as usize]), lens.clip_m[0], clipped_m);
+                if clipped_m.len() < 3 {
+                    continue;
+                }
+                polygon_px.extend(clipped_m.iter().map(|&p| lens.to_image(p)));
+            } else {
+                polygon_px.extend(corners.iter().map(|&i| projected_px[i as usize]));
+            }
+            let tag = if want.rgb.is_some() { index as u32 } else { face.body } + 1;
+            if let Some(style) = want.rgb {
+                shader.note(style, mesh, index, facing);
+            }
+            canvas.fill_polygon::<HAS_TAGS>(polygon_px, plane, tag);
         }
-        canvas.fill(polygon_px, plane, tag);
+    }
+}
+
+/// [`Draw::onto`] and its argument; whether there are tags is known when this is compiled.
+struct DrawOnto<'a, const HAS_TAGS: bool> {
+    draw: Draw<'a>,
+    out: &'a mut FrameBuffer,
+}
+
+impl<const HAS_TAGS: bool> Kernel for DrawOnto<'_, HAS_TAGS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { draw, out } = self;
+        let Draw { mesh, layer, lens, has_panes, .. } = draw;
+        lens.collect_visible(layer, &mut out.scratch.visible);
+        out.hidden.begin(&out.canvas);
+        for index in 0..out.scratch.visible.len() {
+            let (nearest_m, part) = out.scratch.visible[index];
+            let part = &layer.parts[part as usize];
+            if (has_panes || !part.is_pane)
+                && !out.hidden.hides(&out.canvas, mesh, part, lens, nearest_m)
+            {
+                draw.part::<HAS_TAGS>(part, out);
+            }
+        }
     }
 }
 
@@ -275,22 +315,23 @@ impl Kernel for Resolve<'_> {
     #[inline(always)]
     fn compute(self) {
         let Self { mesh, lens, want, out } = self;
-        let FrameBuffer { depth_m, instances, rgb, canvas, .. } = out;
+        let FrameBuffer { depth_m, empty_depth_m, instances, rgb, canvas, .. } = out;
         let num_pixels = canvas.width_px * canvas.height_px;
         depth_m.resize(num_pixels, 0.0);
         let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
+        let empty_m = empty_depth_m.unwrap_or(f32::INFINITY);
         for (row, depth_m) in depth_m.chunks_exact_mut(canvas.width_px).enumerate() {
             let pixels = depth_m.iter_mut().zip(canvas.row(row));
             match lens.optics {
                 Optics::Perspective { .. } => {
                     for (depth_m, &nearness) in pixels {
-                        *depth_m = if nearness > empty { 1.0 / nearness } else { f32::INFINITY };
+                        *depth_m = if nearness > empty { 1.0 / nearness } else { empty_m };
                     }
                 }
                 Optics::Orthographic { .. } => {
                     for (depth_m, &nearness) in pixels {
                         let below_m = horizon_m - nearness;
-                        *depth_m = if nearness > empty { below_m } else { f32::INFINITY };
+                        *depth_m = if nearness > empty { below_m } else { empty_m };
                     }
                 }
             }

@@ -9,7 +9,7 @@ use crate::{
         raster::{
             canvas::LANES,
             lens::Lens,
-            render::{FrameBuffer, Want, draw_parts},
+            render::{Draw, FrameBuffer, Want},
         },
     },
     world::mesh::SceneMesh,
@@ -55,7 +55,7 @@ pub fn visible_px(
     let size_px = [camera.width_px, camera.height_px];
     frame.canvas.clear_within(size_px, lens.far_nearness(), rows.clone(), blocks.clone());
     let want = Want { rgb: None, instances: true };
-    draw_parts(mesh, &mesh.parts, &lens, want, frame, |_| true);
+    Draw { mesh, layer: mesh.solid_layer(), lens: &lens, want, has_panes: true }.onto(frame);
     let tag = body as u32 + 1;
     let canvas = &frame.canvas;
     let drawn = rows.flat_map(|row| {

@@ -102,7 +102,7 @@ fn clearance_m(
     is_counted: impl Fn(u32) -> bool,
 ) -> Vec<f32> {
     let (mut canvas, mut scratch) = (Canvas::default(), Scratch::default());
-    canvas.clear(width_px, height_px, lens.far_nearness());
+    canvas.clear(width_px, height_px, lens.far_nearness(), false);
     for part in mesh.parts.iter().filter(|part| is_counted(part.body)) {
         lens.transform(&mesh.vertices_m[part.vertices.clone()], &mut scratch);
         for face in &mesh.faces[part.faces.clone()] {
@@ -110,7 +110,7 @@ fn clearance_m(
             let corners = mesh.corners_of(face).iter();
             scratch.polygon_px.clear();
             scratch.polygon_px.extend(corners.map(|&i| scratch.projected_px[i as usize]));
-            canvas.fill(&scratch.polygon_px, plane, 1);
+            canvas.fill(&scratch.polygon_px, plane);
         }
     }
     let floor = (lens.horizon_m() - BELOW_M) as f32;

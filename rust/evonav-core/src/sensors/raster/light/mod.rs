@@ -20,6 +20,7 @@ use crate::{
     world::{appearance::Lighting, mesh::SceneMesh, scene::Scene},
 };
 
+pub(super) use field::FaceField;
 use field::Field;
 pub(super) use sun::Sun;
 

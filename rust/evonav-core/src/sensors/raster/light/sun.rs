@@ -191,7 +191,7 @@ impl Sun {
                 let corners = mesh.corners_of(face).iter().rev();
                 scratch.polygon_px.clear();
                 scratch.polygon_px.extend(corners.map(|&i| scratch.projected_px[i as usize]));
-                canvas.fill(&scratch.polygon_px, plane, 1);
+                canvas.fill(&scratch.polygon_px, plane);
             }
             if number % LOOKED_AT == LOOKED_AT - 1 {
                 least = least_of(&canvas.nearness);
@@ -304,7 +304,7 @@ mod tests {
     fn map_naive(sun: &Sun, mesh: &SceneMesh) -> Canvas {
         let lens = Lens::new(&sun.view);
         let (mut canvas, mut scratch) = (Canvas::default(), Scratch::default());
-        canvas.clear(sun.size[0] as usize, sun.size[1] as usize, 0.0);
+        canvas.clear(sun.size[0] as usize, sun.size[1] as usize, 0.0, false);
         for part in &mesh.parts {
             lens.transform(&mesh.vertices_m[part.vertices.clone()], &mut scratch);
             let kind = mesh.skins[part.faces.start].material.kind;
@@ -315,7 +315,7 @@ mod tests {
                 let Some((plane, _)) = lens.nearness_plane(&face.reversed()) else { continue };
                 let corners = mesh.corners_of(face).iter().rev();
                 let corners: Vec<_> = corners.map(|&i| scratch.projected_px[i as usize]).collect();
-                canvas.fill(&corners, plane, 1);
+                canvas.fill(&corners, plane);
             }
         }
         canvas

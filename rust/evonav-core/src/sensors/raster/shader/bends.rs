@@ -30,6 +30,7 @@ pub(super) struct Bends {
 
 impl Bends {
     /// Set `light` for a row.
+    #[inline(always)]
     pub fn darken(&mut self, canvas: &Canvas, row: usize, optics: Optics, shades: Shades) {
         let corner_px = corner_reach_px(canvas);
         self.light.clear();
@@ -83,6 +84,7 @@ impl Bends {
     /// # Arguments
     /// * `depth_m` - of the row's pixels in perspective views, 1 in orthographic ones.
     /// * `corner` - darkness in concave corners, 0 to 1.
+    #[inline(always)]
     pub fn open(
         &mut self,
         canvas: &Canvas,
@@ -100,10 +102,11 @@ impl Bends {
         let centre = &canvas.row(row)[..width];
         let unit = 0.5 * scale_px as f32 / reach_px as f32;
         let (open, depth_m) = (&mut open[..width], &depth_m[..width]);
-        evonav_simd::compute(OpenRow { open, centre, neighbours, depth_m, unit, corner });
+        OpenRow { open, centre, neighbours, depth_m, unit, corner }.compute();
     }
 
     /// Copy a row and continue it on both sides linearly, as the planes there continue.
+    #[inline(always)]
     fn pad(&mut self, row: &[f32], width_px: usize, reach_px: usize) {
         let row = &row[..width_px];
         let (first, last) = (row[0], row[width_px - 1]);
@@ -183,6 +186,7 @@ fn corner_reach_px(canvas: &Canvas) -> usize {
 /// # Arguments
 /// * `padded` - the row, continued by the first of the numbers.
 /// * `reach_px` - how far away the neighbours are.
+#[inline(always)]
 fn neighbours<'a>(
     padded: &'a [f32],
     canvas: &'a Canvas,
@@ -199,12 +203,14 @@ fn neighbours<'a>(
 }
 
 /// Return the darkness in a corner, `most` or less. A large bend is not a corner but a surface far behind an edge.
+#[inline(always)]
 fn corner_shade(bend: f32, most: f32) -> f32 {
     let is_corner = (1.8 - bend).clamp(0.0, 1.0);
     most * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
 /// Return the share of the darkness of a silhouette's line.
+#[inline(always)]
 fn line_shade(bend: f32) -> f32 {
     (bend - 1.0).clamp(0.0, 1.0)
 }

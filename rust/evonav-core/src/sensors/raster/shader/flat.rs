@@ -3,12 +3,17 @@
 //! A face is lit from above and from one side so that the faces of a box differ, and by a lamp at
 //! the camera, so that walls fade with angle.
 
+use evonav_simd::Kernel;
+
 use crate::{
     geometry::Vec3,
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::Optics,
-        shader::bends::{Bends, Shades},
+        shader::{
+            bends::{Bends, Shades},
+            response::write_pixels,
+        },
     },
     world::mesh::{Face, dot},
 };
@@ -35,6 +40,12 @@ struct LitFace {
 
 impl LitFace {
     const SKY: Self = Self { rgb: SKY, facing: 0.0 };
+
+    #[inline(always)]
+    fn numbers(&self) -> [f32; 4] {
+        let [red, green, blue] = self.rgb;
+        [self.facing, red, green, blue]
+    }
 }
 
 /// Colours of the faces in view, and working memory for one row.
@@ -49,6 +60,9 @@ pub(super) struct Flat {
     /// orthographic views.
     shortness: Vec<[f32; LANES]>,
     bends: Bends,
+    /// [`LitFace::numbers`] of a row's pixels, and their colours, a channel a byte.
+    lanes: [Vec<f32>; 4],
+    packed: Vec<u32>,
 }
 
 impl Flat {
@@ -93,14 +107,7 @@ impl Flat {
         rgb: &mut [u8],
     ) {
         let shades = Shades { corner: CORNER_SHADE, line: has_lines.then_some(LINE_SHADE) };
-        let rows = rgb.chunks_exact_mut(3 * canvas.width_px).enumerate();
-        for (row, pixels) in rows.filter(|(row, _)| is_wanted(*row)) {
-            self.bends.darken(canvas, row, optics, shades);
-            if let Optics::Orthographic { .. } = optics {
-                self.level_facing(canvas, row);
-            }
-            self.paint(canvas, row, pixels);
-        }
+        evonav_simd::compute(Shade { flat: self, canvas, optics, shades, is_wanted, rgb });
     }
 
     /// Set `shortness` so that nearness times `shortness` is 1 in a row: all rays are along the
@@ -113,54 +120,90 @@ impl Flat {
         }
     }
 
-    fn paint(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
+    /// Set a row's pixels. [`LitFace::facing`] times the camera's nearness over the length of the
+    /// ray at depth 1 is the cosine between a plane's normal and the ray.
+    #[inline(always)]
+    fn paint(&mut self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
         let blocks = canvas.row_blocks(row);
-        let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
-        let mut whole = whole.iter_mut();
-        let tags = &canvas.tags[blocks.clone()];
-        let depths = canvas.nearness[blocks.clone()].iter().zip(&self.shortness[blocks]);
-        for ((tags, (nearness, shortness)), lights) in
-            tags.iter().zip(depths).zip(self.bends.light.as_chunks().0)
-        {
-            let facing = std::array::from_fn(|lane| nearness[lane] * shortness[lane]);
-            let rgb = self.colours(tags, &facing, lights);
-            match whole.next() {
-                Some(pixels) => pixels.copy_from_slice(rgb.as_flattened()),
-                None => rest.copy_from_slice(&rgb.as_flattened()[..rest.len()]),
+        self.look_up(&canvas.tags[blocks.clone()]);
+        let Self { lanes, packed, bends, shortness, .. } = self;
+        let num = packed.len();
+        let light = &mut bends.light[..num];
+        let [planes, red, green, blue] = lanes.each_ref().map(|lanes| &lanes[..num]);
+        let nearness = &canvas.nearness[blocks.clone()].as_flattened()[..num];
+        let shortness = &shortness[blocks].as_flattened()[..num];
+        for i in 0..num {
+            let facing = nearness[i] * shortness[i];
+            light[i] *= 1.0 - LAMP_SHARE + LAMP_SHARE * planes[i] * facing;
+        }
+        for i in 0..num {
+            let [red, green, blue] =
+                [red, green, blue].map(|channel| to_byte(channel[i] * light[i]));
+            packed[i] = red | green << 8 | blue << 16;
+        }
+        write_pixels(packed, pixels);
+    }
+
+    /// Set the numbers of the faces of a row's pixels.
+    #[inline(always)]
+    fn look_up(&mut self, tags: &[[u32; LANES]]) {
+        let Self { faces, lanes, packed, .. } = self;
+        lanes.iter_mut().for_each(|lanes| lanes.resize(tags.len() * LANES, 0.0));
+        packed.resize(tags.len() * LANES, 0);
+        for (block, tags) in tags.iter().enumerate() {
+            let place = block * LANES..(block + 1) * LANES;
+            // Most blocks lie within one face.
+            let different = tags.iter().fold(0, |different, tag| different | (tag ^ tags[0]));
+            if different == 0 {
+                let face = faces[tags[0] as usize].numbers();
+                for (lanes, number) in lanes.iter_mut().zip(face) {
+                    lanes[place.clone()].fill(number);
+                }
+                continue;
+            }
+            for (index, &tag) in place.zip(tags) {
+                let face = faces[tag as usize].numbers();
+                for (lanes, number) in lanes.iter_mut().zip(face) {
+                    lanes[index] = number;
+                }
             }
         }
     }
+}
 
-    /// Compute the colours of a block. `facing` is inverse depth over the length of the ray at
-    /// depth 1. Multiplied by the camera's distance from a plane, it is the cosine between the
-    /// plane's normal and the ray. In orthographic views, where faces contain that cosine, it is 1.
-    fn colours(
-        &self,
-        tags: &[u32; LANES],
-        facing: &[f32; LANES],
-        lights: &[f32; LANES],
-    ) -> [[u8; 3]; LANES] {
-        let lit = |face: &LitFace, lane: usize| {
-            lights[lane] * (1.0 - LAMP_SHARE + LAMP_SHARE * face.facing * facing[lane])
-        };
-        // Most blocks lie within one face.
-        if tags.iter().all(|&tag| tag == tags[0]) {
-            let face = self.faces[tags[0] as usize];
-            let light: [f32; LANES] = std::array::from_fn(|lane| lit(&face, lane));
-            let channels = face.rgb.map(|channel| light.map(|light| to_byte(channel * light)));
-            return std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8));
+/// [`Flat::shade`] and its arguments.
+struct Shade<'a, F> {
+    flat: &'a mut Flat,
+    canvas: &'a Canvas,
+    optics: Optics,
+    shades: Shades,
+    is_wanted: F,
+    rgb: &'a mut [u8],
+}
+
+impl<F: Fn(usize) -> bool> Kernel for Shade<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { flat, canvas, optics, shades, is_wanted, rgb } = self;
+        let rows = rgb.chunks_exact_mut(3 * canvas.width_px).enumerate();
+        for (row, pixels) in rows.filter(|(row, _)| is_wanted(*row)) {
+            flat.bends.darken(canvas, row, optics, shades);
+            if let Optics::Orthographic { .. } = optics {
+                flat.level_facing(canvas, row);
+            }
+            flat.paint(canvas, row, pixels);
         }
-        std::array::from_fn(|lane| {
-            let face = &self.faces[tags[lane] as usize];
-            face.rgb.map(|channel| to_byte(channel * lit(face, lane)) as u8)
-        })
     }
 }
 
-/// Round a number of 0 or more to the low byte of the result, at most 255. The mantissa of a sum
-/// with 2^23 is used, which unlike a conversion needs no treatment of numbers out of range.
-pub(super) fn to_byte(value: f32) -> u32 {
-    (value.min(255.0) + 8_388_608.0).to_bits()
+/// Round a number of 0 or more, at most 255. The mantissa of a sum with 2^23 is used, which unlike a
+/// conversion needs no treatment of numbers out of range.
+#[inline(always)]
+fn to_byte(value: f32) -> u32 {
+    let value = if value < 255.0 { value } else { 255.0 };
+    (value + 8_388_608.0).to_bits() & 0xff
 }
 
 /// Direction of the weaker light.

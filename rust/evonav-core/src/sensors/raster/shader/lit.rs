@@ -11,7 +11,7 @@ use crate::{
     sensors::raster::{
         canvas::{Canvas, LANES},
         lens::{Lens, Rays},
-        light::Light,
+        light::{FaceField, Light},
         shader::{
             bends::Bends,
             edges::Edges,
@@ -75,7 +75,6 @@ impl Lit {
     ) {
         let rays = lens.rays();
         self.picture += 1;
-        self.runs.find(canvas);
         self.surfaces.resize(mesh.faces.len(), Default::default());
         let length = canvas.blocks_per_row() * LANES + 2 * LANES;
         self.scale.clear();
@@ -83,28 +82,12 @@ impl Lit {
         self.open.resize(length, u16::MAX);
         self.bright.iter_mut().for_each(|channel| channel.resize(length, 0));
         self.packed.resize(length, 0);
-        for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            let nearness = canvas.row(row);
-            if rays.horizon_m.is_none() {
-                for (scale, w) in self.scale.iter_mut().zip(nearness) {
-                    *scale = 1.0 / w;
-                }
-            }
-            let Self { bends, open, scale, .. } = self;
-            bends.open(canvas, row, lens.optics, scale, CORNER_SHADE, open);
-            self.light(mesh, light, lens, &rays, canvas, row);
-            let Self { bright, open, packed, .. } = self;
-            evonav_simd::compute(Develop { bright, open, packed, pixels });
-            for run in &self.empty {
-                // The ends of a run lie on one side of the horizon in level pictures.
-                let colour = if rays.is_below_horizon([run.start, row]) { GROUND } else { SKY };
-                pixels[3 * run.start..3 * run.end].as_chunks_mut().0.fill(colour);
-            }
-        }
+        evonav_simd::compute(Rows { lit: self, mesh, light, lens, rays: &rays, canvas, rgb });
         self.edges.smooth(canvas, &self.runs, rgb);
     }
 
     /// Set the brightness of a row, and its empty runs.
+    #[inline(always)]
     fn light(
         &mut self,
         mesh: &SceneMesh,
@@ -135,6 +118,45 @@ impl Lit {
     }
 }
 
+/// Colours all rows, but for the edges between faces.
+struct Rows<'a> {
+    lit: &'a mut Lit,
+    mesh: &'a SceneMesh,
+    light: Option<&'a Light>,
+    lens: &'a Lens,
+    rays: &'a Rays,
+    canvas: &'a Canvas,
+    rgb: &'a mut [u8],
+}
+
+impl Kernel for Rows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn compute(self) {
+        let Self { lit, mesh, light, lens, rays, canvas, rgb } = self;
+        lit.runs.find(canvas);
+        for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
+            let nearness = canvas.row(row);
+            if rays.horizon_m.is_none() {
+                for (scale, w) in lit.scale.iter_mut().zip(nearness) {
+                    *scale = 1.0 / w;
+                }
+            }
+            let Lit { bends, open, scale, .. } = &mut *lit;
+            bends.open(canvas, row, lens.optics, scale, CORNER_SHADE, open);
+            lit.light(mesh, light, lens, rays, canvas, row);
+            let Lit { bright, open, packed, .. } = &mut *lit;
+            Develop { bright, open, packed, pixels }.compute();
+            for run in &lit.empty {
+                // The ends of a run lie on one side of the horizon in level pictures.
+                let colour = if rays.is_below_horizon([run.start, row]) { GROUND } else { SKY };
+                pixels[3 * run.start..3 * run.end].as_chunks_mut().0.fill(colour);
+            }
+        }
+    }
+}
+
 /// One over the number of pixels between two places; 0 if they are the same.
 const SHARES: [f32; 2 * LANES + 1] = {
     let mut shares = [0.0; 2 * LANES + 1];
@@ -158,7 +180,9 @@ struct End {
 
 impl End {
     #[inline(always)]
-    fn of(light: Light4, surface: &Surface) -> Self {
+    fn at(face: Option<&FaceField<'_>>, place: [f32; 2], surface: &Surface) -> Self {
+        let even = [EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0];
+        let light = face.map_or(even, |face| face.at(place));
         Self { light, rooted: rooted(&light, surface) }
     }
 }
@@ -174,12 +198,8 @@ impl Shot<'_> {
             places.map(|[du, at]| (du * u + at) * self.scale[column])
         };
         let face = self.light.and_then(|light| light.field.of_face(self.mesh, index));
-        let end = |place: [f32; 2]| match &face {
-            Some(face) => End::of(face.at(place), surface),
-            None => End::of([EVEN * EVEN, EVEN * EVEN, EVEN * EVEN, 0.0], surface),
-        };
         let (mut first, mut from) = (run.start, place(run.start));
-        let mut start = end(from);
+        let mut start = End::at(face.as_ref(), from, surface);
         while first < run.end {
             let (mut step, mut last) = (2 * LANES, (first + 2 * LANES).min(run.end - 1));
             let mut to = place(last);
@@ -189,7 +209,7 @@ impl Shot<'_> {
                 (step, last) = (LANES, first + LANES);
                 to = place(last);
             }
-            let stop = if last > first { end(to) } else { start };
+            let stop = if last > first { End::at(face.as_ref(), to, surface) } else { start };
             let columns = first..(first + step).min(run.end);
             self.between(surface, columns, [&start, &stop], SHARES[last - first], bright);
             (first, from, start) = (first + step, to, stop);

@@ -41,14 +41,23 @@ impl Kernel for Develop<'_> {
         for (((packed, red), green), blue) in packed.iter_mut().zip(red).zip(green).zip(blue) {
             *packed = u32::from(red | green << 8) | u32::from(*blue) << 16;
         }
-        let (whole, rest) = pixels.as_chunks_mut();
-        let (blocks, _) = packed.as_chunks();
-        for (pixels, block) in whole.iter_mut().zip(blocks) {
-            *pixels = bytes_of(block);
-        }
-        if !rest.is_empty() {
-            rest.copy_from_slice(&bytes_of(&blocks[whole.len()])[..rest.len()]);
-        }
+        write_pixels(packed, pixels);
+    }
+}
+
+/// Write a row's colours.
+///
+/// # Arguments
+/// * `packed` - a channel a byte; the last block may go on beyond the row.
+#[inline(always)]
+pub(super) fn write_pixels(packed: &[u32], pixels: &mut [u8]) {
+    let (whole, rest) = pixels.as_chunks_mut();
+    let (blocks, _) = packed.as_chunks();
+    for (pixels, block) in whole.iter_mut().zip(blocks) {
+        *pixels = bytes_of(block);
+    }
+    if !rest.is_empty() {
+        rest.copy_from_slice(&bytes_of(&blocks[whole.len()])[..rest.len()]);
     }
 }
 

@@ -20,6 +20,7 @@ pub(super) struct Runs {
 }
 
 impl Runs {
+    #[inline(always)]
     pub fn find(&mut self, canvas: &Canvas) {
         self.runs.clear();
         self.rows.clear();
