@@ -1,7 +1,6 @@
 //! Navigation: obstacles, the free space of an agent, and shortest paths.
 
 mod agent_body;
-mod approaches;
 mod distance_field;
 mod distance_tiles;
 mod free_space;

@@ -2,7 +2,7 @@
 
 use evonav_simd::Kernel;
 
-use crate::{geometry::Vec2, world::navigation::Obstacles};
+use crate::geometry::Vec2;
 
 /// Tolerance of the tangency test, metres over the length of an edge; it adds edges rather than
 /// removing them.
@@ -62,17 +62,6 @@ impl Nodes {
 
     pub(super) fn point_m(&self, i: usize) -> Vec2 {
         [self.columns[0][i], self.columns[1][i]]
-    }
-
-    /// Return the nodes to which a taut path from an end may go first.
-    ///
-    /// From an end that lies inside the tangents of a corner, no path passes that corner
-    /// tangentially: it may lead to every node.
-    pub(super) fn next_to(&self, obstacles: &Obstacles, end_m: Vec2) -> Vec<usize> {
-        if obstacles.is_hugged(end_m) {
-            return (0..self.len()).collect();
-        }
-        self.tangent_to(Node::end(end_m))
     }
 
     /// Return the nodes to which a straight line from a node may go so that it grazes the obstacles

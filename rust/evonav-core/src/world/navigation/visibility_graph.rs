@@ -20,7 +20,6 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     world::navigation::{
         Obstacles,
-        approaches::Repeated,
         distance_field::{DistanceField, Reached},
         distance_tiles,
         nodes::{Node, Nodes},
@@ -45,7 +44,6 @@ struct Edge {
 pub struct VisibilityGraph {
     nodes: Nodes,
     edges: Vec<OnceLock<Box<[Edge]>>>,
-    repeated: Repeated,
 }
 
 /// An entry of the open list. The smallest bound comes first, then the smallest node, so that ties
@@ -97,7 +95,18 @@ impl VisibilityGraph {
             fans.push_corner_nodes(obstacle, &is_free, &may_be_free, &mut nodes);
         }
         let edges = (0..nodes.len()).map(|_| OnceLock::new()).collect();
-        Self { nodes, edges, repeated: Repeated::default() }
+        Self { nodes, edges }
+    }
+
+    /// Return the nodes to which a taut path from a start may go first.
+    ///
+    /// From an end that lies inside the tangents of a corner, no path passes that corner
+    /// tangentially: it may lead to every node.
+    fn first_after(&self, obstacles: &Obstacles, start_m: Vec2) -> Vec<usize> {
+        if obstacles.is_hugged(start_m) {
+            return (0..self.nodes.len()).collect();
+        }
+        self.nodes.tangent_to(Node::end(start_m))
     }
 
     /// Return the shortest path between two free points that do not see each other, both included;
@@ -138,24 +147,14 @@ impl VisibilityGraph {
     /// no path, or no point.
     ///
     /// # Complexity
-    /// That of [`Self::field`]; a point costs less the nearer it is to the one before it. Where the
-    /// same points are asked for again and again, the nodes that lead to them are kept: a point
-    /// then costs one visibility test and a sum for each of its nodes.
+    /// That of [`Self::field`]; a point costs less the nearer it is to the one before it.
     pub fn distances_m(
         &self,
         obstacles: &Obstacles,
         start_m: Vec2,
         targets_m: &[Option<Vec2>],
     ) -> Vec<f64> {
-        let Some(approaches) = self.repeated.approaches(&self.nodes, obstacles, targets_m) else {
-            return distance_tiles::distances_m(
-                &self.field(obstacles, start_m),
-                obstacles,
-                targets_m,
-            );
-        };
-        let search = self.search_all(obstacles, start_m);
-        approaches.distances_m(obstacles, start_m, targets_m, &search.cost_m)
+        distance_tiles::distances_m(&self.field(obstacles, start_m), obstacles, targets_m)
     }
 
     /// Compute the shortest distances from a free point to all places where paths may bend.
@@ -164,16 +163,6 @@ impl VisibilityGraph {
     /// Dijkstra over the whole graph: O(n log n + edges), and the cost of edges that are not
     /// computed yet.
     pub fn field(&self, obstacles: &Obstacles, start_m: Vec2) -> DistanceField {
-        let search = self.search_all(obstacles, start_m);
-        let reached = (0..self.nodes.len()).filter(|&i| search.is_closed[i]);
-        DistanceField::new(
-            start_m,
-            reached.map(|i| Reached::new(self.nodes.at(i), search.cost_m[i])),
-        )
-    }
-
-    /// Search until all nodes that a start reaches are closed; the cost of all others is infinite.
-    fn search_all(&self, obstacles: &Obstacles, start_m: Vec2) -> Search {
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, |_| 0.0);
         while let Some(node) = search.pop(self, obstacles, start_m) {
@@ -182,7 +171,11 @@ impl VisibilityGraph {
                 search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
             }
         }
-        search
+        let reached = (0..self.nodes.len()).filter(|&i| search.is_closed[i]);
+        DistanceField::new(
+            start_m,
+            reached.map(|i| Reached::new(self.nodes.at(i), search.cost_m[i])),
+        )
     }
 
     fn edges_of(&self, obstacles: &Obstacles, node: u32) -> &[Edge] {
@@ -249,7 +242,7 @@ impl Search {
         start_m: Vec2,
         ahead_m: impl Fn(u32) -> f64,
     ) {
-        let open = graph.nodes.next_to(obstacles, start_m).into_iter().map(|i| {
+        let open = graph.first_after(obstacles, start_m).into_iter().map(|i| {
             let (node_index, cost_m) = (i as u32, distance_2d_m(start_m, graph.nodes.point_m(i)));
             let bound_m = cost_m + ahead_m(node_index);
             Open { bound_m, cost_m, node: node_index, parent: START }
