@@ -5,6 +5,7 @@ It lets everything between an agent and a model be tried without a key: `evonav 
 
 import json
 import random
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -140,10 +141,9 @@ def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> It
         InvalidArgumentError: The port is not available.
     """
     try:
-        http = ThreadingHTTPServer((host, port), _handler(server))
+        http = _QuietServer((host, port), _handler(server))
     except OSError as error:
         raise InvalidArgumentError(f"{host}:{port}: {error}") from error
-    http.daemon_threads = True
     server.url = f"http://{host}:{http.server_port}/v1"
     thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
@@ -153,6 +153,16 @@ def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> It
         http.shutdown()
         http.server_close()
         thread.join()
+
+
+class _QuietServer(ThreadingHTTPServer):
+    """Prints no traceback for a client that has gone, as those of an interrupted run have."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as in the library
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
 
 
 def _handler(server: MockServer) -> type[BaseHTTPRequestHandler]:
