@@ -133,7 +133,7 @@ impl House {
     }
 
     fn room_of(&self, x_m: f64, z_m: f64) -> Option<&str> {
-        Some(self.inner.rooms[self.inner.room_of([x_m, z_m])?].id.as_str())
+        self.inner.room_id_of([x_m, z_m])
     }
 
     #[pyo3(signature = (*, allow_unknown_assets))]

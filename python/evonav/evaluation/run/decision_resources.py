@@ -8,6 +8,7 @@ from pydantic import Field
 
 from evonav.component import Component
 from evonav.decision.vlm.ledger import LEDGER_NAME
+from evonav.decision.vlm.shared_file import fold_log
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.settings_model import SettingError, Settings
 
@@ -73,8 +74,6 @@ class DecisionResources:
 
 def fold_logs(decision: Component[Any]) -> None:
     """Make the files of a run's answers and costs whole, after the processes that wrote to them have ended."""
-    from evonav.decision.vlm.shared_file import fold_log
-
     for key in ("cache", "ledger"):
         if (path := decision.host_options.get(key)) is not None:
             fold_log(Path(path))

@@ -190,6 +190,11 @@ impl House {
         self.rooms.iter().position(|room| polygon_contains(&room.polygon_m, point_m))
     }
 
+    /// Return the id of the first room whose floor contains `point_m`.
+    pub fn room_id_of(&self, point_m: Vec2) -> Option<&str> {
+        Some(self.rooms[self.room_of(point_m)?].id.as_str())
+    }
+
     /// Return the index in [`House::objects`] of the object with an id.
     pub fn object_index(&self, id: &str) -> Option<usize> {
         self.index.get(id).copied()

@@ -95,7 +95,7 @@ fn reachable_rooms(house: &House, scene: &Scene, from_m: Vec2) -> BTreeSet<Strin
     let navigation =
         Navigation::build(scene, AgentBody::DEFAULT, NavigationConfig::default()).unwrap();
     let positions = navigation.reachable_positions(from_m, 0.25).unwrap();
-    positions.iter().filter_map(|&p| Some(house.rooms[house.room_of(p)?].id.clone())).collect()
+    positions.iter().filter_map(|&p| house.room_id_of(p).map(str::to_owned)).collect()
 }
 
 /// Checks every transition of a task, and returns how many additions, removals, states and moves

@@ -62,8 +62,8 @@ fn edges_naive(map: &OccupancyMap, agent: Cell) -> Vec<Cell> {
     island.into_iter().filter(|cell| (4..=6).contains(&num_unexplored(cell))).collect()
 }
 
-/// Of the five edge cells beside a region that lie best in its direction, the nearest, pushed away
-/// from obstacles.
+/// Ranks the edge cells beside a region by how well they lie in its direction, takes the nearest of
+/// the first five, and pushes it away from obstacles.
 fn position_naive(
     map: &OccupancyMap,
     edges: &[Cell],

@@ -164,8 +164,7 @@ impl PyEmbeddedSimulator {
     }
 
     fn room_of(&self, x_m: f64, z_m: f64) -> Option<&str> {
-        let house = self.core.house();
-        Some(house.rooms[house.room_of([x_m, z_m])?].id.as_str())
+        self.core.house().room_id_of([x_m, z_m])
     }
 
     fn bodies(&self) -> Vec<BodyRecord> {

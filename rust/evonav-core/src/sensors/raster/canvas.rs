@@ -33,16 +33,12 @@ impl Canvas {
     /// Clear the canvas; without tags it has those of earlier pictures, or none. Surfaces that are not
     /// nearer than `empty` will not be drawn.
     pub fn clear(&mut self, width_px: usize, height_px: usize, empty: f32, has_tags: bool) {
-        (self.width_px, self.height_px) = (width_px, height_px);
-        let num_blocks = self.blocks_per_row() * height_px;
-        self.nearness.clear();
-        self.nearness.resize(num_blocks, [empty; LANES]);
+        let blocks = 0..width_px.div_ceil(LANES);
+        self.clear_window([width_px, height_px], empty, 0..height_px, blocks);
         if has_tags {
             self.tags.clear();
-            self.tags.resize(num_blocks, [0; LANES]);
+            self.tags.resize(self.nearness.len(), [0; LANES]);
         }
-        self.store_all();
-        self.draw_within(0..height_px, 0..self.blocks_per_row());
     }
 
     /// Clear some rows and blocks without tags, and store and draw only these until the canvas is
@@ -50,39 +46,43 @@ impl Canvas {
     /// whole canvas is drawn.
     pub fn clear_window(
         &mut self,
-        [width_px, height_px]: [usize; 2],
+        size_px: [usize; 2],
         empty: f32,
         rows: Range<usize>,
         blocks: Range<usize>,
     ) {
-        (self.width_px, self.height_px) = (width_px, height_px);
+        let num_blocks = self.store(size_px, &rows, &blocks);
         self.nearness.clear();
-        self.nearness.resize(rows.len() * blocks.len(), [empty; LANES]);
-        self.store_all();
-        (self.first_stored, self.blocks_stored) = ([rows.start, blocks.start], blocks.len());
+        self.nearness.resize(num_blocks, [empty; LANES]);
         self.draw_within(rows, blocks);
     }
 
-    fn store_all(&mut self) {
-        (self.first_stored, self.blocks_stored) = ([0, 0], self.blocks_per_row());
-        self.left.resize(self.height_px, 0);
-        self.right.resize(self.height_px, 0);
+    /// Store some rows and blocks of a canvas of this size; return how many blocks these are.
+    fn store(
+        &mut self,
+        [width_px, height_px]: [usize; 2],
+        rows: &Range<usize>,
+        blocks: &Range<usize>,
+    ) -> usize {
+        (self.width_px, self.height_px) = (width_px, height_px);
+        (self.first_stored, self.blocks_stored) = ([rows.start, blocks.start], blocks.len());
+        self.left.resize(height_px, 0);
+        self.right.resize(height_px, 0);
+        rows.len() * blocks.len()
     }
 
     /// Clear some rows and blocks, and draw only on them until the canvas is cleared again. Their
     /// pixels get the same values as when the whole canvas is drawn.
     pub fn clear_within(
         &mut self,
-        [width_px, height_px]: [usize; 2],
+        size_px @ [width_px, height_px]: [usize; 2],
         empty: f32,
         rows: Range<usize>,
         blocks: Range<usize>,
     ) {
-        (self.width_px, self.height_px) = (width_px, height_px);
-        let num_blocks = self.blocks_per_row() * height_px;
+        let num_blocks = self.store(size_px, &(0..height_px), &(0..width_px.div_ceil(LANES)));
         self.nearness.resize(num_blocks, [empty; LANES]);
         self.tags.resize(num_blocks, [0; LANES]);
-        self.store_all();
         for row in rows.clone() {
             let first = self.row_blocks(row).start;
             self.nearness[first + blocks.start..first + blocks.end].fill([empty; LANES]);

@@ -29,7 +29,7 @@ const SIDE: usize = 64;
 const ROWS: usize = SIDE + 2;
 const COLUMNS: usize = SIDE + 2 * LANES;
 
-/// Parts that are drawn before it is looked whether the next ones may still be seen.
+/// Number of parts after whose drawing the next ones are checked: they may all be hidden.
 const LOOKED_AT: usize = 4;
 /// Cosine between a face's normal and the sun below which its nearness may be rounded by more than
 /// [`ROUNDING_M`].

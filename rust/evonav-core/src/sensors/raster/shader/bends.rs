@@ -1,7 +1,5 @@
 //! Darkness in concave corners and around silhouettes, from depth alone.
 
-use evonav_simd::Kernel;
-
 use crate::sensors::raster::{
     canvas::{Canvas, LANES},
     lens::Optics,
@@ -149,9 +147,7 @@ struct OpenRow<'a> {
     corner: f32,
 }
 
-impl Kernel for OpenRow<'_> {
-    type Output = ();
-
+impl OpenRow<'_> {
     #[inline(always)]
     fn compute(self) {
         const WHOLE: f32 = 32767.0;

@@ -1,7 +1,5 @@
 //! The camera's response to brightness, in numbers of 16 bits.
 
-use evonav_simd::Kernel;
-
 use crate::sensors::raster::canvas::LANES;
 
 /// Brightness as a number of 16 bits, a grey level.
@@ -28,11 +26,9 @@ pub(super) struct Develop<'a> {
     pub pixels: &'a mut [u8],
 }
 
-impl Kernel for Develop<'_> {
-    type Output = ();
-
+impl Develop<'_> {
     #[inline(always)]
-    fn compute(self) {
+    pub(super) fn compute(self) {
         let Self { bright, open, packed, pixels } = self;
         for channel in bright.iter_mut() {
             respond(channel, open);
