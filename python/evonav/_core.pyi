@@ -164,6 +164,31 @@ def assets() -> list[tuple[str, str, _Vec3]]:
 
 # sensors
 
+@final
+class RunImage:
+    """An `(H, W)` image of numbers as runs of equal pixels in its rows."""
+
+    def __new__(cls, shape: tuple[int, int], ends: NDArray[np.int32]) -> RunImage:
+        """Make an image of its height, its width and its `ends`."""
+
+    @staticmethod
+    def of(pixels: NDArray[np.int32]) -> RunImage:
+        """Find the runs of an image."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+
+    @property
+    def ends(self) -> NDArray[np.int32]:
+        """`(N, 2)` one past the last pixel of each run, in row-major order, and the number of its pixels."""
+
+    def pixels(self) -> NDArray[np.int32]:
+        """Return the `(H, W)` number of each pixel."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __reduce__(self) -> tuple[type[RunImage], tuple[tuple[int, int], NDArray[np.int32]]]: ...
+
 def visible_cells(
     blocked: NDArray[np.uint8],
     *,
@@ -175,13 +200,13 @@ def visible_cells(
     range_m: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]: ...
 def number_instances(
-    instances: NDArray[np.int32],
+    instances: NDArray[np.int32] | RunImage,
     is_detectable: NDArray[np.bool_],
     *,
     min_area_px: int,
     max_box_fraction: float,
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
-def renumber_masks(masks: NDArray[np.int32], numbers: NDArray[np.int32]) -> NDArray[np.int32]:
+) -> tuple[RunImage, list[int]]: ...
+def renumber_masks(masks: NDArray[np.int32] | RunImage, numbers: NDArray[np.int32]) -> RunImage:
     """Replace each detection of `(H, W)` masks by its new number, negative for none."""
 
 def draw_normals(seed: int, labels: Sequence[Sequence[str]], *, num_draws: int) -> NDArray[np.float64]:
@@ -234,10 +259,10 @@ def noisy_depth(
     seed: int,
     labels: Sequence[str],
 ) -> NDArray[np.float32]: ...
-def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[np.int64]:
+def instance_areas(instances: NDArray[np.int32] | RunImage, num_instances: int) -> NDArray[np.int64]:
     """Count the pixels of each instance, `(N,)`, of an `(H, W)` image: 0 where nothing is, else 1 + index."""
 
-def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int64]:
+def mask_extents(masks: NDArray[np.int32] | RunImage, *, num_masks: int) -> NDArray[np.int64]:
     """Return `(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
 
 def encode_png(rgb: NDArray[np.uint8]) -> bytes:
@@ -451,7 +476,7 @@ def unproject_image(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrin
     """Return the world points `(H, W, 3)` of an `(H, W)` depth image."""
 
 def unproject_masks(
-    view: View, masks: NDArray[np.int32], *, num_detections: int, max_points: int
+    view: View, masks: NDArray[np.int32] | RunImage, *, num_detections: int, max_points: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Return the world points `(N, 3)` behind all masks, mask by mask, and the index after each mask's last point."""
 
@@ -535,7 +560,7 @@ class EmbeddedSimulator:
 
     def render(
         self, pose: Pose, *, rgb: bool, instances: bool
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, RunImage | None]:
         """Render depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
 
     def render_camera(

@@ -12,11 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evonav._core import RunImage
 from evonav.agents.hosting.requests import read_request, write_request
 from evonav.agents.hosting.shared_slots import LEAST_BYTES, NUM_SLOTS, SharedSlots
 from evonav.evaluation.hosting.channel import SharedBlock
 from evonav.sensors.observation import Detections, Observation, View, VisibleOccupancy
 from evonav.world.pose import Pose
+from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Intrinsics
 
 LARGE = LEAST_BYTES // 4
@@ -215,7 +217,7 @@ class OddObservation(Observation):
 
 
 @pytest.mark.parametrize("num_views", [0, 1, 3])
-@pytest.mark.parametrize("how", ["plain", "everything", "odd views", "odd arrays", "odd"])
+@pytest.mark.parametrize("how", ["plain", "runs", "everything", "odd views", "odd arrays", "odd"])
 def test_observations_are_read_as_written(sides, how, num_views):
     rng = np.random.default_rng(0)
     features, rgb = rng.random((2, 7), dtype=np.float32), rng.integers(0, 9, (3, 4, 3), np.uint8)
@@ -223,6 +225,10 @@ def test_observations_are_read_as_written(sides, how, num_views):
     if how == "odd views":
         odd = [OddView(*(getattr(view, name) for name in View.__dataclass_fields__)) for view in seen.views[1:]]
         seen = replace(seen, views=(*seen.views[:1], *odd))
+    elif how == "runs":
+        masks = unexpanded(RunImage.of(np.array([[0, 0, -1, -1], [0, 0, 0, 0], [-1, 0, -1, 0]], np.int32)))
+        detections = Detections(masks, ("Mug",), rng.random(1, dtype=np.float32))
+        seen = replace(seen, views=tuple(replace(view, detections=detections) for view in seen.views))
     elif how == "odd arrays":
         detections = Detections(np.ma.masked_array([1, 2]), ["Mug"], (0.5,), np.array([None, "x"]))
         seen = replace(seen, views=tuple(replace(view, detections=detections) for view in seen.views))
@@ -231,6 +237,7 @@ def test_observations_are_read_as_written(sides, how, num_views):
     block, slots = sides
     number, operation, (read,) = read_request(write_request(7, "act", (seen,), block.write), slots.arrays)
     assert (number, operation) == (7, "act")
+    assert all((type(view.detections.stored_masks) is RunImage) == (how == "runs") for view in read.views)
     assert (type(read), repr(read), list(map(type, read.views))) == (
         type(seen),
         repr(seen),

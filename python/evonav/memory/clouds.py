@@ -48,7 +48,7 @@ def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
     """
     camera_m = view.pose.position_m
     points_m, ends = _core.unproject_masks(
-        view, view.detections.masks, num_detections=len(view.detections.labels), max_points=max_points
+        view, view.detections.stored_masks, num_detections=len(view.detections.labels), max_points=max_points
     )
     limit = np.iinfo(np.int16).max
     offsets_mm = np.rint((points_m - np.array(camera_m, np.float32)) * np.float32(1e3))

@@ -193,7 +193,7 @@ def thumbnail(pixels: NDArray[np.uint8], size_px: int) -> NDArray[np.uint8]:
 
 def boxes_of(detections: Detections) -> list[tuple[int, Box]]:
     """Return number of pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` for one without pixels."""
-    extents = _core.mask_extents(detections.masks, num_masks=len(detections.labels))
+    extents = _core.mask_extents(detections.stored_masks, num_masks=len(detections.labels))
     return [(area_px, (left, top, right, bottom)) for area_px, left, top, right, bottom in extents.tolist()]
 
 

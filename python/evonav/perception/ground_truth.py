@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
+from evonav._core import RunImage
 from evonav.errors import InvalidArgumentError
 from evonav.perception.perception import Percept, StageScene
 from evonav.sensors.observation import Detections
+from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Frame, SceneObject
 
 DETECTED_KINDS = ("object", "door", "window")
@@ -78,21 +80,22 @@ class GroundTruthPerception:
         """
         masks, instances = self.number(frame, objects)
         return Detections(
-            masks=masks,
+            masks=unexpanded(masks),
             labels=tuple(objects[index].category for index in instances),
             confidences=np.ones(len(instances), np.float32),
         )
 
-    def number(self, frame: Frame, objects: Sequence[SceneObject]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    def number(self, frame: Frame, objects: Sequence[SceneObject]) -> tuple[RunImage, list[int]]:
         """Return numbered masks, and the index into `objects` of each: oracle data.
 
         Raises:
             InvalidArgumentError: See `detect`.
         """
-        if frame.instances is None:
+        instances = frame.stored_instances
+        if instances is None:
             raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
         return _core.number_instances(
-            frame.instances,
+            instances,
             self._is_detected if objects is self._objects else _are_detected(objects),
             min_area_px=self.min_px(frame),
             max_box_fraction=self.max_box_fraction,

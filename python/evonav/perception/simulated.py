@@ -21,6 +21,7 @@ from evonav.perception.noise.pose_drift import PoseDrift
 from evonav.perception.perception import Percept, StageScene
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, text_feature
 from evonav.sensors.observation import Detections
+from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Frame, SceneObject
 
 F64 = NDArray[np.float64]
@@ -141,10 +142,11 @@ class NoisyPerception:
     def _detect(self, frame: Frame, view: str) -> Detections:
         """Return the detections of a view, numbered by their first pixel."""
         objects = self._stage().objects
-        truth, instances = _GROUND_TRUTH.number(frame, objects)
+        runs, instances = _GROUND_TRUTH.number(frame, objects)
+        truth = runs.pixels()
         bodies = [objects[index] for index in instances]
         outlines = _core.mask_outlines(truth, frame.depth_m, num_masks=len(bodies))
-        extents = _core.mask_extents(truth, num_masks=len(bodies))
+        extents = _core.mask_extents(runs, num_masks=len(bodies))
         found = self._found(view, bodies, outlines, extents[:, 0] / truth.size)
         labels, sources = list(found.labels), list(range(len(bodies)))
         masks = self._masks(truth, extents, found, sources, view, bodies)
@@ -165,7 +167,7 @@ class NoisyPerception:
             features = self._features(found, sources, view, bodies, [what for _, _, what in phantoms], labels)
             features = features[order]
         return Detections(
-            masks=numbered,
+            masks=unexpanded(numbered),
             labels=tuple(labels[number] for number in order),
             confidences=np.array([confidences[number] for number in order], np.float32),
             features=features,

@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
+from evonav._core import RunImage
 from evonav.world.pose import Pose
+from evonav.world.run_images import stored, unexpanded, with_run_images
 from evonav.world.simulator import Intrinsics
 
 
+@with_run_images("masks")
 @dataclass(frozen=True, slots=True)
 class Detections:
     """Objects found in one image. Detection `i` covers `masks == i`; its number means nothing in other views."""
@@ -25,6 +28,11 @@ class Detections:
     features: NDArray[np.float32] | None = field(default=None, repr=False)
     """`(N, D)` unit image features (CLIP), if the perception computes them."""
 
+    @property
+    def stored_masks(self) -> NDArray[np.int32] | RunImage:
+        """The masks as they are stored, perhaps as runs of equal pixels; the core takes both."""
+        return cast("NDArray[np.int32] | RunImage", stored(self, "masks"))
+
     def taken(self, indices: Sequence[int]) -> "Detections":
         """Return some of the detections, numbered anew in the order given; the pixels of the others become -1."""
         taken = list(indices)
@@ -33,7 +41,7 @@ class Detections:
         numbers = np.full(len(self.labels), -1, np.int32)
         numbers[taken] = np.arange(len(taken), dtype=np.int32)
         return Detections(
-            masks=_core.renumber_masks(self.masks, numbers),
+            masks=unexpanded(_core.renumber_masks(self.stored_masks, numbers)),
             labels=tuple(self.labels[index] for index in taken),
             confidences=self.confidences[taken],
             features=None if self.features is None else self.features[taken],

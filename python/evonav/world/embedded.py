@@ -14,6 +14,7 @@ from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.world.appearance import Change, changes_json
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
+from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 _Position = tuple[float, float, float]
@@ -201,7 +202,8 @@ class EmbeddedSimulator:
         """
         at = (pose or self._pose).canonical()
         depth_m, colours, ids = self._world.render(at, rgb=rgb, instances=instances)
-        return Frame(replace(at, y_m=self.config.camera_height_m), self.intrinsics, depth_m, colours, ids)
+        at = replace(at, y_m=self.config.camera_height_m)
+        return Frame(at, self.intrinsics, depth_m, colours, None if ids is None else unexpanded(ids))
 
     def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
         """Render any camera; ceilings are seen from below only, so views from above show the rooms.

@@ -4,12 +4,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Literal, Protocol
+from typing import Literal, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav._core import RunImage
 from evonav.world.pose import Pose
+from evonav.world.run_images import stored, with_run_images
 
 
 class Action(Enum):
@@ -105,6 +107,7 @@ class SimulatorConfig:
         return replace(pose, yaw_rad=pose.yaw_rad + turn_rad).canonical()
 
 
+@with_run_images("instances")
 @dataclass(frozen=True, slots=True)
 class Frame:
     """A simulator's images at one camera pose. It contains instance ids, so it is for evaluators only."""
@@ -118,6 +121,11 @@ class Frame:
     """`(H, W, 3)` colours; `None` if not requested."""
     instances: NDArray[np.int32] | None = None
     """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the `SceneObject`; `None` if not requested."""
+
+    @property
+    def stored_instances(self) -> NDArray[np.int32] | RunImage | None:
+        """The instances as they are stored, perhaps as runs of equal pixels; the core takes both."""
+        return cast("NDArray[np.int32] | RunImage | None", stored(self, "instances"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,9 @@ use evonav_core::{
         },
         occupancy::OccupancyMap,
     },
-    sensors::{camera::Camera, unproject::MaskedDepth, visible_cells::visible_cells},
+    sensors::{
+        camera::Camera, runs::RunImage, unproject::MaskedDepth, visible_cells::visible_cells,
+    },
 };
 
 const SIDE_PX: usize = 300;
@@ -63,6 +65,10 @@ fn look(boxes: &[[f64; 3]], camera: &Camera) -> (Vec<f32>, Vec<i32>) {
     (0..SIDE_PX * SIDE_PX).map(cast).unzip()
 }
 
+fn runs(masks: &[i32]) -> RunImage {
+    RunImage::of(masks, SIDE_PX).expect("whole rows")
+}
+
 /// Each box seen from four sides and above.
 fn full_map(config: ObjectMapConfig) -> ObjectMap {
     let mut map = ObjectMap::new(config).expect("a valid configuration");
@@ -72,6 +78,7 @@ fn full_map(config: ObjectMapConfig) -> ObjectMap {
         {
             let camera = camera(x + dx, y + 0.7, z + dz, turn * quarter, 0.7);
             let (depth_m, masks) = look(&[[x, y, z]], &camera);
+            let masks = runs(&masks);
             let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
             let labels = ["Box".to_owned()];
             let view = DetectedView { image, labels: &labels, confidences: &[1.0], features: &[] };
@@ -92,7 +99,7 @@ fn bench_objects(c: &mut Criterion) {
     areas.sort_by(|a, b| b.cmp(a));
     areas.truncate(20);
     let number = |mask: &i32| areas.iter().position(|a| a.1 == *mask).map_or(-1, |i| i as i32);
-    let masks: Vec<i32> = masks.iter().map(number).collect();
+    let masks = runs(&masks.iter().map(number).collect::<Vec<_>>());
     let labels = vec!["Box".to_owned(); 20];
     let confidences = [1.0; 20];
     let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
@@ -127,7 +134,7 @@ fn bench_objects(c: &mut Criterion) {
     bench_forgetting(c, &map, &camera, &depth_m);
     // As many views as fill the map: the next one is due for a clean-up.
     let due = full_map(ObjectMapConfig { views_per_cleanup: 401, ..config });
-    let nothing = vec![-1; masks.len()];
+    let nothing = runs(&[-1; SIDE_PX * SIDE_PX]);
     let image = MaskedDepth { masks: &nothing, ..image };
     let view = DetectedView { image, labels: &[], confidences: &[], features: &[] };
     c.bench_function("objects/clean_up_100_entries", |b| {

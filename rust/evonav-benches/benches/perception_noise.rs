@@ -14,6 +14,7 @@ use evonav_core::{
     sensors::{
         camera::Camera,
         instance_masks::{MaskFilter, number_instances},
+        runs::RunImage,
     },
 };
 
@@ -41,7 +42,10 @@ fn bench_noise(c: &mut Criterion) {
     let instances: Vec<i32> = masks.iter().map(|mask| mask + 1).collect();
     c.bench_function("noise/ground_truth_300x300", |b| {
         let filter = MaskFilter { min_area_px: 90, max_box_fraction: 1.0 };
-        b.iter(|| number_instances(black_box(&instances), SIDE_PX, &[true; 20], filter));
+        b.iter(|| {
+            let instances = RunImage::of(black_box(&instances), SIDE_PX).expect("whole rows");
+            number_instances(&instances, &[true; 20], filter)
+        });
     });
     c.bench_function("noise/outlines_300x300", |b| {
         b.iter(|| mask_outlines(black_box(&masks), &depth_m, SIDE_PX, 20));

@@ -16,6 +16,7 @@ use evonav_core::{
         png::encode_png,
         raster::{FrameBuffer, Light, Style, Want, render, render_lit, visible_px},
         ray_caster::RayCaster,
+        runs::RunImage,
         visible_bodies::visible_bodies,
     },
     textures::{MOST_PLACES, Sums, Texture, texture_of},
@@ -82,7 +83,10 @@ fn bench_raster(c: &mut Criterion) {
     let want = Want { rgb: None, instances: true };
     render(&mesh, &cameras_300[0], want, &mut frame).expect("a camera in the house");
     c.bench_function("ground_truth/instance_areas_300x300", |b| {
-        b.iter(|| instance_areas(black_box(&frame.instances), scene.bodies.len()));
+        b.iter(|| {
+            let instances = RunImage::of(black_box(&frame.instances), 300).expect("whole rows");
+            instance_areas(&instances, scene.bodies.len())
+        });
     });
     // A reference image of a task.
     render(

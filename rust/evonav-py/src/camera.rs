@@ -10,7 +10,7 @@ use evonav_core::{
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays, error};
+use crate::{arrays, error, run_image::NumberImage};
 
 /// `evonav.world.pose.Pose`.
 #[derive(FromPyObject)]
@@ -78,12 +78,12 @@ pub fn unproject_image<'py>(
 pub fn unproject_masks<'py>(
     py: Python<'py>,
     view: DepthImage<'py>,
-    masks: PyReadonlyArray2<'py, i32>,
+    masks: NumberImage<'py>,
     num_detections: usize,
     max_points: usize,
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<i64>>)> {
     let (camera, depth_m) = view.borrow()?;
-    let (masks, _) = arrays::row_major("masks", &masks)?;
+    let masks = &*masks.runs(py, "masks")?;
     let image = MaskedDepth { camera, depth_m, masks };
     let clouds = py
         .detach(|| unproject::unproject_masks(image, num_detections, max_points))

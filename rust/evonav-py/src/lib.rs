@@ -12,6 +12,7 @@ mod inspection;
 mod memory;
 mod perception;
 mod resampling;
+mod run_image;
 mod sensors;
 mod simulator;
 mod unigoal;
@@ -47,6 +48,7 @@ mod _core {
             },
         },
         resampling::draw_counts,
+        run_image::RunImage,
         sensors::{
             decode_png, encode_png, instance_areas, mask_extents, number_instances, renumber_masks,
             visible_cells,

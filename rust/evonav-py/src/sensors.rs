@@ -11,7 +11,10 @@ use numpy::{
 };
 use pyo3::{prelude::*, types::PyBytes};
 
-use crate::{arrays, error};
+use crate::{
+    arrays, error,
+    run_image::{NumberImage, RunImage},
+};
 
 /// Return the visible cells: free ones and blocked ones.
 #[pyfunction]
@@ -39,49 +42,41 @@ pub fn visible_cells<'py>(
 /// Renumber an instance image; return masks and instances of the detections.
 #[pyfunction]
 #[pyo3(signature = (instances, is_detectable, *, min_area_px, max_box_fraction))]
-#[expect(clippy::type_complexity, reason = "a pair of arrays")]
 pub fn number_instances<'py>(
     py: Python<'py>,
-    instances: PyReadonlyArray2<'py, i32>,
+    instances: NumberImage<'py>,
     is_detectable: PyReadonlyArray1<'py, bool>,
     min_area_px: usize,
     max_box_fraction: f64,
-) -> PyResult<(Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<i64>>)> {
-    let (image, shape) = arrays::row_major("instances", &instances)?;
-    let is_detectable = is_detectable.as_slice()?;
+) -> PyResult<(RunImage, Vec<usize>)> {
     let filter = instance_masks::MaskFilter { min_area_px, max_box_fraction };
-    let masks = py
-        .detach(|| instance_masks::number_instances(image, shape[1], is_detectable, filter))
+    let image = instances.runs(py, "instances")?;
+    let masks = instance_masks::number_instances(&image, is_detectable.as_slice()?, filter)
         .map_err(error::to_py)?;
-    let instances = masks.instances.into_iter().map(|index| index as i64).collect();
-    Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
+    Ok((RunImage::new(masks.labels), masks.instances))
 }
 
 /// Give the detections of masks other numbers.
 #[pyfunction]
-pub fn renumber_masks<'py>(
-    py: Python<'py>,
-    masks: PyReadonlyArray2<'py, i32>,
-    numbers: PyReadonlyArray1<'py, i32>,
-) -> PyResult<Bound<'py, PyArray2<i32>>> {
-    let (image, shape) = arrays::row_major("masks", &masks)?;
-    let numbers = numbers.as_slice()?;
-    let renumbered = py
-        .detach(|| instance_masks::renumber_masks(image, shape[1], numbers))
-        .map_err(error::to_py)?;
-    arrays::image_of(py, renumbered, shape)
+pub fn renumber_masks(
+    py: Python<'_>,
+    masks: NumberImage<'_>,
+    numbers: PyReadonlyArray1<'_, i32>,
+) -> PyResult<RunImage> {
+    let masks = masks.runs(py, "masks")?;
+    let renumbered = instance_masks::renumber_masks(&masks, numbers.as_slice()?);
+    renumbered.map(RunImage::new).map_err(error::to_py)
 }
 
 /// Count the pixels of each instance.
 #[pyfunction]
 pub fn instance_areas<'py>(
     py: Python<'py>,
-    instances: PyReadonlyArray2<'py, i32>,
+    instances: NumberImage<'py>,
     num_instances: usize,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
-    let (image, _) = arrays::row_major("instances", &instances)?;
-    let areas =
-        py.detach(|| instance_masks::instance_areas(image, num_instances)).map_err(error::to_py)?;
+    let image = instances.runs(py, "instances")?;
+    let areas = instance_masks::instance_areas(&image, num_instances).map_err(error::to_py)?;
     Ok(PyArray1::from_vec(py, areas))
 }
 
@@ -90,13 +85,11 @@ pub fn instance_areas<'py>(
 #[pyo3(signature = (masks, *, num_masks))]
 pub fn mask_extents<'py>(
     py: Python<'py>,
-    masks: PyReadonlyArray2<'py, i32>,
+    masks: NumberImage<'py>,
     num_masks: usize,
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
-    let (image, shape) = arrays::row_major("masks", &masks)?;
-    let extents = py
-        .detach(|| instance_masks::mask_extents(image, shape[1], num_masks))
-        .map_err(error::to_py)?;
+    let masks = masks.runs(py, "masks")?;
+    let extents = instance_masks::mask_extents(&masks, num_masks).map_err(error::to_py)?;
     let row = |extent: instance_masks::Extent| {
         let [[top, bottom], [left, right]] = [extent.rows, extent.cols];
         [extent.area_px, left, top, right, bottom].map(|px| px as i64)

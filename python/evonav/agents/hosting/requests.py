@@ -12,17 +12,19 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from evonav._core import RunImage
 from evonav.agents.hosting.shared_slots import Places
 from evonav.sensors.observation import Detections, Observation, View, VisibleOccupancy
 from evonav.world.pose import Pose
+from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Intrinsics
 
 Parts: TypeAlias = Any
 """Tuples, lists, numbers and texts."""
 
 _KINDS = (View, Pose, Intrinsics, Detections, VisibleOccupancy)
-_POSE, _INTRINSICS, _DETECTIONS, _VIEW, _OBSERVATION = (
-    attrgetter(*(field.name for field in fields(kind))) for kind in (Pose, Intrinsics, Detections, View, Observation)
+_POSE, _INTRINSICS, _VIEW, _OBSERVATION = (
+    attrgetter(*(field.name for field in fields(kind))) for kind in (Pose, Intrinsics, View, Observation)
 )
 
 
@@ -86,20 +88,23 @@ def _view_parts(view: View, arrays: list[Any]) -> Parts:
     pose, intrinsics, depth_m, detections, occupancy, rgb = _VIEW(view)
     if (type(view), type(pose), type(intrinsics), type(detections), type(occupancy)) != _KINDS:
         return view
-    masks, labels, confidences, features = _DETECTIONS(detections)
-    arrays += (depth_m, masks, confidences, features, occupancy.free, occupancy.blocked, rgb)
-    return _POSE(pose), _INTRINSICS(intrinsics), labels
+    masks, shape = detections.stored_masks, None
+    if type(masks) is RunImage:
+        masks, shape = masks.ends, masks.shape
+    arrays += (depth_m, masks, detections.confidences, detections.features, occupancy.free, occupancy.blocked, rgb)
+    return _POSE(pose), _INTRINSICS(intrinsics), shape, detections.labels
 
 
 def _view_of(parts: Parts, arrays: Iterator[Any]) -> View:
     if isinstance(parts, View):
         return parts
-    pose, intrinsics, labels = parts
+    pose, intrinsics, shape, labels = parts
+    depth_m, masks = next(arrays), next(arrays)
     return View(
         Pose(*pose),
         Intrinsics(*intrinsics),
-        next(arrays),
-        Detections(next(arrays), labels, next(arrays), next(arrays)),
+        depth_m,
+        Detections(masks if shape is None else unexpanded(RunImage(shape, masks)), labels, next(arrays), next(arrays)),
         VisibleOccupancy(next(arrays), next(arrays)),
         next(arrays),
     )

@@ -243,9 +243,10 @@ class StalenessTracker:
 
     def look(self, frame: Frame) -> None:
         """Take in a view as the simulator rendered it, with instances."""
-        if frame.instances is None:
+        instances = frame.stored_instances
+        if instances is None:
             return
-        is_visible = _core.instance_areas(frame.instances, len(self._objects)) >= self._min_visible_px
+        is_visible = _core.instance_areas(instances, len(self._objects)) >= self._min_visible_px
         self.is_target_visible |= self._target is not None and bool(is_visible[self._target])
         offsets_m = self._ground_m - (frame.pose.x_m, frame.pose.z_m)
         is_visible &= self._is_object & (np.hypot(offsets_m[:, 0], offsets_m[:, 1]) <= EVIDENCE_RANGE_M)

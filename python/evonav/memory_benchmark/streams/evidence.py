@@ -89,8 +89,8 @@ def visible_px(frame: Frame, bodies: Bodies, range_m: float = EVIDENCE_RANGE_M) 
         bodies: The simulator's bodies, in instance order.
         range_m: Largest distance on the ground plane between camera and centre of the object.
     """
-    assert frame.instances is not None
-    areas = _core.instance_areas(frame.instances, len(bodies))
+    assert frame.stored_instances is not None
+    areas = _core.instance_areas(frame.stored_instances, len(bodies))
     found = {}
     for index in np.flatnonzero(areas).tolist():
         body = bodies[index]

@@ -59,8 +59,8 @@ def _moment(spec: StreamSpec, before: str, after: str, poses: list[Pose], earlie
         number = 0
         for simulator, own, other in zip(simulators, positions_m, reversed(positions_m), strict=True):
             frame = simulator.render(poses[index], rgb=False)
-            assert frame.instances is not None
-            areas = _core.instance_areas(frame.instances, len(simulator.objects))
+            assert frame.stored_instances is not None
+            areas = _core.instance_areas(frame.stored_instances, len(simulator.objects))
             is_changed = [
                 body.id in own and (body.id not in other or math.dist(own[body.id], other[body.id]) > MOVED_MIN_M)
                 for body in simulator.objects

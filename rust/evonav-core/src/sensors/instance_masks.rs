@@ -2,7 +2,7 @@
 
 use crate::{
     Error,
-    sensors::runs::{Run, runs},
+    sensors::runs::{Run, RunImage},
 };
 
 /// The smallest and largest masks that count as detections.
@@ -18,7 +18,7 @@ pub struct MaskFilter {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Masks {
     /// Detection of each pixel, -1 where none.
-    pub labels: Vec<i32>,
+    pub labels: RunImage,
     /// Instance (index into the caller's table) of each detection.
     pub instances: Vec<usize>,
 }
@@ -27,28 +27,25 @@ pub struct Masks {
 /// numbers do not reveal the instances.
 ///
 /// # Arguments
-/// * `image` - row-major, `width_px` a row; 0 where nothing is, else 1 + index into `is_detectable`.
+/// * `image` - 0 where nothing is, else 1 + index into `is_detectable`.
 /// * `is_detectable` - whether each instance may be detected (walls may not).
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the image is not whole rows, holds a number outside the table, or the filter is not a number.
+/// [`Error::InvalidArgument`] if the image holds a number outside the table, or the filter is not a number.
 ///
 /// # Complexity
-/// O(pixels + instances), two passes.
+/// O(runs + instances), two passes.
 pub fn number_instances(
-    image: &[i32],
-    width_px: usize,
+    image: &RunImage,
     is_detectable: &[bool],
     filter: MaskFilter,
 ) -> Result<Masks, Error> {
     Error::require("max_box_fraction", filter.max_box_fraction, "in 0..=1", |v| {
         (0.0..=1.0).contains(&v)
     })?;
-    Error::require_rows("instances", image.len(), width_px)?;
     let mut extents = vec![Extent::EMPTY; is_detectable.len()];
     let mut order = Vec::new();
-    let found: Vec<Run> = runs(image, width_px).collect();
-    for run in &found {
+    for run in image.runs() {
         let instance = usize::try_from(run.value).ok().and_then(|value| value.checked_sub(1));
         let Some(instance) = instance else {
             Error::require("instances", run.value, "0 or 1 + an index of an object", |v| v == 0)?;
@@ -60,9 +57,10 @@ pub fn number_instances(
         if extent.area_px == 0 {
             order.push(instance);
         }
-        extent.add(run);
+        extent.add(&run);
     }
-    let max_box_px = filter.max_box_fraction * image.len() as f64;
+    let [height_px, width_px] = image.shape();
+    let max_box_px = filter.max_box_fraction * (height_px * width_px) as f64;
     order.retain(|&instance| {
         let extent = &extents[instance];
         is_detectable[instance]
@@ -73,35 +71,26 @@ pub fn number_instances(
     for (number, &instance) in order.iter().enumerate() {
         number_of[instance + 1] = number as i32;
     }
-    let mut labels = Vec::with_capacity(image.len());
-    for run in found {
-        labels.resize(labels.len() + run.len(), number_of[run.value as usize]);
-    }
+    let labels = image.renumbered(|value| Ok(number_of[value as usize]))?;
     Ok(Masks { labels, instances: order })
 }
 
 /// Give the detections of an image other numbers.
 ///
 /// # Arguments
-/// * `masks` - row-major, `width_px` a row; negative where nothing is.
+/// * `masks` - negative where nothing is.
 /// * `numbers` - new number of each detection, negative for none.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the image is not whole rows, or holds a number outside the table.
+/// [`Error::InvalidArgument`] if the image holds a number outside the table.
 ///
 /// # Complexity
-/// O(pixels).
-pub fn renumber_masks(masks: &[i32], width_px: usize, numbers: &[i32]) -> Result<Vec<i32>, Error> {
-    Error::require_rows("masks", masks.len(), width_px)?;
-    let mut renumbered = Vec::with_capacity(masks.len());
-    for run in runs(masks, width_px) {
-        let number = match usize::try_from(run.value) {
-            Err(_) => -1,
-            Ok(mask) => *numbers.get(mask).ok_or_else(|| outside(run.value))?,
-        };
-        renumbered.resize(renumbered.len() + run.len(), number);
-    }
-    Ok(renumbered)
+/// O(runs).
+pub fn renumber_masks(masks: &RunImage, numbers: &[i32]) -> Result<RunImage, Error> {
+    masks.renumbered(|mask| match usize::try_from(mask) {
+        Err(_) => Ok(-1),
+        Ok(index) => numbers.get(index).copied().ok_or_else(|| outside(mask)),
+    })
 }
 
 fn outside(mask: i32) -> Error {
@@ -121,15 +110,15 @@ fn outside(mask: i32) -> Error {
 /// [`Error::InvalidArgument`] if the image holds a number outside the table.
 ///
 /// # Complexity
-/// O(pixels), one pass; a run of equal pixels is added in one step.
-pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, Error> {
+/// O(runs + instances).
+pub fn instance_areas(image: &RunImage, num_instances: usize) -> Result<Vec<i64>, Error> {
     let mut areas = vec![0; num_instances + 1];
-    for run in runs(image, image.len()) {
+    for run in image.runs() {
         let area =
             usize::try_from(run.value).ok().and_then(|value| areas.get_mut(value)).ok_or_else(
                 || Error::invalid("instances", run.value, "0 or 1 + an index of an object"),
             )?;
-        *area += run.len() as i64;
+        *area += run.num_pixels() as i64;
     }
     areas.remove(0);
     Ok(areas)
@@ -138,22 +127,17 @@ pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, E
 /// Return the area and bounding box of each mask.
 ///
 /// # Arguments
-/// * `masks` - row-major, `width_px` a row; negative where nothing is.
+/// * `masks` - negative where nothing is.
 /// * `num_masks` - masks are numbered from 0 to one less than this.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the image is not whole rows, or holds a larger number.
+/// [`Error::InvalidArgument`] if the image holds a larger number.
 ///
 /// # Complexity
-/// O(pixels + masks).
-pub fn mask_extents(
-    masks: &[i32],
-    width_px: usize,
-    num_masks: usize,
-) -> Result<Vec<Extent>, Error> {
-    Error::require_rows("masks", masks.len(), width_px)?;
+/// O(runs + masks).
+pub fn mask_extents(masks: &RunImage, num_masks: usize) -> Result<Vec<Extent>, Error> {
     let mut extents = vec![Extent::EMPTY; num_masks];
-    for run in runs(masks, width_px) {
+    for run in masks.runs() {
         let Ok(mask) = usize::try_from(run.value) else { continue };
         extents.get_mut(mask).ok_or_else(|| outside(run.value))?.add(&run);
     }
@@ -178,10 +162,10 @@ impl Extent {
     fn add(&mut self, run: &Run) {
         let Run { row, cols, .. } = *run;
         *self = if self.area_px == 0 {
-            Self { area_px: run.len(), rows: [row, row + 1], cols }
+            Self { area_px: run.num_pixels(), rows: [row, row + 1], cols }
         } else {
             Self {
-                area_px: self.area_px + run.len(),
+                area_px: self.area_px + run.num_pixels(),
                 rows: [self.rows[0], row + 1],
                 cols: [self.cols[0].min(cols[0]), self.cols[1].max(cols[1])],
             }

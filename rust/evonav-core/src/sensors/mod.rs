@@ -5,7 +5,7 @@ pub mod instance_masks;
 pub mod png;
 pub mod raster;
 pub mod ray_caster;
-pub(crate) mod runs;
+pub mod runs;
 pub mod unproject;
 pub mod visible_bodies;
 pub mod visible_cells;

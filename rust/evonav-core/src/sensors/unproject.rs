@@ -4,7 +4,7 @@ use crate::{
     Error,
     sensors::{
         camera::Camera,
-        runs::{Run, runs},
+        runs::{Run, RunImage},
     },
 };
 
@@ -19,7 +19,7 @@ pub struct MaskedDepth<'a> {
     /// Planar depth, row-major, metres; infinite or not positive where there is none.
     pub depth_m: &'a [f32],
     /// Detection of each pixel, negative if none.
-    pub masks: &'a [i32],
+    pub masks: &'a RunImage,
 }
 
 /// Return the points behind the pixels of each detection.
@@ -46,17 +46,21 @@ pub fn unproject_masks(
     let MaskedDepth { camera, depth_m, masks } = image;
     camera.check()?;
     Error::require("max_points", max_points, "at least 1", |n| n > 0)?;
-    let num_px = camera.width_px * camera.height_px;
-    for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.len())] {
-        Error::require(name, len, "one value a pixel of the camera", |n| n == num_px)?;
+    for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.shape().iter().product())] {
+        Error::require(name, len, "one value a pixel of the camera", |n| {
+            n == camera.width_px * camera.height_px
+        })?;
     }
+    Error::require("masks", masks.shape()[1], "as wide as the camera's image", |n| {
+        n == camera.width_px
+    })?;
     if let Some(depth) = first_nan(depth_m) {
         return Err(Error::invalid("depth_m", depth, "not NaN"));
     }
     let depth_of = |run: &Run| &depth_m[run.row * camera.width_px..][run.cols[0]..run.cols[1]];
     let mut found: Vec<(usize, Run)> = Vec::new();
     let mut num_px = vec![0; num_detections];
-    for run in runs(masks, camera.width_px) {
+    for run in masks.runs() {
         let Ok(detection) = usize::try_from(run.value) else { continue };
         let count = num_px.get_mut(detection).ok_or_else(|| {
             Error::invalid("masks", run.value, "negative or the index of a detection")

@@ -13,6 +13,7 @@ use crate::{
     sensors::{
         instance_masks::{MaskFilter, number_instances},
         raster::FrameBuffer,
+        runs::RunImage,
     },
     simulator::{
         actions::{Action, Strides, act, set_down},
@@ -278,13 +279,13 @@ impl Batch {
         }
         if let Some(labels) = images.labels {
             let is_detectable: Vec<bool> = slot.labels.iter().map(|&label| label != 0).collect();
-            let width_px = self.config.image_px[0];
-            let filter = self.config.mask_filter;
-            let masks = number_instances(&frame.instances, width_px, &is_detectable, filter)?;
-            let label_of =
-                |mask: i32| usize::try_from(mask).map_or(0, |m| slot.labels[masks.instances[m]]);
-            for (out, &mask) in labels.iter_mut().zip(&masks.labels) {
-                *out = label_of(mask);
+            let instances = RunImage::of(&frame.instances, self.config.image_px[0])?;
+            let masks = number_instances(&instances, &is_detectable, self.config.mask_filter)?;
+            let mut begin = 0;
+            for &[end, mask] in masks.labels.ends() {
+                let label = usize::try_from(mask).map_or(0, |m| slot.labels[masks.instances[m]]);
+                labels[begin..end as usize].fill(label);
+                begin = end as usize;
             }
         }
         Ok(())

@@ -7,6 +7,7 @@ use evonav_core::{
     },
     sensors::{
         camera::Camera,
+        runs::RunImage,
         unproject::{MaskedDepth, Point},
     },
 };
@@ -176,7 +177,8 @@ fn what_does_not_fit_is_named() {
 #[test]
 fn a_map_compares_the_entries_asked_for_and_names_an_unknown_one() {
     let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
-    let (depth_m, masks) = (vec![2.0; NUM_PX], vec![0; NUM_PX]);
+    let (depth_m, masks) = (vec![2.0; NUM_PX], [0; NUM_PX]);
+    let masks = RunImage::of(&masks, CAMERA.width_px).unwrap();
     let image = MaskedDepth { camera: CAMERA, depth_m: &depth_m, masks: &masks };
     let labels = ["Box".to_owned()];
     let view = DetectedView { image, labels: &labels, confidences: &[1.0], features: &[] };

@@ -9,6 +9,7 @@ use evonav_core::{
     },
     sensors::{
         camera::Camera,
+        runs::RunImage,
         unproject::{MaskedDepth, Point},
     },
 };
@@ -58,6 +59,7 @@ fn map_of(looks: &[(f64, f64, f32)]) -> ObjectMap {
         let depth_m: Vec<f32> = (0..NUM_PX).map(|i| distance_m + 0.01 * (i % 40) as f32).collect();
         let masks: Vec<i32> = (0..NUM_PX).map(|i| (i % 40 / 10) as i32).collect();
         let labels: Vec<String> = (0..4).map(|i| format!("Strip{i}")).collect();
+        let masks = RunImage::of(&masks, 40).unwrap();
         let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
         let view = DetectedView { image, labels: &labels, confidences: &[1.0; 4], features: &[] };
         map.update(&view).unwrap();

@@ -1,22 +1,28 @@
 //! Masks of instances in images, counted pixel by pixel.
 
-use evonav_core::sensors::instance_masks::{
-    MaskFilter, instance_areas, mask_extents, number_instances, renumber_masks,
+use evonav_core::sensors::{
+    instance_masks::{MaskFilter, instance_areas, mask_extents, number_instances, renumber_masks},
+    runs::RunImage,
 };
 use proptest::{collection::vec, prelude::*};
+
+fn runs(pixels: &[i32], width_px: usize) -> RunImage {
+    RunImage::of(pixels, width_px).unwrap()
+}
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn areas_are_counts_of_equal_pixels(image in vec(0..6_i32, 0..60), num_more in 0..3_usize) {
-        let areas = instance_areas(&image, 5 + num_more).unwrap();
+        let row = runs(&image, image.len());
+        let areas = instance_areas(&row, 5 + num_more).unwrap();
         let expected: Vec<i64> = (1..=5 + num_more as i32)
             .map(|value| image.iter().filter(|v| **v == value).count() as i64)
             .collect();
         prop_assert_eq!(areas, expected);
         let fits = image.iter().all(|&value| value <= 3);
-        prop_assert_eq!(instance_areas(&image, 3).is_ok(), fits);
+        prop_assert_eq!(instance_areas(&row, 3).is_ok(), fits);
     }
 
     #[test]
@@ -25,7 +31,7 @@ proptest! {
     ) {
         let stretch = |&(mask, length): &(i32, usize)| std::iter::repeat_n(mask, length);
         let image: Vec<i32> = stretches.iter().flat_map(stretch).take(80).collect();
-        let extents = mask_extents(&image, 10, 4).unwrap();
+        let extents = mask_extents(&runs(&image, 10), 4).unwrap();
         for (mask, extent) in extents.iter().enumerate() {
             let pixels: Vec<usize> = (0..80).filter(|&i| image[i] == mask as i32).collect();
             let range = |f: fn(usize) -> usize| {
@@ -49,9 +55,10 @@ proptest! {
         image.truncate(image.len() / width_px * width_px);
         let number = |&mask: &i32| usize::try_from(mask).map_or(-1, |mask| numbers[mask]);
         let expected: Vec<i32> = image.iter().map(number).collect();
-        prop_assert_eq!(renumber_masks(&image, width_px, &numbers).unwrap(), expected);
+        let masks = runs(&image, width_px);
+        prop_assert_eq!(renumber_masks(&masks, &numbers).unwrap(), runs(&expected, width_px));
         let fits = image.iter().all(|&mask| mask < 3);
-        prop_assert_eq!(renumber_masks(&image, width_px, &numbers[..3]).is_ok(), fits);
+        prop_assert_eq!(renumber_masks(&masks, &numbers[..3]).is_ok(), fits);
     }
 
     #[test]
@@ -62,7 +69,7 @@ proptest! {
         max_box_fraction in 0.3..=1.0,
     ) {
         let filter = MaskFilter { min_area_px, max_box_fraction };
-        let masks = number_instances(&image, 10, &is_detectable, filter).unwrap();
+        let masks = number_instances(&runs(&image, 10), &is_detectable, filter).unwrap();
         let mut expected = Vec::new();
         for &value in image.iter().filter(|v| **v > 0) {
             let pixels: Vec<usize> = (0..80).filter(|&i| image[i] == value).collect();
@@ -81,9 +88,9 @@ proptest! {
             }
         }
         prop_assert_eq!(&masks.instances, &expected);
-        for (label, value) in masks.labels.iter().zip(image) {
+        for (label, value) in masks.labels.pixels().into_iter().zip(image) {
             let number = expected.iter().position(|&i| i as i32 + 1 == value);
-            prop_assert_eq!(*label, number.map_or(-1, |n| n as i32));
+            prop_assert_eq!(label, number.map_or(-1, |n| n as i32));
         }
     }
 }
@@ -94,12 +101,13 @@ fn images_that_do_not_fit_are_named() {
         |name: &str, message: String| assert!(message.contains(&format!("`{name}`")), "{message}");
     let filter = MaskFilter { min_area_px: 1, max_box_fraction: 1.0 };
     for image in [[7, 0], [-1, 0], [i32::MAX, 0]] {
-        names("instances", number_instances(&image, 2, &[true], filter).unwrap_err().to_string());
-        names("instances", instance_areas(&image, 1).unwrap_err().to_string());
+        names(
+            "instances",
+            number_instances(&runs(&image, 2), &[true], filter).unwrap_err().to_string(),
+        );
+        names("instances", instance_areas(&runs(&image, 2), 1).unwrap_err().to_string());
     }
-    names("instances", number_instances(&[0, 0, 0], 2, &[], filter).unwrap_err().to_string());
-    names("masks", mask_extents(&[0, 1], 2, 1).unwrap_err().to_string());
-    names("masks", renumber_masks(&[0, 1], 2, &[0]).unwrap_err().to_string());
-    names("masks", renumber_masks(&[0, 0, 0], 2, &[0]).unwrap_err().to_string());
-    names("masks", mask_extents(&[0, 0, 0], 2, 1).unwrap_err().to_string());
+    names("masks", mask_extents(&runs(&[0, 1], 2), 1).unwrap_err().to_string());
+    names("masks", renumber_masks(&runs(&[0, 1], 2), &[0]).unwrap_err().to_string());
+    names("pixels", RunImage::of(&[0, 0, 0], 2).unwrap_err().to_string());
 }

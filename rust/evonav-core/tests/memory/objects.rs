@@ -6,6 +6,7 @@ use evonav_core::{
     memory::objects::{DetectedView, ObjectMap, ObjectMapConfig, Update},
     sensors::{
         camera::Camera,
+        runs::RunImage,
         unproject::{MaskedDepth, Point, unproject_masks},
     },
 };
@@ -20,7 +21,7 @@ type SolidBox = ([f64; 3], [f64; 3], &'static str);
 
 const SIDE_PX: usize = 48;
 
-fn look(boxes: &[SolidBox], camera: &Camera) -> (Vec<f32>, Vec<i32>) {
+fn look(boxes: &[SolidBox], camera: &Camera) -> (Vec<f32>, RunImage) {
     let cast = |i: usize| {
         let ray = camera.ray([(i % SIDE_PX) as f64 + 0.5, (i / SIDE_PX) as f64 + 0.5]);
         let hit = |(centre, size, _): &SolidBox| {
@@ -39,7 +40,8 @@ fn look(boxes: &[SolidBox], camera: &Camera) -> (Vec<f32>, Vec<i32>) {
         let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0));
         nearest.map_or((f32::INFINITY, -1), |(depth, k)| (depth as f32, k as i32))
     };
-    (0..SIDE_PX * SIDE_PX).map(cast).unzip()
+    let (depth_m, masks): (_, Vec<i32>) = (0..SIDE_PX * SIDE_PX).map(cast).unzip();
+    (depth_m, RunImage::of(&masks, SIDE_PX).unwrap())
 }
 
 fn camera(x: f64, z: f64, yaw_rad: f64) -> Camera {
@@ -300,7 +302,10 @@ fn arguments_that_do_not_fit_are_named_and_change_nothing() {
         |depth_m, masks| DetectedView { image: MaskedDepth { camera, depth_m, masks }, ..good };
     fails(&with(&nan, &masks), "depth_m");
     fails(&with(&depth_m[1..], &masks), "depth_m");
-    fails(&with(&depth_m, &vec![1; masks.len()]), "masks");
+    let row = RunImage::of(&masks.pixels(), depth_m.len()).unwrap();
+    fails(&with(&depth_m, &row), "masks");
+    let ones = RunImage::of(&vec![1; depth_m.len()], SIDE_PX).unwrap();
+    fails(&with(&depth_m, &ones), "masks");
     fails(&DetectedView { confidences: &[], ..good }, "confidences");
     fails(&DetectedView { confidences: &[f32::NAN], ..good }, "confidences");
     fails(&DetectedView { features: &[f32::INFINITY], ..good }, "features");

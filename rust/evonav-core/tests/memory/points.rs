@@ -14,9 +14,10 @@ pub fn distance2(a: Point, b: Point) -> f32 {
 }
 
 pub fn unproject_naive(image: MaskedDepth<'_>, num: usize, max_points: usize) -> Vec<Vec<Point>> {
+    let masks = image.masks.pixels();
     let of_mask = |mask: usize| {
-        let pixels: Vec<usize> = (0..image.masks.len())
-            .filter(|&i| image.masks[i] == mask as i32)
+        let pixels: Vec<usize> = (0..masks.len())
+            .filter(|&i| masks[i] == mask as i32)
             .filter(|&i| image.depth_m[i].is_finite() && image.depth_m[i] > 0.0)
             .collect();
         let stride = pixels.len().div_ceil(max_points).max(1);

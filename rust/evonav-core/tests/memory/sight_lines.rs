@@ -8,6 +8,7 @@ use evonav_core::{
     },
     sensors::{
         camera::Camera,
+        runs::RunImage,
         unproject::{MaskedDepth, Point},
     },
 };
@@ -134,7 +135,8 @@ fn see_wall(map: &mut ObjectMap, eye: Vec3) {
         yaw_rad: 0.0,
         horizon_rad: 0.0,
     };
-    let image = MaskedDepth { camera, depth_m: &[1.0; 10_000], masks: &[0; 10_000] };
+    let masks = RunImage::of(&[0; 10_000], 100).expect("a square image");
+    let image = MaskedDepth { camera, depth_m: &[1.0; 10_000], masks: &masks };
     let labels = ["Screen".to_owned()];
     let view = DetectedView { image, labels: &labels, confidences: &[1.0], features: &[] };
     map.update(&view).expect("a valid view");

@@ -213,7 +213,8 @@ proptest! {
             let all: Vec<Part> = parts.iter().copied().chain(front).collect();
             let want = Want { rgb: Some(Style::Default), instances: true };
             render(&SceneMesh::build(&scene_of(&all)), &camera, want, buffer).unwrap();
-            buffer.take()
+            let (depth_m, rgb) = buffer.take();
+            (depth_m, rgb, buffer.instances.clone())
         };
         let [glazed, opaque, open] =
             [Some(pane), Some(board), None].map(|front| picture(front, &mut buffer));

@@ -43,7 +43,8 @@ fn seen(simulator: &EmbeddedSimulator, style: Style) -> (Vec<f32>, Vec<i32>, Vec
         let yaw_rad = std::f64::consts::TAU * turn as f64 / NUM_TURNS as f64;
         let pose = Pose { yaw_rad, ..OWN.start() };
         simulator.render(&simulator.view(&pose), want, &mut out).expect("a valid view");
-        let (depth_m, rgb, instances) = out.take();
+        let instances = out.instances.clone();
+        let (depth_m, rgb) = out.take();
         found.0.extend(depth_m);
         found.1.extend(instances);
         found.2.extend(rgb);

@@ -1,12 +1,14 @@
 //! `evonav_core::memory::objects`. Shapes, units and errors: `_core.pyi`.
 
+use std::sync::Arc;
+
 use evonav_core::{
     Error,
     memory::objects::{
         self, DetectedView, Entry, ObjectMapConfig, depth_evidence::EvidenceConfig,
         seen_through::SeeThroughConfig, sight_lines::SightConfig,
     },
-    sensors::unproject::MaskedDepth,
+    sensors::{runs::RunImage, unproject::MaskedDepth},
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -15,6 +17,7 @@ use crate::{
     arrays,
     camera::{DepthImage, Intrinsics, PyPose},
     error,
+    run_image::NumberImage,
 };
 
 /// An object entry at the time of the call that returned it.
@@ -98,7 +101,8 @@ impl ObjectMap {
 
     fn update(&mut self, py: Python<'_>, view: View<'_>) -> PyResult<Update> {
         let found = view.detections.extract()?;
-        let (view, map) = (view.detected(&found)?, &mut self.0);
+        let masks = Detections::masks(&found, py)?;
+        let (view, map) = (view.detected(&found, &masks)?, &mut self.0);
         let update = py.detach(|| map.update(&view)).map_err(error::to_py)?;
         let merged = update.merged.into_iter().map(Into::into).collect();
         Ok((update.entry_ids, update.removed, merged))
@@ -111,7 +115,8 @@ impl ObjectMap {
         view: View<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let found = view.detections.extract()?;
-        let view = view.detected(&found)?;
+        let masks = Detections::masks(&found, py)?;
+        let view = view.detected(&found, &masks)?;
         let found = py.detach(|| self.0.compare(entry_id, &view));
         let found = found.map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
@@ -236,18 +241,28 @@ struct View<'py> {
 /// `evonav.sensors.observation.Detections`.
 #[derive(FromPyObject)]
 struct Detections<'py> {
-    masks: PyReadonlyArray2<'py, i32>,
+    stored_masks: NumberImage<'py>,
     labels: Vec<String>,
     confidences: PyReadonlyArray1<'py, f32>,
     features: Option<PyReadonlyArray2<'py, f32>>,
 }
 
+impl Detections<'_> {
+    fn masks(&self, py: Python<'_>) -> PyResult<Arc<RunImage>> {
+        self.stored_masks.runs(py, "masks")
+    }
+}
+
 impl View<'_> {
     /// Return the view as slices, which can be used without the interpreter; the image has the size
     /// of `masks`.
-    fn detected<'a>(&'a self, found: &'a Detections<'_>) -> PyResult<DetectedView<'a>> {
-        let Detections { masks, labels, confidences, features } = found;
-        let (masks, [height_px, width_px]) = arrays::row_major("masks", masks)?;
+    fn detected<'a>(
+        &'a self,
+        found: &'a Detections<'_>,
+        masks: &'a RunImage,
+    ) -> PyResult<DetectedView<'a>> {
+        let Detections { labels, confidences, features, .. } = found;
+        let [height_px, width_px] = masks.shape();
         let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;
         let expected = "as many rows as `masks`";
         Error::require("depth_m", depth_shape[0], expected, |n| n == height_px)

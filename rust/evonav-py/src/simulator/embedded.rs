@@ -3,12 +3,14 @@
 use std::sync::{Arc, Mutex};
 
 use evonav_core::{
+    Error,
     assets::{Catalogue, UnknownAssets},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::{
         camera::{CLIP_M, View},
         raster::{FrameBuffer, Style, Want},
+        runs,
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
@@ -21,14 +23,10 @@ use evonav_core::{
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::{arrays, camera::PyPose, error, house::unknown_assets};
+use crate::{arrays, camera::PyPose, error, house::unknown_assets, run_image::RunImage};
 
-/// Depth, colours and instances of one view.
-type Images<'py> = (
-    Bound<'py, PyArray2<f32>>,
-    Option<Bound<'py, PyArray3<u8>>>,
-    Option<Bound<'py, PyArray2<i32>>>,
-);
+/// Depth, colours and instances of a view.
+type Images<'py, I> = (Bound<'py, PyArray2<f32>>, Option<Bound<'py, PyArray3<u8>>>, Option<I>);
 
 /// Corners, bodies and colours of triangles.
 type Triangles<'py> =
@@ -205,8 +203,10 @@ impl PyEmbeddedSimulator {
         pose: PyPose,
         rgb: bool,
         instances: bool,
-    ) -> PyResult<Images<'py>> {
-        self.images(py, &self.core.view(&pose.pose()), self.core.want(rgb, instances))
+    ) -> PyResult<Images<'py, RunImage>> {
+        let (view, want) = (self.core.view(&pose.pose()), self.core.want(rgb, instances));
+        self.images(py, &view, want, |ids| runs::RunImage::of(ids, view.camera.width_px))
+            .map(|(depth, colours, ids)| (depth, colours, ids.map(RunImage::new)))
     }
 
     #[pyo3(signature = (view, *, rgb, instances))]
@@ -216,8 +216,13 @@ impl PyEmbeddedSimulator {
         view: CameraView,
         rgb: bool,
         instances: bool,
-    ) -> PyResult<Images<'py>> {
-        self.images(py, &view.view(), self.core.want(rgb, instances))
+    ) -> PyResult<Images<'py, Bound<'py, PyArray2<i32>>>> {
+        let view = view.view();
+        let shape = [view.camera.height_px, view.camera.width_px];
+        let take = |ids: &mut Vec<i32>| Ok(std::mem::take(ids));
+        let (depth, colours, ids) = self.images(py, &view, self.core.want(rgb, instances), take)?;
+        let ids = ids.map(|ids| arrays::image_of(py, ids, shape)).transpose()?;
+        Ok((depth, colours, ids))
     }
 
     /// Return the indices of the bodies that AI2-THOR calls visible.
@@ -308,7 +313,14 @@ impl PyEmbeddedSimulator {
 }
 
 impl PyEmbeddedSimulator {
-    fn images<'py>(&self, py: Python<'py>, view: &View, want: Want) -> PyResult<Images<'py>> {
+    /// Render a view, with instances as `of_ids` returns them.
+    fn images<'py, I: Send>(
+        &self,
+        py: Python<'py>,
+        view: &View,
+        want: Want,
+        of_ids: impl FnOnce(&mut Vec<i32>) -> Result<I, Error> + Send,
+    ) -> PyResult<Images<'py, I>> {
         let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
         let (depth, colours, ids) = py
             .detach(|| {
@@ -316,19 +328,19 @@ impl PyEmbeddedSimulator {
                 let free = BUFFERS.try_lock().ok().and_then(|mut buffers| buffers.pop());
                 let mut buffer = free.unwrap_or_default();
                 self.core.render(view, want, &mut buffer)?;
-                let images = buffer.take();
+                let ids = want.instances.then(|| of_ids(&mut buffer.instances)).transpose()?;
+                let (depth, colours) = buffer.take();
                 if height * width <= MAX_REUSED_PX
                     && let Ok(mut buffers) = BUFFERS.try_lock()
                 {
                     buffers.push(buffer);
                 }
-                Ok(images)
+                Ok((depth, colours, ids))
             })
             .map_err(error::to_py)?;
         let depth = arrays::image_of(py, depth, shape)?;
         let of_colours = || arrays::image_of(py, colours, [height, width, 3]);
         let colours = want.rgb.is_some().then(of_colours).transpose()?;
-        let ids = want.instances.then(|| arrays::image_of(py, ids, shape)).transpose()?;
         Ok((depth, colours, ids))
     }
 }

@@ -59,10 +59,9 @@ pub struct FrameBuffer {
 }
 
 impl FrameBuffer {
-    /// Take depth, colours and instances out as vectors of their own.
-    pub fn take(&mut self) -> (Vec<f32>, Vec<u8>, Vec<i32>) {
-        let Self { depth_m, rgb, instances, .. } = self;
-        (std::mem::take(depth_m), std::mem::take(rgb), std::mem::take(instances))
+    /// Take depth and colours out as vectors of their own.
+    pub fn take(&mut self) -> (Vec<f32>, Vec<u8>) {
+        (std::mem::take(&mut self.depth_m), std::mem::take(&mut self.rgb))
     }
 }
 
