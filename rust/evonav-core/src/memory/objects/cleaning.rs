@@ -1,14 +1,16 @@
 //! Clean point clouds.
 
-use std::borrow::Cow;
-
 use crate::{
     geometry::{Aabb, Vec3, distance_2d_m},
     memory::objects::{
         ObjectMapConfig,
         clouds::{
-            cloud::Cloud, dbscan::largest_cluster, one_cluster::Density, point_blocks::PointBlocks,
-            voxel_filter::one_a_voxel, voxels::bounds,
+            cloud::Cloud,
+            density::Density,
+            largest_cluster::{Cluster, largest_cluster},
+            point_blocks::PointBlocks,
+            voxel_filter::one_a_voxel,
+            voxels::bounds,
         },
     },
     sensors::unproject::Point,
@@ -45,16 +47,17 @@ pub(crate) fn clean(
         return None;
     }
     let (mut points, mut blocks) = one_a_voxel(points, config.voxel_m);
-    let mut is_one_cluster = density.is_one_cluster(&blocks.of(&points));
-    if !is_one_cluster {
-        match largest_cluster(&points, config.cluster_radius_m as f32, config.cluster_min_points) {
-            Some(Cow::Borrowed(_)) => is_one_cluster = true,
-            Some(Cow::Owned(cluster)) if cluster.len() >= 5 => {
-                blocks = PointBlocks::new(&cluster, 1.0 / config.voxel_m);
-                points = cluster;
+    let mut is_one_cluster = false;
+    match largest_cluster(&blocks.of(&points), density) {
+        Some(Cluster::Whole) => is_one_cluster = true,
+        Some(Cluster::Part { is_inside, is_only }) => {
+            let cluster = part(&points, &is_inside);
+            if cluster.len() >= 5 {
+                (points, blocks) = (cluster, blocks.part(&is_inside));
+                is_one_cluster = is_only;
             }
-            _ => {}
         }
+        None => {}
     }
     let [min_m, max_m] = bounds(&points)?.map(|corner| corner.map(f64::from));
     let bounds_m = Aabb { min_m, max_m };
@@ -65,18 +68,25 @@ pub(crate) fn clean(
 
 /// Reduce an entry's cloud to its largest cluster, if enough points are left.
 pub(crate) fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig, density: &Density) {
-    if !density.is_one_cluster(&cloud.blocks()) {
-        let (radius_m, min_points) = (config.cluster_radius_m as f32, config.cluster_min_points);
-        match largest_cluster(cloud.points(), radius_m, min_points) {
-            Some(Cow::Borrowed(_)) => {}
-            Some(Cow::Owned(cluster)) if cluster.len() >= 4 => {
+    match largest_cluster(&cloud.blocks(), density) {
+        Some(Cluster::Whole) => cloud.know_one_cluster(),
+        Some(Cluster::Part { is_inside, is_only }) => {
+            let cluster = part(cloud.points(), &is_inside);
+            if cluster.len() >= 4 {
                 *cloud = Cloud::new(&cluster, config.voxel_m, config.overlap_radius_m as f32);
-                return;
+                if is_only {
+                    cloud.know_one_cluster();
+                }
             }
-            _ => return,
         }
+        None => {}
     }
-    cloud.know_one_cluster();
+}
+
+/// Return the points that are inside.
+fn part(points: &[Point], is_inside: &[bool]) -> Vec<Point> {
+    let inside = points.iter().zip(is_inside).filter(|&(_, &is_inside)| is_inside);
+    inside.map(|(&point, _)| point).collect()
 }
 
 /// Return the mean of points; the origin for none.

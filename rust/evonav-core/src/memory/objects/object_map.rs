@@ -11,7 +11,7 @@ use crate::{
     memory::objects::{
         Entry, ObjectMapConfig,
         cleaning::{Patch, centroid_m, clean, denoise, is_within},
-        clouds::{cloud::Cloud, one_cluster::Density, point_blocks::PointBlocks},
+        clouds::{cloud::Cloud, density::Density, point_blocks::PointBlocks},
         depth_evidence::{DepthEvidence, EvidenceConfig, depth_evidence},
         entry::Sighting,
         sight_lines::{SightConfig, reach_m, visible_shares},

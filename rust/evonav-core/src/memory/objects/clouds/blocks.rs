@@ -5,20 +5,20 @@ use crate::{
     sensors::unproject::Point,
 };
 
-/// The points of a cloud by block of 4 x 4 x 4 voxels. Some of them, the old ones, may be known to
-/// be one cluster: more points can only extend it.
+/// The points of a cloud by block of 4 x 4 x 4 voxels. The first of them, the old ones, may be known
+/// to be one cluster: more points can only extend it.
 pub(crate) trait Blocks {
     /// Return the blocks, and a bit for each voxel with points.
     fn blocks(&self) -> &[(Voxel, u64)];
 
-    /// Return the points of a block.
-    fn points(&self, block: usize) -> impl Iterator<Item = Point>;
+    /// Return the points.
+    fn points(&self) -> &[Point];
 
-    /// Return the points of a block that are not old.
-    fn new_points(&self, block: usize) -> impl Iterator<Item = Point>;
+    /// Return the number of old points.
+    fn num_old(&self) -> usize;
 
-    /// Return whether a block has old points.
-    fn has_old(&self, block: usize) -> bool;
+    /// Return the indices of a block's points, descending.
+    fn indices(&self, block: usize) -> impl Iterator<Item = usize>;
 }
 
 /// Return the block of a voxel.

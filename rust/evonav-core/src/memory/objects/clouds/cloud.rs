@@ -246,28 +246,21 @@ pub(crate) struct CloudBlocks<'a> {
     firsts: Vec<u32>,
 }
 
-impl CloudBlocks<'_> {
-    fn indices(&self, block: usize) -> impl Iterator<Item = usize> {
-        chain(&self.cloud.next, self.firsts[block]).map(|index| index as usize)
-    }
-}
-
 impl Blocks for CloudBlocks<'_> {
     fn blocks(&self) -> &[(Voxel, u64)] {
         &self.blocks
     }
 
-    fn points(&self, block: usize) -> impl Iterator<Item = Point> {
-        self.indices(block).map(|index| self.cloud.points[index])
+    fn points(&self) -> &[Point] {
+        &self.cloud.points
     }
 
-    fn new_points(&self, block: usize) -> impl Iterator<Item = Point> {
-        let new = self.indices(block).take_while(|&index| index >= self.cloud.num_old);
-        new.map(|index| self.cloud.points[index])
+    fn num_old(&self) -> usize {
+        self.cloud.num_old
     }
 
-    fn has_old(&self, block: usize) -> bool {
-        self.cloud.num_old > 0 && self.indices(block).any(|index| index < self.cloud.num_old)
+    fn indices(&self, block: usize) -> impl Iterator<Item = usize> {
+        chain(&self.cloud.next, self.firsts[block]).map(|index| index as usize)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Find density clusters of a point cloud.
 
-use std::{borrow::Cow, sync::LazyLock};
+use std::sync::LazyLock;
 
 use crate::{
     grid::components::find,
@@ -32,25 +32,6 @@ pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
     grid.label(&others, &parts)
 }
 
-/// Return the points of the largest cluster (the first of equals), in their order; `None` if all
-/// points are noise. They are borrowed if they are all points.
-pub fn largest_cluster(
-    points: &[Point],
-    radius_m: f32,
-    min_points: usize,
-) -> Option<Cow<'_, [Point]>> {
-    let labels = dbscan(points, radius_m, min_points);
-    if !labels.is_empty() && labels.iter().all(|&label| label == 0) {
-        return Some(Cow::Borrowed(points));
-    }
-    let num = labels.iter().max().map_or(0, |&last| (last + 1) as usize);
-    let mut sizes = vec![0_usize; num];
-    labels.iter().filter(|&&label| label != NOISE).for_each(|&label| sizes[label as usize] += 1);
-    let largest = (0..num).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
-    let is_inside = |&(_, &label): &(&Point, &i32)| label == largest as i32;
-    Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
-}
-
 /// Return the squared distance of two points.
 pub(crate) fn distance2(a: Point, b: Point) -> f32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -66,7 +47,7 @@ struct Grid<'a> {
     /// Points by cell; cell `c` has `fours[starts[c]..starts[c + 1]]`.
     fours: Vec<Four>,
     starts: Vec<u32>,
-    /// Number of points of each cell.
+    /// Number of points of each cell that are not taken out.
     sizes: Vec<u32>,
     cells: Cells,
     /// Steps as in [`STEPS`].
@@ -182,6 +163,7 @@ impl<'a> Grid<'a> {
         let take = |[four, place]: [usize; 2]| {
             let four = &mut self.fours[four];
             four.set(place, [f32::INFINITY; 3]);
+            self.sizes[self.cell_of[four.points[place] as usize] as usize] -= 1;
             four.points[place]
         };
         let mut others: Vec<u32> = others.into_iter().map(take).collect();
@@ -190,25 +172,28 @@ impl<'a> Grid<'a> {
     }
 
     /// Join cells that have core points within the radius of each other; return the part of each
-    /// cell. Cells without core points are parts of their own.
+    /// cell. Cells without core points are of no part.
     fn parts(&self) -> Vec<u32> {
         let mut part_of = vec![NO_PART; self.cells.num()];
         let mut sizes = Vec::new();
         let mut left = Vec::new();
+        let mut num_left = self.sizes.iter().filter(|&&size| size > 0).count();
         for first in 0..self.cells.num() {
-            if part_of[first] != NO_PART {
+            if part_of[first] != NO_PART || self.sizes[first] == 0 {
                 continue;
             }
             let part = sizes.len() as u32;
             part_of[first] = part;
-            sizes.push(0_usize);
+            sizes.push(1_usize);
             left.push(first);
-            while let Some(cell) = left.pop() {
-                sizes[part as usize] += 1;
+            num_left -= 1;
+            while let Some(cell) = left.pop().filter(|_| num_left > 0) {
                 for &step in &self.steps[..NUM_TOUCHING] {
                     let Some(other) = self.cells.beside(cell, step) else { continue };
                     if part_of[other] == NO_PART && self.are_joined(cell, other) {
                         part_of[other] = part;
+                        sizes[part as usize] += 1;
+                        num_left -= 1;
                         left.push(other);
                     }
                 }
@@ -233,10 +218,14 @@ impl<'a> Grid<'a> {
     fn join_rest(&self, part_of: &mut [u32], sizes: &[usize]) {
         let mut parents: Vec<u32> = (0..sizes.len() as u32).collect();
         let largest = (0..sizes.len()).max_by_key(|&part| sizes[part]);
-        let outside = |&cell: &usize| Some(part_of[cell] as usize) != largest;
+        let outside =
+            |&cell: &usize| part_of[cell] != NO_PART && Some(part_of[cell] as usize) != largest;
         for cell in (0..self.cells.num()).filter(outside) {
             for &step in &self.steps[NUM_TOUCHING..] {
                 let Some(other) = self.cells.beside(cell, step) else { continue };
+                if part_of[other] == NO_PART || part_of[other] == part_of[cell] {
+                    continue;
+                }
                 let (a, b) =
                     (find(&mut parents, part_of[cell]), find(&mut parents, part_of[other]));
                 if a != b && self.are_joined(cell, other) {
@@ -244,7 +233,8 @@ impl<'a> Grid<'a> {
                 }
             }
         }
-        part_of.iter_mut().for_each(|part| *part = find(&mut parents, *part));
+        let parts = part_of.iter_mut().filter(|part| **part != NO_PART);
+        parts.for_each(|part| *part = find(&mut parents, *part));
     }
 
     /// Number the clusters in the order of their first core points, then look for one near each of
@@ -252,7 +242,7 @@ impl<'a> Grid<'a> {
     fn label(&self, others: &[u32], parts: &[u32]) -> Vec<i32> {
         let mut labels = vec![0; self.points.len()];
         others.iter().for_each(|&other| labels[other as usize] = NOISE);
-        if parts.iter().any(|&part| part != 0) {
+        if parts.iter().any(|&part| part != 0 && part != NO_PART) {
             let mut number_of = vec![NOISE; self.cells.num()];
             let mut num = 0;
             for (label, &cell) in labels.iter_mut().zip(&self.cell_of).filter(|(l, _)| **l == 0) {

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Points by block of 4 x 4 x 4 voxels, since those of a surface lie together.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct PointBlocks {
     /// Blocks with points, in the order of their first ones, and the [`bit`](Spot::bit)s of the
     /// voxels with points.
@@ -21,7 +21,7 @@ pub(crate) struct PointBlocks {
 }
 
 /// A voxel of [`PointBlocks`].
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Spot(u32);
 
 impl Spot {
@@ -70,6 +70,23 @@ impl PointBlocks {
         Self { blocks, spots }
     }
 
+    /// Return the same for some of the points.
+    pub(crate) fn part(&self, is_inside: &[bool]) -> Self {
+        let mut number_of = vec![END; self.blocks.len()];
+        let mut blocks: Vec<(Voxel, u64)> = Vec::with_capacity(self.blocks.len());
+        let inside = self.spots.iter().zip(is_inside).filter(|&(_, &is_inside)| is_inside);
+        let enter = |(&spot, _): (&Spot, &bool)| {
+            let number = &mut number_of[spot.block()];
+            if *number == END {
+                *number = blocks.len() as u32;
+                blocks.push((self.blocks[spot.block()].0, 0));
+            }
+            blocks[*number as usize].1 |= spot.bit();
+            Spot(*number << 6 | spot.place() as u32)
+        };
+        Self { spots: inside.map(enter).collect(), blocks }
+    }
+
     /// Return the points by block.
     pub(crate) fn of<'a>(&'a self, points: &'a [Point]) -> LinkedBlocks<'a> {
         LinkedBlocks { points, blocks: self, links: OnceCell::new() }
@@ -100,17 +117,17 @@ impl Blocks for LinkedBlocks<'_> {
         &self.blocks.blocks
     }
 
-    fn points(&self, block: usize) -> impl Iterator<Item = Point> {
+    fn points(&self) -> &[Point] {
+        self.points
+    }
+
+    fn num_old(&self) -> usize {
+        0
+    }
+
+    fn indices(&self, block: usize) -> impl Iterator<Item = usize> {
         let (firsts, next) = self.links.get_or_init(|| self.linked());
-        chain(next, firsts[block]).map(|index| self.points[index as usize])
-    }
-
-    fn new_points(&self, block: usize) -> impl Iterator<Item = Point> {
-        self.points(block)
-    }
-
-    fn has_old(&self, _: usize) -> bool {
-        false
+        chain(next, firsts[block]).map(|index| index as usize)
     }
 }
 
@@ -123,4 +140,25 @@ pub(crate) fn chain(next: &[u32], first: u32) -> impl Iterator<Item = u32> {
     let is_index = |&index: &u32| index != END;
     let following = move |&index: &u32| Some(next[index as usize]).filter(is_index);
     std::iter::successors(Some(first).filter(is_index), following)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::{collection::vec, prelude::*};
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn the_blocks_of_a_part_are_those_of_its_points(
+            points in vec(([-0.2_f32..0.2, -0.2_f32..0.2, -0.2_f32..0.2], any::<bool>()), 0..99),
+            inverse_edge in 2.0..200.0,
+        ) {
+            let (points, is_inside): (Vec<Point>, Vec<bool>) = points.into_iter().unzip();
+            let inside = points.iter().zip(&is_inside).filter(|&(_, &is_inside)| is_inside);
+            let part: Vec<Point> = inside.map(|(&point, _)| point).collect();
+            let blocks = PointBlocks::new(&points, inverse_edge).part(&is_inside);
+            prop_assert_eq!(blocks, PointBlocks::new(&part, inverse_edge));
+        }
+    }
 }
