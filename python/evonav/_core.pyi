@@ -325,7 +325,7 @@ class OccupancyMap:
 
 @final
 class ObjectEntry:
-    """An object entry at the time of the call that returned it."""
+    """An object entry at the time of the call that returned it; while it does not change, the same one is returned."""
 
     @property
     def id(self) -> int:
@@ -361,7 +361,7 @@ class ObjectEntry:
 
     @property
     def feature(self) -> NDArray[np.float32] | None:
-        """Unit mean of the detections' features, `(D,)`."""
+        """Unit mean of the detections' features, `(D,)`; it cannot be written to."""
 
     @property
     def first_seen_stage(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -74,6 +75,7 @@ def inspectable(agent: object) -> InspectableAgent | None:
     return agent if isinstance(agent, InspectableAgent) else _from_explain(agent)
 
 
+@lru_cache(maxsize=1024)  # an entry that has not changed is the same object as before
 def entry_belief(entry: ObjectEntry) -> EntryBelief:
     """Return an entry of an `ObjectMap` as records state it."""
     return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)

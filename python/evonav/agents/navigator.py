@@ -6,6 +6,7 @@ Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -180,10 +181,10 @@ class Navigator:
             entry: The entry.
             with_looks: False to leave out what its views show, which takes time.
         """
-        appearance = self._appearance(entry) if self._names_colours and with_looks else None
-        return ObjectCandidate(
-            entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections, appearance=appearance
-        )
+        candidate = _candidate_of(entry)
+        if not (self._names_colours and with_looks):
+            return candidate
+        return replace(candidate, appearance=self._appearance(entry))
 
     def _appearance(self, entry: ObjectEntry) -> Appearance | None:
         """Return what the views of an entry show; `None` without any."""
@@ -255,6 +256,11 @@ class Navigator:
             if best is None or cost < best[0]:
                 best = (cost, view)
         return None if best is None else picture_of(best[1], self.config.image_px)
+
+
+@lru_cache(maxsize=1024)  # an entry that has not changed is the same object as before
+def _candidate_of(entry: ObjectEntry) -> ObjectCandidate:
+    return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
 
 
 def _mean(rows: Sequence[tuple[float, ...]]) -> tuple[float, ...]:

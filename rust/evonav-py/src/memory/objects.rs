@@ -10,7 +10,7 @@ use evonav_core::{
     },
     sensors::{runs::RunImage, unproject::MaskedDepth},
 };
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::{
@@ -48,12 +48,19 @@ impl ObjectEntry {
             centre_m: entry.centre_m().into(),
             size_m: entry.size_m().into(),
             num_points: entry.cloud.points().len(),
-            feature: entry.feature.as_ref().map(|f| PyArray1::from_slice(py, f).unbind()),
+            feature: entry.feature.as_ref().map(|feature| read_only(py, feature)),
             first_seen_stage: entry.first_seen_stage,
             last_seen_stage: entry.last_seen_stage,
             last_seen_view: entry.last_seen_view,
         }
     }
+}
+
+/// Return an array that nobody can write to: an entry may be returned several times.
+fn read_only(py: Python<'_>, feature: &[f32]) -> Py<PyArray1<f32>> {
+    let array = PyArray1::from_slice(py, feature);
+    array.readwrite().make_nonwriteable();
+    array.unbind()
 }
 
 #[pymethods]
@@ -69,7 +76,24 @@ impl ObjectEntry {
 
 /// Detections merged into lasting entries.
 #[pyclass(module = "evonav._core")]
-pub struct ObjectMap(objects::ObjectMap);
+pub struct ObjectMap {
+    map: objects::ObjectMap,
+    /// The entries as they were last returned, by ascending id: those that have not changed since
+    /// are returned again, so that what was made of them can be found again, too.
+    shown: Vec<Py<ObjectEntry>>,
+}
+
+impl ObjectMap {
+    /// Return an entry as it was last returned, if it has not changed since. With each detection
+    /// the number of detections grows, and whatever else changes an entry takes points from it.
+    fn shown(&self, py: Python<'_>, entry: &Entry) -> Option<Py<ObjectEntry>> {
+        let index = self.shown.binary_search_by_key(&entry.id, |shown| shown.get().id).ok()?;
+        let ObjectEntry { num_detections, num_points, .. } = self.shown[index].get();
+        let is_same =
+            (*num_detections, *num_points) == (entry.num_detections, entry.cloud.points().len());
+        is_same.then(|| self.shown[index].clone_ref(py))
+    }
+}
 
 type Update = (Vec<Option<u64>>, Vec<u64>, Vec<(u64, u64)>);
 
@@ -96,13 +120,14 @@ impl ObjectMap {
                 merge_similarity,
             }
         );
-        objects::ObjectMap::new(config).map(Self).map_err(error::to_py)
+        let map = objects::ObjectMap::new(config).map_err(error::to_py)?;
+        Ok(Self { map, shown: Vec::new() })
     }
 
     fn update(&mut self, py: Python<'_>, view: View<'_>) -> PyResult<Update> {
         let found = view.detections.extract()?;
         let masks = Detections::masks(&found, py)?;
-        let (view, map) = (view.detected(&found, &masks)?, &mut self.0);
+        let (view, map) = (view.detected(&found, &masks)?, &mut self.map);
         let update = py.detach(|| map.update(&view)).map_err(error::to_py)?;
         let merged = update.merged.into_iter().map(Into::into).collect();
         Ok((update.entry_ids, update.removed, merged))
@@ -117,7 +142,7 @@ impl ObjectMap {
         let found = view.detections.extract()?;
         let masks = Detections::masks(&found, py)?;
         let view = view.detected(&found, &masks)?;
-        let found = py.detach(|| self.0.compare(entry_id, &view));
+        let found = py.detach(|| self.map.compare(entry_id, &view));
         let found = found.map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
     }
@@ -135,7 +160,7 @@ impl ObjectMap {
         );
         let (targets, eyes) =
             (arrays::rows("targets_m", &targets_m)?, arrays::rows("eyes_m", &eyes_m)?);
-        let shares = py.detach(|| self.0.visible_shares(targets, eyes, &config));
+        let shares = py.detach(|| self.map.visible_shares(targets, eyes, &config));
         Ok(PyArray1::from_vec(py, shares.map_err(error::to_py)?))
     }
 
@@ -150,7 +175,7 @@ impl ObjectMap {
             arrays::from_attributes!(config, EvidenceConfig { max_points, band_m, band_share });
         let (depth_m, [height_px, width_px]) = arrays::row_major("depth_m", &view.depth_m)?;
         let camera = view.pose.camera([width_px, height_px], view.intrinsics.vertical_fov_rad);
-        let found = py.detach(|| self.0.depth_evidence(&entry_ids, &camera, depth_m, &config));
+        let found = py.detach(|| self.map.depth_evidence(&entry_ids, &camera, depth_m, &config));
         let found = found.map_err(error::to_py)?.into_iter();
         let rows =
             found.map(|e| [e.num_see_through, e.num_supported, e.num_occluded, e.num_out_of_view]);
@@ -164,7 +189,7 @@ impl ObjectMap {
         max_distance_m: f64,
     ) -> PyResult<Vec<u64>> {
         let (camera, _) = view.borrow()?;
-        py.detach(|| self.0.in_view(&camera, max_distance_m)).map_err(error::to_py)
+        py.detach(|| self.map.in_view(&camera, max_distance_m)).map_err(error::to_py)
     }
 
     fn remove_seen_through(
@@ -178,40 +203,49 @@ impl ObjectMap {
             SeeThroughConfig { near_m, far_m, band_m, band_share, margin_px }
         );
         let (camera, depth_m) = view.borrow()?;
-        let map = &mut self.0;
+        let map = &mut self.map;
         let eroded = py.detach(|| map.remove_seen_through(&camera, depth_m, &config));
         let rows = eroded.map_err(error::to_py)?.into_iter();
         Ok(rows.map(|e| (e.id, e.num_removed, e.num_left)).collect())
     }
 
     fn num_bytes(&self) -> usize {
-        self.0.num_bytes()
+        self.map.num_bytes()
     }
 
     fn begin_stage(&mut self, stage: u32) {
-        self.0.begin_stage(stage);
+        self.map.begin_stage(stage);
     }
 
     fn remove(&mut self, entry_id: u64) -> bool {
-        self.0.remove(entry_id)
+        self.map.remove(entry_id)
     }
 
     fn clear(&mut self) {
-        self.0.clear();
+        self.map.clear();
+        self.shown.clear();
     }
 
     #[getter]
     fn num_views(&self) -> u64 {
-        self.0.num_views()
+        self.map.num_views()
     }
 
     #[getter]
-    fn entries(&self, py: Python<'_>) -> Vec<ObjectEntry> {
-        self.0.entries().iter().map(|entry| ObjectEntry::new(py, entry)).collect()
+    fn entries(&mut self, py: Python<'_>) -> PyResult<Vec<Py<ObjectEntry>>> {
+        let entry = |entry| match self.shown(py, entry) {
+            Some(shown) => Ok(shown),
+            None => Py::new(py, ObjectEntry::new(py, entry)),
+        };
+        let entries: Vec<_> = self.map.entries().iter().map(entry).collect::<PyResult<_>>()?;
+        self.shown = entries.iter().map(|entry| entry.clone_ref(py)).collect();
+        Ok(entries)
     }
 
-    fn entry(&self, py: Python<'_>, entry_id: u64) -> Option<ObjectEntry> {
-        self.0.entry(entry_id).map(|entry| ObjectEntry::new(py, entry))
+    fn entry(&self, py: Python<'_>, entry_id: u64) -> PyResult<Option<Py<ObjectEntry>>> {
+        let Some(entry) = self.map.entry(entry_id) else { return Ok(None) };
+        let shown = self.shown(py, entry).map(Ok);
+        shown.unwrap_or_else(|| Py::new(py, ObjectEntry::new(py, entry))).map(Some)
     }
 
     fn points_m<'py>(
@@ -219,12 +253,12 @@ impl ObjectMap {
         py: Python<'py>,
         entry_id: u64,
     ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
-        let entry = self.0.entry(entry_id);
+        let entry = self.map.entry(entry_id);
         entry.map(|entry| arrays::rows_of(py, entry.cloud.points().to_vec())).transpose()
     }
 
     fn __len__(&self) -> usize {
-        self.0.entries().len()
+        self.map.entries().len()
     }
 }
 
