@@ -147,6 +147,28 @@ def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
         entries.compare(1, here)
 
 
+def test_an_entry_is_the_same_object_until_it_changes() -> None:
+    entries = ObjectMap()
+    here, moved = a_view(*block(), "Mug"), a_view(*block(35, 2.6), "Mug")
+    entries.update(here)
+    entries.update(moved)
+    first, second = entries.entries
+    assert [entries.entry(1), entries.entry(2)] == [first, second]
+    entries.update(moved)
+    assert entries.entries[0] is first
+    seen_again = entries.entry(2)
+    assert seen_again is not None
+    assert (second.num_detections, seen_again.num_detections) == (1, 2)
+    empty = replace(here, depth_m=np.where(np.arange(60)[:, None] < 30, np.float32(9.0), here.depth_m))
+    assert [one.entry_id for one in entries.remove_seen_through(empty)] == [1]
+    left = entries.entry(1)
+    assert left is not None
+    assert left.num_points < first.num_points
+    entries.clear()
+    entries.update(moved)
+    assert entries.entries[0].centre_m == second.centre_m
+
+
 @pytest.mark.parametrize(
     ("name", "change"),
     [

@@ -1,6 +1,6 @@
 //! Images of masks: validation and neighbouring pixels.
 
-use crate::{Error, sensors::runs::runs};
+use crate::{Error, sensors::runs::RunImage};
 
 /// The size of a validated image of masks.
 pub(super) struct MaskImage {
@@ -11,7 +11,7 @@ pub(super) struct MaskImage {
 impl MaskImage {
     pub fn new(masks: &[i32], width_px: usize, num_masks: usize) -> Result<Self, Error> {
         Error::require_rows("masks", masks.len(), width_px)?;
-        for run in runs(masks, width_px) {
+        for run in RunImage::of(masks, width_px)?.runs() {
             Error::require("masks", run.value, "negative or the index of a detection", |mask| {
                 usize::try_from(mask).is_ok_and(|mask| mask < num_masks) || mask < 0
             })?;

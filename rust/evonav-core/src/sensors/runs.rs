@@ -1,5 +1,7 @@
 //! Runs of equal pixels in images of numbers.
 
+use std::ops::{BitOrAssign, BitXor};
+
 use evonav_simd::Kernel;
 
 use crate::{Error, grid::bits::ones};
@@ -43,11 +45,56 @@ impl RunImage {
     /// [`Error::InvalidArgument`] if the image is not whole rows, or has 2^31 pixels or more.
     pub fn of(pixels: &[i32], width_px: usize) -> Result<Self, Error> {
         Error::require_rows("pixels", pixels.len(), width_px)?;
-        let mut image = Self::empty([pixels.len().checked_div(width_px).unwrap_or(0), width_px])?;
-        let ends = runs(pixels, width_px);
-        image.runs =
-            ends.map(|run| [(run.row * width_px + run.cols[1]) as i32, run.value]).collect();
+        let mut image = Self::empty([pixels.len() / width_px, width_px])?;
+        image.add_rows(pixels, evonav_simd::compute(Changes(pixels)), width_px, |value| value);
         Ok(image)
+    }
+
+    /// Find the runs of an image whose rows have padding, as [`RunImage::of`].
+    ///
+    /// # Arguments
+    /// * `rows` - each of `stride` pixels, the first of which are the image's.
+    /// * `number_of` - number in the image of a number in `rows`.
+    #[inline(always)]
+    pub(crate) fn of_padded(
+        shape: [usize; 2],
+        rows: &[u32],
+        stride: usize,
+        number_of: impl Fn(u32) -> i32,
+    ) -> Result<Self, Error> {
+        let mut image = Self::empty(shape)?;
+        image.add_rows(rows, Changes(rows).compute(), stride, number_of);
+        Ok(image)
+    }
+
+    /// Add the runs of rows.
+    ///
+    /// # Arguments
+    /// * `changes` - those of `rows`.
+    #[inline(always)]
+    fn add_rows<T: Copy>(
+        &mut self,
+        rows: &[T],
+        mut changes: Vec<u64>,
+        stride: usize,
+        number_of: impl Fn(T) -> i32,
+    ) {
+        for first in (0..rows.len()).step_by(stride.max(1)) {
+            changes[first / 64] |= 1 << (first % 64);
+        }
+        let begins = changes.into_iter().enumerate();
+        let begins = begins.flat_map(|(index, bits)| ones(bits).map(move |bit| index * 64 + bit));
+        let (mut row, mut first, mut begin) = (0, 0, 0);
+        for end in begins.skip(1).chain([rows.len()]) {
+            if begin == first + stride {
+                (row, first) = (row + 1, begin);
+            }
+            if begin - first < self.width_px && begin < end {
+                let end = row * self.width_px + self.width_px.min(end - first);
+                self.push(end as i32, number_of(rows[begin]));
+            }
+            begin = end;
+        }
     }
 
     /// Make an image of given [`RunImage::ends`].
@@ -144,36 +191,10 @@ impl RunImage {
     }
 }
 
-/// Return the runs of an image in row-major order. Pixels after the last whole row are left out.
-///
-/// # Complexity
-/// O(pixels), most of it 64 pixels at once.
-pub(crate) fn runs(pixels: &[i32], width_px: usize) -> impl Iterator<Item = Run> {
-    let num_rows = pixels.len().checked_div(width_px).unwrap_or(0);
-    let pixels = &pixels[..num_rows * width_px];
-    let mut starts = evonav_simd::compute(Changes(pixels));
-    for first in (0..pixels.len()).step_by(width_px.max(1)) {
-        starts[first / 64] |= 1 << (first % 64);
-    }
-    let starts = starts.into_iter().enumerate();
-    let starts = starts.flat_map(|(index, bits)| ones(bits).map(move |bit| index * 64 + bit));
-    let mut starts = starts.chain([pixels.len()]);
-    let mut begin = starts.next().unwrap_or(0);
-    let (mut row, mut first) = (0, 0);
-    starts.map(move |end| {
-        if begin == first + width_px {
-            (row, first) = (row + 1, begin);
-        }
-        let run = Run { value: pixels[begin], row, cols: [begin - first, end - first] };
-        begin = end;
-        run
-    })
-}
-
 /// Pixels that differ from the one before: a bit for each, in words of 64.
-struct Changes<'a>(&'a [i32]);
+struct Changes<'a, T>(&'a [T]);
 
-impl Kernel for Changes<'_> {
+impl<T: Copy + Eq + Default + BitXor<Output = T> + BitOrAssign> Kernel for Changes<'_, T> {
     type Output = Vec<u64>;
 
     #[inline(always)]
@@ -196,12 +217,15 @@ impl Kernel for Changes<'_> {
 }
 
 #[inline(always)]
-fn changes(before: &[i32; 64], here: &[i32; 64]) -> u64 {
-    let mut differences = 0;
-    for (a, b) in before.iter().zip(here) {
+fn changes<T: Copy + Eq + Default + BitXor<Output = T> + BitOrAssign>(
+    before: &[T; 64],
+    here: &[T; 64],
+) -> u64 {
+    let mut differences = T::default();
+    for (&a, &b) in before.iter().zip(here) {
         differences |= a ^ b;
     }
-    if differences == 0 {
+    if differences == T::default() {
         return 0;
     }
     let mut bytes = [0_u8; 64];
@@ -218,18 +242,20 @@ fn changes(before: &[i32; 64], here: &[i32; 64]) -> u64 {
 mod tests {
     use proptest::{collection::vec, prelude::*};
 
-    use super::{Run, RunImage, runs};
+    use super::{Run, RunImage};
 
     proptest! {
         #[test]
         fn runs_are_equal_pixels_of_a_row(
-            stretches in vec((-1..3_i32, 1..150_usize), 0..20),
-            width_px in 0..200_usize,
+            stretches in vec((0..3_i32, 1..150_usize), 0..20),
+            width_px in 1..200_usize,
+            padding in 0..20_usize,
         ) {
             let stretch = |&(value, length): &(i32, usize)| std::iter::repeat_n(value, length);
-            let pixels: Vec<i32> = stretches.iter().flat_map(stretch).collect();
+            let mut pixels: Vec<i32> = stretches.iter().flat_map(stretch).collect();
+            pixels.truncate(pixels.len() / width_px * width_px);
             let mut expected = Vec::new();
-            for (row, pixels) in pixels.chunks_exact(width_px.max(1)).enumerate() {
+            for (row, pixels) in pixels.chunks_exact(width_px).enumerate() {
                 let mut begin = 0;
                 for equal in pixels.chunk_by(|a, b| a == b) {
                     let cols = [begin, begin + equal.len()];
@@ -237,14 +263,20 @@ mod tests {
                     begin += equal.len();
                 }
             }
-            let found: Vec<Run> = runs(&pixels, width_px).collect();
-            prop_assert_eq!(&found, &if width_px == 0 { Vec::new() } else { expected });
-            let Some(num_rows) = pixels.len().checked_div(width_px) else { return Ok(()) };
-            let whole = &pixels[..num_rows * width_px];
-            let image = RunImage::of(whole, width_px).unwrap();
-            prop_assert_eq!(image.runs().collect::<Vec<_>>(), found);
-            prop_assert_eq!(image.pixels(), whole);
-            prop_assert_eq!(RunImage::from_ends(image.shape(), image.ends()).unwrap(), image);
+            let image = RunImage::of(&pixels, width_px).unwrap();
+            prop_assert_eq!(image.runs().collect::<Vec<_>>(), expected);
+            prop_assert_eq!(image.pixels(), &pixels[..]);
+            prop_assert_eq!(&RunImage::from_ends(image.shape(), image.ends()).unwrap(), &image);
+            // What is in the padding does not matter, and other numbers may be the same in the image.
+            let padded = |row: &[i32]| {
+                let pixels = row.iter().map(|&value| 2 * value as u32 + row.len() as u32 % 2);
+                let rest = (0..padding as u32).map(|i| if i < 5 { 2 * row[0] as u32 } else { i });
+                pixels.chain(rest).collect::<Vec<_>>()
+            };
+            let rows: Vec<u32> = pixels.chunks_exact(width_px).flat_map(padded).collect();
+            let number_of = |value: u32| value as i32 / 2;
+            let found = RunImage::of_padded(image.shape(), &rows, width_px + padding, number_of);
+            prop_assert_eq!(found.unwrap(), image);
         }
 
         #[test]

@@ -13,7 +13,6 @@ use crate::{
     sensors::{
         instance_masks::{MaskFilter, number_instances},
         raster::FrameBuffer,
-        runs::RunImage,
     },
     simulator::{
         actions::{Action, Strides, act, set_down},
@@ -269,6 +268,7 @@ impl Batch {
         // The content is overwritten, so a thread that panicked has left nothing that matters.
         let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
         frame.empty_depth_m = Some(self.config.empty_depth_m);
+        frame.has_runs = true;
         let want = slot.world.want(images.rgb.is_some(), images.labels.is_some());
         slot.world.render(&slot.world.view(&slot.pose), want, &mut frame)?;
         if let Some(depth_m) = images.depth_m {
@@ -279,8 +279,8 @@ impl Batch {
         }
         if let Some(labels) = images.labels {
             let is_detectable: Vec<bool> = slot.labels.iter().map(|&label| label != 0).collect();
-            let instances = RunImage::of(&frame.instances, self.config.image_px[0])?;
-            let masks = number_instances(&instances, &is_detectable, self.config.mask_filter)?;
+            let masks =
+                number_instances(&frame.instance_runs, &is_detectable, self.config.mask_filter)?;
             let mut begin = 0;
             for &[end, mask] in masks.labels.ends() {
                 let label = usize::try_from(mask).map_or(0, |m| slot.labels[masks.instances[m]]);

@@ -8,6 +8,7 @@ use evonav_core::{
         camera::{Camera, View},
         raster::{FrameBuffer, Style, Want, render_view},
         ray_caster::RayCaster,
+        runs::RunImage,
         visible_bodies::{visibility_points, visible_bodies},
     },
     world::mesh::{SceneMesh, Triangle},
@@ -217,6 +218,14 @@ proptest! {
             render_view(&mesh, &view, Want { rgb: Some(style), instances: true }, &mut again).unwrap();
             prop_assert_eq!(&used.instances, &frame.instances);
             prop_assert_eq!(&again.rgb, &frame.rgb);
+        }
+        let runs = RunImage::of(&frames[0].instances, view.camera.width_px).unwrap();
+        for rgb in [None, Some(Style::Plain), Some(Style::Default)] {
+            let mut frame = FrameBuffer::default();
+            frame.has_runs = true;
+            render_view(&mesh, &view, Want { rgb, instances: true }, &mut frame).unwrap();
+            prop_assert_eq!(&frame.instance_runs, &runs);
+            prop_assert!(frame.instances.is_empty());
         }
     }
 

@@ -3,14 +3,12 @@
 use std::sync::{Arc, Mutex};
 
 use evonav_core::{
-    Error,
     assets::{Catalogue, UnknownAssets},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::{
         camera::{CLIP_M, View},
         raster::{FrameBuffer, Style, Want},
-        runs,
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
@@ -205,7 +203,8 @@ impl PyEmbeddedSimulator {
         instances: bool,
     ) -> PyResult<Images<'py, RunImage>> {
         let (view, want) = (self.core.view(&pose.pose()), self.core.want(rgb, instances));
-        self.images(py, &view, want, |ids| runs::RunImage::of(ids, view.camera.width_px))
+        let take = |buffer: &mut FrameBuffer| std::mem::take(&mut buffer.instance_runs);
+        self.images(py, &view, want, true, take)
             .map(|(depth, colours, ids)| (depth, colours, ids.map(RunImage::new)))
     }
 
@@ -219,8 +218,9 @@ impl PyEmbeddedSimulator {
     ) -> PyResult<Images<'py, Bound<'py, PyArray2<i32>>>> {
         let view = view.view();
         let shape = [view.camera.height_px, view.camera.width_px];
-        let take = |ids: &mut Vec<i32>| Ok(std::mem::take(ids));
-        let (depth, colours, ids) = self.images(py, &view, self.core.want(rgb, instances), take)?;
+        let take = |buffer: &mut FrameBuffer| std::mem::take(&mut buffer.instances);
+        let want = self.core.want(rgb, instances);
+        let (depth, colours, ids) = self.images(py, &view, want, false, take)?;
         let ids = ids.map(|ids| arrays::image_of(py, ids, shape)).transpose()?;
         Ok((depth, colours, ids))
     }
@@ -313,13 +313,14 @@ impl PyEmbeddedSimulator {
 }
 
 impl PyEmbeddedSimulator {
-    /// Render a view, with instances as `of_ids` returns them.
+    /// Render a view, with instances as `take` returns them.
     fn images<'py, I: Send>(
         &self,
         py: Python<'py>,
         view: &View,
         want: Want,
-        of_ids: impl FnOnce(&mut Vec<i32>) -> Result<I, Error> + Send,
+        has_runs: bool,
+        take: impl FnOnce(&mut FrameBuffer) -> I + Send,
     ) -> PyResult<Images<'py, I>> {
         let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
         let (depth, colours, ids) = py
@@ -327,8 +328,9 @@ impl PyEmbeddedSimulator {
                 // Nobody waits here: after a fork, the thread that holds the lock may not exist.
                 let free = BUFFERS.try_lock().ok().and_then(|mut buffers| buffers.pop());
                 let mut buffer = free.unwrap_or_default();
+                buffer.has_runs = has_runs;
                 self.core.render(view, want, &mut buffer)?;
-                let ids = want.instances.then(|| of_ids(&mut buffer.instances)).transpose()?;
+                let ids = want.instances.then(|| take(&mut buffer));
                 let (depth, colours) = buffer.take();
                 if height * width <= MAX_REUSED_PX
                     && let Ok(mut buffers) = BUFFERS.try_lock()

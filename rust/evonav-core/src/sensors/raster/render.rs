@@ -12,58 +12,16 @@ use crate::{
     sensors::{
         camera::{Camera, View},
         raster::{
-            canvas::{Canvas, LANES},
-            hidden::Hidden,
-            lens::{Lens, Optics, Scratch},
+            canvas::LANES,
+            frame::{FrameBuffer, Want},
+            lens::{Lens, Scratch},
             light::Light,
-            panes::Panes,
-            shader::Shader,
+            resolve::Resolve,
             style::Style,
         },
     },
     world::mesh::{Layer, PartMesh, SceneMesh},
 };
-
-/// The images to render besides depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Want {
-    /// The style of colours to render, if any.
-    pub rgb: Option<Style>,
-    /// Whether to render the body of each pixel.
-    pub instances: bool,
-}
-
-impl Want {
-    /// Return whether it matters which surface a pixel shows.
-    fn has_tags(self) -> bool {
-        self.rgb.is_some() || self.instances
-    }
-}
-
-/// The images of one view, row-major, and working memory to render the next one without allocating.
-#[derive(Debug, Clone, Default)]
-pub struct FrameBuffer {
-    /// Planar depth in metres, `(H, W)`; where nothing is, `empty_depth_m`.
-    pub depth_m: Vec<f32>,
-    /// Depth of pixels where nothing is; infinite if there is none.
-    pub empty_depth_m: Option<f32>,
-    /// Body index + 1 of each pixel, `(H, W)`; 0 where nothing is. Empty if not rendered.
-    pub instances: Vec<i32>,
-    /// Colours, sRGB, `(H, W, 3)`. Empty if not rendered.
-    pub rgb: Vec<u8>,
-    pub(super) canvas: Canvas,
-    hidden: Hidden,
-    shader: Shader,
-    panes: Panes,
-    pub(super) scratch: Scratch,
-}
-
-impl FrameBuffer {
-    /// Take depth and colours out as vectors of their own.
-    pub fn take(&mut self) -> (Vec<f32>, Vec<u8>) {
-        (std::mem::take(&mut self.depth_m), std::mem::take(&mut self.rgb))
-    }
-}
 
 /// Render the view of a camera with AI2-THOR's clip planes, as [`render_view`].
 ///
@@ -164,7 +122,7 @@ fn draw_solid(
         out.shader.begin(style, mesh, &lens, [width_px, height_px]);
     }
     Draw { mesh, layer: mesh.solid_layer(), lens: &lens, want, has_panes: true }.onto(out);
-    evonav_simd::compute(Resolve { mesh, lens: &lens, want, out });
+    evonav_simd::compute(Resolve { mesh, lens: &lens, want, out })?;
     Ok(lens)
 }
 
@@ -296,84 +254,6 @@ fn clip_near(
             let (near, far) = if a[2] < b[2] { (a, b) } else { (b, a) };
             let t = (near_m - near[2]) / (far[2] - near[2]);
             clipped_m.push(std::array::from_fn(|i| near[i] + t * (far[i] - near[i])));
-        }
-    }
-}
-
-/// Turns the canvas of the solid parts into images of depth and instances.
-struct Resolve<'a> {
-    mesh: &'a SceneMesh,
-    lens: &'a Lens,
-    want: Want,
-    out: &'a mut FrameBuffer,
-}
-
-impl Kernel for Resolve<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn compute(self) {
-        let Self { mesh, lens, want, out } = self;
-        let FrameBuffer { depth_m, empty_depth_m, instances, rgb, canvas, .. } = out;
-        let num_pixels = canvas.width_px * canvas.height_px;
-        depth_m.resize(num_pixels, 0.0);
-        let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
-        let empty_m = empty_depth_m.unwrap_or(f32::INFINITY);
-        for (row, depth_m) in depth_m.chunks_exact_mut(canvas.width_px).enumerate() {
-            let pixels = depth_m.iter_mut().zip(canvas.row(row));
-            match lens.optics {
-                Optics::Perspective { .. } => {
-                    for (depth_m, &nearness) in pixels {
-                        *depth_m = if nearness > empty { 1.0 / nearness } else { empty_m };
-                    }
-                }
-                Optics::Orthographic { .. } => {
-                    for (depth_m, &nearness) in pixels {
-                        let below_m = horizon_m - nearness;
-                        *depth_m = if nearness > empty { below_m } else { empty_m };
-                    }
-                }
-            }
-        }
-        instances.resize(if want.instances { num_pixels } else { 0 }, 0);
-        for (row, bodies) in instances.chunks_exact_mut(canvas.width_px).enumerate() {
-            let tags = &canvas.tags[canvas.row_blocks(row)];
-            match want.rgb {
-                Some(_) => to_bodies(mesh, tags, bodies),
-                None => {
-                    for (body, &tag) in bodies.iter_mut().zip(tags.as_flattened()) {
-                        *body = tag as i32;
-                    }
-                }
-            }
-        }
-        rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
-    }
-}
-
-/// Set the instance ids of a row by its face tags. Most blocks lie within one face.
-#[inline(always)]
-fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
-    let body_of = |tag: u32| match tag.checked_sub(1) {
-        Some(face) => mesh.faces[face as usize].body as i32 + 1,
-        None => 0,
-    };
-    let mut last = (0, 0);
-    for (bodies, tags) in bodies.chunks_mut(LANES).zip(tags) {
-        // Compared without a branch a lane.
-        let mut different = 0;
-        for tag in tags {
-            different |= tag ^ last.0;
-        }
-        if different == 0 {
-            bodies.fill(last.1);
-            continue;
-        }
-        for (body, &tag) in bodies.iter_mut().zip(tags) {
-            if tag != last.0 {
-                last = (tag, body_of(tag));
-            }
-            *body = last.1;
         }
     }
 }

@@ -8,8 +8,9 @@ use crate::{
         camera::{Camera, View},
         raster::{
             canvas::LANES,
+            frame::{FrameBuffer, Want},
             lens::Lens,
-            render::{Draw, FrameBuffer, Want},
+            render::Draw,
         },
     },
     world::mesh::SceneMesh,

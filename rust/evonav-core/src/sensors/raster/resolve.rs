@@ -1,0 +1,116 @@
+//! Turn a canvas into images of depth and instances.
+
+use evonav_simd::Kernel;
+
+use crate::{
+    Error,
+    sensors::{
+        raster::{
+            canvas::LANES,
+            frame::{FrameBuffer, Want},
+            lens::{Lens, Optics},
+        },
+        runs::RunImage,
+    },
+    world::mesh::SceneMesh,
+};
+
+/// Turns the canvas of the solid parts into images of depth and instances.
+pub(super) struct Resolve<'a> {
+    pub mesh: &'a SceneMesh,
+    pub lens: &'a Lens,
+    pub want: Want,
+    pub out: &'a mut FrameBuffer,
+}
+
+impl Kernel for Resolve<'_> {
+    type Output = Result<(), Error>;
+
+    #[inline(always)]
+    fn compute(self) -> Self::Output {
+        let Self { mesh, lens, want, out } = self;
+        let FrameBuffer {
+            depth_m,
+            empty_depth_m,
+            instances,
+            has_runs,
+            instance_runs,
+            rgb,
+            canvas,
+            ..
+        } = out;
+        let num_pixels = canvas.width_px * canvas.height_px;
+        depth_m.resize(num_pixels, 0.0);
+        let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
+        let empty_m = empty_depth_m.unwrap_or(f32::INFINITY);
+        for (row, depth_m) in depth_m.chunks_exact_mut(canvas.width_px).enumerate() {
+            let pixels = depth_m.iter_mut().zip(canvas.row(row));
+            match lens.optics {
+                Optics::Perspective { .. } => {
+                    for (depth_m, &nearness) in pixels {
+                        *depth_m = if nearness > empty { 1.0 / nearness } else { empty_m };
+                    }
+                }
+                Optics::Orthographic { .. } => {
+                    for (depth_m, &nearness) in pixels {
+                        let below_m = horizon_m - nearness;
+                        *depth_m = if nearness > empty { below_m } else { empty_m };
+                    }
+                }
+            }
+        }
+        let has_pixels = want.instances && !*has_runs;
+        instances.resize(if has_pixels { num_pixels } else { 0 }, 0);
+        for (row, bodies) in instances.chunks_exact_mut(canvas.width_px).enumerate() {
+            let tags = &canvas.tags[canvas.row_blocks(row)];
+            match want.rgb {
+                Some(_) => to_bodies(mesh, tags, bodies),
+                None => {
+                    for (body, &tag) in bodies.iter_mut().zip(tags.as_flattened()) {
+                        *body = tag as i32;
+                    }
+                }
+            }
+        }
+        if want.instances && *has_runs {
+            let (shape, stride) =
+                ([canvas.height_px, canvas.width_px], LANES * canvas.blocks_per_row());
+            let tags = canvas.tags.as_flattened();
+            *instance_runs = match want.rgb {
+                Some(_) => RunImage::of_padded(shape, tags, stride, |tag| body_of(mesh, tag)),
+                None => RunImage::of_padded(shape, tags, stride, |tag| tag as i32),
+            }?;
+        }
+        rgb.resize(if want.rgb.is_some() { 3 * num_pixels } else { 0 }, 0);
+        Ok(())
+    }
+}
+
+/// Return the instance id of a face tag.
+#[inline(always)]
+fn body_of(mesh: &SceneMesh, tag: u32) -> i32 {
+    tag.checked_sub(1).map_or(0, |face| mesh.faces[face as usize].body as i32 + 1)
+}
+
+/// Set the instance ids of a row by its face tags. Most blocks lie within one face.
+#[inline(always)]
+fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
+    let mut last = (0, 0);
+    for (bodies, tags) in bodies.chunks_mut(LANES).zip(tags) {
+        // Compared without a branch a lane.
+        let mut different = 0;
+        for tag in tags {
+            different |= tag ^ last.0;
+        }
+        if different == 0 {
+            bodies.fill(last.1);
+            continue;
+        }
+        for (body, &tag) in bodies.iter_mut().zip(tags) {
+            if tag != last.0 {
+                last = (tag, body_of(mesh, tag));
+            }
+            *body = last.1;
+        }
+    }
+}
