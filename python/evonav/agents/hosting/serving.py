@@ -19,7 +19,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, Protocol
 
-from evonav.agents.agent import Agent
+from evonav.agents.agent import Agent, ExplainingAgent
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import sandbox, wire
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
@@ -133,6 +133,7 @@ class _Server:
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
+        self._explaining: ExplainingAgent | None = None
         self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
@@ -159,6 +160,7 @@ class _Server:
         self._agent = None
         self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
         self._agent = new_agent(self._factory, self._decision)
+        self._explaining = explaining(self._agent)
         return self._sensors()
 
     def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
@@ -181,7 +183,7 @@ class _Server:
 
     def do_entries(self) -> dict[str, bytes]:
         """Return the object memory, if the agent explains itself."""
-        agent = explaining(self.agent)
+        agent = self._explaining
         return {} if agent is None else {"entries": wire.ENTRIES.write(list(agent.entries()))}
 
     def do_costs(self) -> dict[str, bytes]:
@@ -193,7 +195,7 @@ class _Server:
         return {"costs": wire.COSTS.write(costs)}
 
     def _diagnostics(self) -> dict[str, bytes]:
-        agent = explaining(self.agent)
+        agent = self._explaining
         return {} if agent is None else {"diagnostics": wire.DIAGNOSTICS.write(agent.diagnostics())}
 
     def _sensors(self) -> dict[str, bytes]:

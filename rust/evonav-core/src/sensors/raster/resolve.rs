@@ -40,22 +40,20 @@ impl Kernel for Resolve<'_> {
             ..
         } = out;
         let num_pixels = canvas.width_px * canvas.height_px;
-        depth_m.resize(num_pixels, 0.0);
+        // Appended, since filling it first would take as long as the depths themselves.
+        depth_m.clear();
+        depth_m.reserve(num_pixels);
         let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
         let empty_m = empty_depth_m.unwrap_or(f32::INFINITY);
-        for (row, depth_m) in depth_m.chunks_exact_mut(canvas.width_px).enumerate() {
-            let pixels = depth_m.iter_mut().zip(canvas.row(row));
+        for row in 0..canvas.height_px {
+            let nearness = canvas.row(row)[..canvas.width_px].iter();
+            let depth = |&near: &f32, depth_m: f32| if near > empty { depth_m } else { empty_m };
             match lens.optics {
                 Optics::Perspective { .. } => {
-                    for (depth_m, &nearness) in pixels {
-                        *depth_m = if nearness > empty { 1.0 / nearness } else { empty_m };
-                    }
+                    depth_m.extend(nearness.map(|near| depth(near, 1.0 / near)));
                 }
                 Optics::Orthographic { .. } => {
-                    for (depth_m, &nearness) in pixels {
-                        let below_m = horizon_m - nearness;
-                        *depth_m = if nearness > empty { below_m } else { empty_m };
-                    }
+                    depth_m.extend(nearness.map(|near| depth(near, horizon_m - near)));
                 }
             }
         }
