@@ -10,7 +10,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
@@ -20,6 +20,7 @@ import evonav
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
+from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid, SimulatorConfig
@@ -68,12 +69,18 @@ class Probe:
         size: dict[str, Any] = {"width_px": width_px, "height_px": height_px}
         if style is not None and HAS_STYLES:
             size["style"] = style
-        simulators = self.simulators(SimulatorConfig(**size))
+        config = SimulatorConfig(**size)
+        simulators = self.simulators(config)
         places = [(int(house), Pose(*place)) for house, *place in self.inputs["views"].tolist()]
 
-        def render(number: int) -> Any:  # noqa: ANN401 - a frame
+        def render(number: int) -> Any:  # noqa: ANN401 - its images
             house, pose = places[number]
-            return simulators[house].render(pose, rgb=style is not None)
+            view = CameraView(
+                replace(pose, y_m=config.camera_height_m),
+                **{name: getattr(config, name) for name in ("width_px", "height_px", "near_m", "far_m")},
+                vertical_fov_rad=config.intrinsics.vertical_fov_rad,
+            )
+            return simulators[house].render_camera(view, rgb=style is not None)
 
         return Operation(render, calls=5, answer=lambda number: _digest(render(number).depth_m, 0.01))
 

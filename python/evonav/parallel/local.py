@@ -264,6 +264,8 @@ def _serve(connection: Connection, work: str, life: int | None = None) -> None:
             _raise_open_files()
             _keep_free_memory()
         serve(work, settings, iter(job, None), send, has_threads=has_threads)
+    # The process ends now; an exception in what it still does would be printed and nothing else.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def _keep_free_memory() -> None:

@@ -1,13 +1,14 @@
 """Views of bundled houses that renderers are compared on."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import SimulationError
 from evonav.house import bundled_houses
+from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
@@ -28,7 +29,7 @@ class HouseView:
     """Number of the house's simulator."""
     name: str
     """Name of the house."""
-    pose: Pose
+    camera: CameraView
     camera_from_world: NDArray[np.float64]
     """`(3, 3)`: right, down, forward."""
     position_m: NDArray[np.float64]
@@ -55,8 +56,16 @@ def views_of_houses(config: SimulatorConfig, num_houses: int) -> tuple[list[Embe
                     [sin_y * cos_p, -sin_p, cos_y * cos_p],
                 ]
             )
-            position_m = np.array([x_m, config.camera_height_m, z_m])
-            views.append(HouseView(number, house.name or str(number), pose, axes, position_m))
+            camera = CameraView(
+                replace(pose, y_m=config.camera_height_m),
+                config.width_px,
+                config.height_px,
+                config.intrinsics.vertical_fov_rad,
+                config.near_m,
+                config.far_m,
+            )
+            position_m = np.array(camera.pose.position_m)
+            views.append(HouseView(number, house.name or str(number), camera, axes, position_m))
     return simulators, views
 
 
@@ -65,9 +74,9 @@ def our_renderer(simulators: Sequence[EmbeddedSimulator], views: Sequence[HouseV
 
     def call(number: int) -> Images:
         view = views[number]
-        frame = simulators[view.house].render(view.pose, rgb=rgb)
-        if frame.instances is None:
-            raise SimulationError("no instances in a frame that was asked for them")
-        return frame.depth_m, frame.instances
+        images = simulators[view.house].render_camera(view.camera, rgb=rgb)
+        if images.instances is None:
+            raise SimulationError("no instances in images that were asked for them")
+        return images.depth_m, images.instances
 
     return call

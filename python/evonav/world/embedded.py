@@ -197,6 +197,8 @@ class EmbeddedSimulator:
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
         """Render the camera's view from `pose` (default: the agent's own); collisions are not checked.
 
+        Instances are stored as runs of pixels, and made an array when they are looked at.
+
         Raises:
             InvalidArgumentError: The pose is not finite.
         """
