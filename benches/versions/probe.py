@@ -78,7 +78,7 @@ class Probe:
             view = CameraView(
                 replace(pose, y_m=config.camera_height_m),
                 **{name: getattr(config, name) for name in ("width_px", "height_px", "near_m", "far_m")},
-                vertical_fov_rad=config.intrinsics.vertical_fov_rad,
+                vertical_fov_rad=simulators[house].intrinsics.vertical_fov_rad,
             )
             return simulators[house].render_camera(view, rgb=style is not None)
 
