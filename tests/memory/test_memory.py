@@ -164,9 +164,17 @@ def test_an_entry_is_the_same_object_until_it_changes() -> None:
     left = entries.entry(1)
     assert left is not None
     assert left.num_points < first.num_points
+
+
+def test_a_map_that_was_cleared_returns_no_entry_of_before() -> None:
+    entries, here = ObjectMap(), a_view(*block(), "Mug")
+    entries.update(here)
+    (before,) = entries.entries
     entries.clear()
-    entries.update(moved)
-    assert entries.entries[0].centre_m == second.centre_m
+    entries.update(replace(here, pose=replace(here.pose, x_m=here.pose.x_m + 1.0)))
+    (after,) = entries.entries
+    assert (after.id, after.num_detections, after.num_points) == (before.id, before.num_detections, before.num_points)
+    assert after.centre_m[0] == pytest.approx(before.centre_m[0] + 1.0)
 
 
 @pytest.mark.parametrize(
