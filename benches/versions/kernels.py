@@ -47,9 +47,7 @@ def write_inputs(path: Path) -> None:
     np.savez(
         path,
         houses=np.array(houses),
-        views=np.array(
-            [[v.house, v.camera.pose.x_m, v.camera.pose.y_m, v.camera.pose.z_m, v.camera.pose.yaw_rad] for v in views]
-        ),
+        views=np.array([[v.house, *v.camera.pose.position_m, v.camera.pose.yaw_rad] for v in views]),
         pairs=np.array(pairs),
         pair_houses=np.array(pair_houses),
         floor=memory.floor().cells,

@@ -1,7 +1,7 @@
 """Store images of numbers as runs of equal pixels, and expand them when they are looked at as arrays.
 
-An image of instances or masks has some thousand runs: they take a tenth of the memory of its pixels, and what the core
-computes from them a tenth of the time.
+An image of instances or masks has some thousand runs, which take 10 KB where its pixels take 360 KB, and what the core
+computes from them takes time a run, not a pixel.
 """
 
 from collections.abc import Callable

@@ -24,8 +24,8 @@ impl Run {
     }
 }
 
-/// An image of numbers as runs of equal pixels: instances, masks. It takes a tenth of the memory,
-/// and time a run in place of time a pixel.
+/// An image of numbers as runs of equal pixels: instances, masks. A view of 300 x 300 pixels has
+/// some 1,250 runs, 10 KB, and what is computed from them takes time a run, not a pixel.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RunImage {
     num_rows: usize,

@@ -1,7 +1,5 @@
 //! `evonav_core::memory::objects`. Shapes, units and errors: `_core.pyi`.
 
-use std::sync::Arc;
-
 use evonav_core::{
     Error,
     memory::objects::{
@@ -84,14 +82,17 @@ pub struct ObjectMap {
 }
 
 impl ObjectMap {
-    /// Return an entry as it was last returned, if it has not changed since. With each detection
+    /// Return an entry, as it was last returned if it has not changed since. With each detection
     /// the number of detections grows, and whatever else changes an entry takes points from it.
-    fn shown(&self, py: Python<'_>, entry: &Entry) -> Option<Py<ObjectEntry>> {
-        let index = self.shown.binary_search_by_key(&entry.id, |shown| shown.get().id).ok()?;
-        let ObjectEntry { num_detections, num_points, .. } = self.shown[index].get();
-        let is_same =
-            (*num_detections, *num_points) == (entry.num_detections, entry.cloud.points().len());
-        is_same.then(|| self.shown[index].clone_ref(py))
+    fn show(&self, py: Python<'_>, entry: &Entry) -> PyResult<Py<ObjectEntry>> {
+        let num_points = entry.cloud.points().len();
+        let is_same = |shown: &ObjectEntry| {
+            shown.num_detections == entry.num_detections && shown.num_points == num_points
+        };
+        match self.shown.binary_search_by_key(&entry.id, |shown| shown.get().id) {
+            Ok(index) if is_same(self.shown[index].get()) => Ok(self.shown[index].clone_ref(py)),
+            _ => Py::new(py, ObjectEntry::new(py, entry)),
+        }
     }
 }
 
@@ -125,8 +126,8 @@ impl ObjectMap {
     }
 
     fn update(&mut self, py: Python<'_>, view: View<'_>) -> PyResult<Update> {
-        let found = view.detections.extract()?;
-        let masks = Detections::masks(&found, py)?;
+        let found: Detections<'_> = view.detections.extract()?;
+        let masks = found.stored_masks.runs(py, "masks")?;
         let (view, map) = (view.detected(&found, &masks)?, &mut self.map);
         let update = py.detach(|| map.update(&view)).map_err(error::to_py)?;
         let merged = update.merged.into_iter().map(Into::into).collect();
@@ -139,8 +140,8 @@ impl ObjectMap {
         entry_id: u64,
         view: View<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let found = view.detections.extract()?;
-        let masks = Detections::masks(&found, py)?;
+        let found: Detections<'_> = view.detections.extract()?;
+        let masks = found.stored_masks.runs(py, "masks")?;
         let view = view.detected(&found, &masks)?;
         let found = py.detach(|| self.map.compare(entry_id, &view));
         let found = found.map_err(error::to_py)?;
@@ -233,19 +234,14 @@ impl ObjectMap {
 
     #[getter]
     fn entries(&mut self, py: Python<'_>) -> PyResult<Vec<Py<ObjectEntry>>> {
-        let entry = |entry| match self.shown(py, entry) {
-            Some(shown) => Ok(shown),
-            None => Py::new(py, ObjectEntry::new(py, entry)),
-        };
-        let entries: Vec<_> = self.map.entries().iter().map(entry).collect::<PyResult<_>>()?;
+        let entries = self.map.entries().iter().map(|entry| self.show(py, entry));
+        let entries: Vec<_> = entries.collect::<PyResult<_>>()?;
         self.shown = entries.iter().map(|entry| entry.clone_ref(py)).collect();
         Ok(entries)
     }
 
     fn entry(&self, py: Python<'_>, entry_id: u64) -> PyResult<Option<Py<ObjectEntry>>> {
-        let Some(entry) = self.map.entry(entry_id) else { return Ok(None) };
-        let shown = self.shown(py, entry).map(Ok);
-        shown.unwrap_or_else(|| Py::new(py, ObjectEntry::new(py, entry))).map(Some)
+        self.map.entry(entry_id).map(|entry| self.show(py, entry)).transpose()
     }
 
     fn points_m<'py>(
@@ -279,12 +275,6 @@ struct Detections<'py> {
     labels: Vec<String>,
     confidences: PyReadonlyArray1<'py, f32>,
     features: Option<PyReadonlyArray2<'py, f32>>,
-}
-
-impl Detections<'_> {
-    fn masks(&self, py: Python<'_>) -> PyResult<Arc<RunImage>> {
-        self.stored_masks.runs(py, "masks")
-    }
 }
 
 impl View<'_> {
