@@ -30,6 +30,7 @@ from evonav.component import import_callable
 from evonav.decision.metered import Metered
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.parallel import profiling
+from evonav.parallel.one_core import OneCore
 
 LENGTH = struct.Struct("<Q")
 """Format of the size of the message that follows."""
@@ -103,8 +104,9 @@ def _end_group() -> None:
 
 
 def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, server: Server) -> None:
-    pid = os.getpid()
+    pid, one_core = os.getpid(), OneCore()
     while (request := _received(requests)) is not None:
+        is_bound = one_core.release()
         number, operation, arguments = read_request(request, memory.arrays)
         parts = server.answer(operation, arguments)
         del arguments
@@ -114,6 +116,8 @@ def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, s
             with suppress(Exception):  # an agent may have closed or replaced it
                 stream.flush()
         data = wire.write_answer(number, time.process_time(), memory.free, parts)
+        # Before the evaluator has the answer: then it can bind this thread itself.
+        one_core.stay() if is_bound else one_core.remember()
         connection.sendall(LENGTH.pack(len(data)) + data)
 
 

@@ -17,7 +17,6 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -35,8 +34,10 @@ from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
 from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, with_absolute_file
 from evonav.evaluation.hosting.model_relay import ModelRelay
+from evonav.evaluation.hosting.scratch import new_scratch
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each, search_path
+from evonav.parallel.one_core import OneCore
 
 LOG_NAME = "agents.log"
 """File in a run's folder with all output of agents."""
@@ -94,8 +95,8 @@ class AgentHosting:
     """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
     scratch: str | None = None
     """Folder for the folders in which processes in a sandbox may write; default: the system's for temporary files."""
-    saves_memory: bool = False
-    """Give back shared memory that an observation leaves unused, since many episodes wait at once."""
+    is_one_of_many: bool = False
+    """A worker has many episodes at once: unused shared memory is given back, and an agent may wake on any core."""
     is_debugged: bool = False
     """Open Python's debugger where an agent raises; only in the evaluator's own process, on a terminal."""
 
@@ -131,9 +132,9 @@ class AgentProcess:
         self._hosting = hosting
         self._closing = threading.RLock()
         self._ends = ExitStack()
-        self._block = SharedBlock(saves_memory=hosting.saves_memory)
+        self._block = SharedBlock(saves_memory=hosting.is_one_of_many)
         self._ends.callback(self._block.close)
-        self._scratch = _new_scratch(hosting) if hosting.is_sandboxed else None
+        self._scratch = new_scratch(hosting.scratch) if hosting.is_sandboxed else None
         if self._scratch is not None:
             self._ends.callback(shutil.rmtree, self._scratch, ignore_errors=True)
         self.relay = ModelRelay() if hosting.relays_model else None
@@ -175,6 +176,7 @@ class AgentProcess:
         for descriptor in (self._connection.fileno(), self._watch):
             if descriptor is not None:
                 self._poll.register(descriptor, select.POLLIN)
+        self._one_core = OneCore()
         self._num_asked = 0
         self._request = ("", 0.0, 0.0)
         """The request that was sent last: its operation, its time limit, and when that has passed."""
@@ -279,6 +281,8 @@ class AgentProcess:
             head, parts = wire.read_answer(self._message(self._request[2]), self._num_asked)
         except (OSError, InvalidArgumentError) as error:
             raise self._lost(error) from None
+        finally:
+            self._one_core.release()
         self._is_waiting = False
         self._own_cpu_s, self._block.free = head.cpu_s, head.free_slot
         if (failure := parts.get("failure")) is not None:
@@ -299,6 +303,8 @@ class AgentProcess:
         self._num_asked += 1
         request = write_request(self._num_asked, operation, arguments, self._block.write)
         self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
+        if self._num_asked > 1 and not self._hosting.is_one_of_many:  # it waits, it does not start
+            self._one_core.stay(self._process.pid)
         self._connection.sendall(LENGTH.pack(len(request)) + request)
 
     def _message(self, deadline_s: float) -> bytes:
@@ -345,6 +351,7 @@ class AgentProcess:
         Args:
             is_at_once: Do not wait for the process to end by itself.
         """
+        self._one_core.release()
         with self._closing:  # a worker that ends closes what an episode on a thread may be closing
             self._connection.close()
             try:
@@ -382,12 +389,6 @@ def check_importable(name: str, hosting: AgentHosting, fork_server: ForkServer |
         text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
         message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice
         raise InvalidArgumentError(message) from None
-
-
-def _new_scratch(hosting: AgentHosting) -> Path:
-    """Make a folder; that of the hosting is not there on other machines of a cluster."""
-    folder = hosting.scratch if hosting.scratch is not None and Path(hosting.scratch).is_dir() else None
-    return Path(tempfile.mkdtemp(prefix="evonav-agent-", dir=folder))
 
 
 def failure_of(text: bytes, *, is_sandboxed: bool = False) -> AgentFailedError:

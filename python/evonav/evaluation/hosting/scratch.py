@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 
 from evonav.errors import StoreError
 from evonav.parallel.folders import LOCK_NAME, writing
@@ -31,6 +31,16 @@ def agents_scratch() -> Iterator[str]:
                     with writing(folder):
                         shutil.rmtree(folder)
         yield name
+
+
+def new_scratch(folder: str | None) -> Path:
+    """Return a new folder for one process.
+
+    Args:
+        folder: The lent folder; default, and where it is not there, as on other machines of a cluster: the system's.
+    """
+    parent = folder if folder is not None and Path(folder).is_dir() else None
+    return Path(mkdtemp(prefix="evonav-agent-", dir=parent))
 
 
 def _may_be_left(folder: Path) -> bool:

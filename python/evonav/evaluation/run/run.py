@@ -245,7 +245,7 @@ def _hosting(request: RunRequest, workforce: Workforce) -> AgentHosting:
         hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
         relays_model=(hosting.is_sandboxed or workforce.jobs_at_once > 1)  # else each process has the client's memory
         and is_relayed(request.config.backend.decision),
-        saves_memory=workforce.jobs_at_once > 1,
+        is_one_of_many=workforce.jobs_at_once > 1,
         log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
     )
 

@@ -1,0 +1,59 @@
+"""Keep a thread, and a process that works while the thread waits, on one core (Linux).
+
+The scheduler wakes a process on an idle core if there is one. Two processes that take turns would use two cores, and
+each would fetch what both use, such as the images of an observation, from the caches of the other's core.
+"""
+
+import ctypes
+import os
+from collections.abc import Set as AbstractSet
+from contextlib import suppress
+from functools import cache
+
+IS_SUPPORTED = hasattr(os, "sched_setaffinity")
+
+
+class OneCore:
+    """Binds a thread to one of its cores for a while."""
+
+    def __init__(self) -> None:
+        """Bind nothing yet."""
+        self._cores: AbstractSet[int] = frozenset()
+
+    def remember(self) -> None:
+        """Note on which cores this thread may run."""
+        if IS_SUPPORTED:
+            with suppress(OSError):
+                self._cores = os.sched_getaffinity(0)
+
+    def stay(self, pid: int | None = None) -> None:
+        """Bind this thread to the core on which it runs, until `release`.
+
+        Args:
+            pid: Number of a process that waits for this thread; its main thread is bound to the same core.
+        """
+        self.remember()
+        if len(self._cores) > 1 and (core := _core()) in self._cores:
+            with suppress(OSError):  # the process has ended, or the system does not allow it
+                os.sched_setaffinity(0, {core})
+                if pid is not None:
+                    os.sched_setaffinity(pid, {core})
+
+    def release(self) -> bool:
+        """Let this thread run on the cores that were noted; return whether it was bound since, by whichever process."""
+        if not self._cores or os.sched_getaffinity(0) == self._cores:
+            return False
+        with suppress(OSError):
+            os.sched_setaffinity(0, self._cores)
+        return True
+
+
+def _core() -> int:
+    """Return the number of the core on which this thread runs; -1 if that is not known."""
+    library = _library()
+    return int(library.sched_getcpu()) if hasattr(library, "sched_getcpu") else -1
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    return ctypes.CDLL(None)
