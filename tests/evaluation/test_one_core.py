@@ -23,7 +23,7 @@ from evonav.agents.random_walk import RandomWalk
 class Confined(RandomWalk):
     def begin_task(self, task):
         with Path(__file__).with_suffix(".json").open("a") as file:
-            print(json.dumps(sorted(os.sched_getaffinity(0))), file=file)
+            print(json.dumps([os.sched_getscheduler(0), sorted(os.sched_getaffinity(0))]), file=file)
         if task:
             os.sched_setaffinity(0, task)
 """
@@ -38,8 +38,10 @@ def test_a_thread_and_a_process_share_a_core_until_released():
         shared = os.sched_getaffinity(waiting.pid)
         assert len(shared) == 1
         assert shared == os.sched_getaffinity(0)
+        assert os.sched_getscheduler(0) == os.SCHED_BATCH
         assert one_core.release()
         assert os.sched_getaffinity(0) == cores
+        assert os.sched_getscheduler(0) == os.SCHED_OTHER
         assert not one_core.release()
         waiting.communicate(b"\n")
     one_core.stay(waiting.pid)  # it has ended
@@ -60,7 +62,7 @@ def test_an_agent_that_works_may_use_all_cores_or_those_that_it_chooses(tmp_path
             agent.ask("begin_task", some)
             assert sorted(os.sched_getaffinity(0)) == cores
     seen = [json.loads(line) for line in (tmp_path / "confined.json").read_text().splitlines()]
-    assert seen == [cores, cores[:1], cores[1:]]
+    assert seen == [[os.SCHED_OTHER, some] for some in (cores, cores[:1], cores[1:])]
 
 
 def test_a_worker_is_free_again_when_an_agent_dies(tmp_path):

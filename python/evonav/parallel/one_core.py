@@ -14,11 +14,16 @@ IS_SUPPORTED = hasattr(os, "sched_setaffinity")
 
 
 class OneCore:
-    """Binds a thread to one of its cores for a while."""
+    """Binds a thread to one of its cores for a while.
+
+    A bound thread that is woken does not interrupt the one that wakes it, which is about to wait (`SCHED_BATCH`).
+    Interrupted, that one would be ready to run on the same core, and the system would move one of the two.
+    """
 
     def __init__(self) -> None:
         """Bind nothing yet."""
         self._cores: AbstractSet[int] = frozenset()
+        self._is_patient = False
 
     def remember(self) -> None:
         """Note on which cores this thread may run."""
@@ -36,11 +41,18 @@ class OneCore:
         if len(self._cores) > 1 and (core := _core()) in self._cores:
             with suppress(OSError):  # the process has ended, or the system does not allow it
                 os.sched_setaffinity(0, {core})
+                if os.sched_getscheduler(0) == os.SCHED_OTHER:
+                    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+                    self._is_patient = True
                 if pid is not None:
                     os.sched_setaffinity(pid, {core})
 
     def release(self) -> bool:
         """Let this thread run on the cores that were noted; return whether it was bound since, by whichever process."""
+        if self._is_patient:
+            with suppress(OSError):
+                os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+            self._is_patient = False
         if not self._cores or os.sched_getaffinity(0) == self._cores:
             return False
         with suppress(OSError):
