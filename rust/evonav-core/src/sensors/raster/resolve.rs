@@ -90,25 +90,32 @@ fn body_of(mesh: &SceneMesh, tag: u32) -> i32 {
     tag.checked_sub(1).map_or(0, |face| mesh.faces[face as usize].body as i32 + 1)
 }
 
-/// Set the instance ids of a row by its face tags. Most blocks lie within one face.
+/// Set the instance ids of a row by its face tags.
 #[inline(always)]
 fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
     let mut last = (0, 0);
-    for (bodies, tags) in bodies.chunks_mut(LANES).zip(tags) {
-        // Compared without a branch a lane.
-        let mut different = 0;
-        for tag in tags {
-            different |= tag ^ last.0;
-        }
-        if different == 0 {
-            bodies.fill(last.1);
-            continue;
-        }
-        for (body, &tag) in bodies.iter_mut().zip(tags) {
-            if tag != last.0 {
-                last = (tag, body_of(mesh, tag));
-            }
-            *body = last.1;
-        }
+    let (blocks, rest) = bodies.as_chunks_mut();
+    for (bodies, tags) in blocks.iter_mut().zip(tags) {
+        *bodies = bodies_of(mesh, tags, &mut last);
     }
+    if !rest.is_empty() {
+        let bodies = bodies_of(mesh, &tags[blocks.len()], &mut last);
+        rest.copy_from_slice(&bodies[..rest.len()]);
+    }
+}
+
+/// Return the instance ids of a block. Most blocks lie within the face that comes last before them.
+#[inline(always)]
+fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES], last: &mut (u32, i32)) -> [i32; LANES] {
+    // Compared without a branch a lane.
+    let different = tags.iter().fold(0, |different, tag| different | (tag ^ last.0));
+    if different == 0 {
+        return [last.1; LANES];
+    }
+    tags.map(|tag| {
+        if tag != last.0 {
+            *last = (tag, body_of(mesh, tag));
+        }
+        last.1
+    })
 }

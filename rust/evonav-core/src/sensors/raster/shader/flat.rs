@@ -60,9 +60,8 @@ pub(super) struct Flat {
     /// orthographic views.
     shortness: Vec<[f32; LANES]>,
     bends: Bends,
-    /// [`LitFace::numbers`] of a row's pixels, and their colours, a channel a byte.
-    lanes: [Vec<f32>; 4],
-    packed: Vec<u32>,
+    /// Colours of a row's pixels, a channel a byte.
+    packed: Vec<[u32; LANES]>,
 }
 
 impl Flat {
@@ -125,50 +124,43 @@ impl Flat {
     #[inline(always)]
     fn paint(&mut self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
         let blocks = canvas.row_blocks(row);
-        self.look_up(&canvas.tags[blocks.clone()]);
-        let Self { lanes, packed, bends, shortness, .. } = self;
-        let num = packed.len();
-        let light = &mut bends.light[..num];
-        let [planes, red, green, blue] = lanes.each_ref().map(|lanes| &lanes[..num]);
-        let nearness = &canvas.nearness[blocks.clone()].as_flattened()[..num];
-        let shortness = &shortness[blocks].as_flattened()[..num];
-        for i in 0..num {
-            let facing = nearness[i] * shortness[i];
-            light[i] *= 1.0 - LAMP_SHARE + LAMP_SHARE * planes[i] * facing;
+        let Self { faces, packed, bends, shortness, .. } = self;
+        packed.resize(blocks.len(), [0; LANES]);
+        let (light, _) = bends.light.as_chunks::<LANES>();
+        let (tags, nearness) = (&canvas.tags[blocks.clone()], &canvas.nearness[blocks.clone()]);
+        let blocks = tags.iter().zip(nearness).zip(&shortness[blocks]).zip(light);
+        for (packed, (((tags, nearness), shortness), light)) in packed.iter_mut().zip(blocks) {
+            let [planes, channels @ ..] = numbers(faces, tags);
+            let mut lit = [0.0; LANES];
+            for i in 0..LANES {
+                let facing = nearness[i] * shortness[i];
+                lit[i] = light[i] * (1.0 - LAMP_SHARE + LAMP_SHARE * planes[i] * facing);
+            }
+            *packed = [0; LANES];
+            for (shift, channel) in [0, 8, 16].into_iter().zip(channels) {
+                for i in 0..LANES {
+                    packed[i] |= to_byte(channel[i] * lit[i]) << shift;
+                }
+            }
         }
-        for i in 0..num {
-            let [red, green, blue] =
-                [red, green, blue].map(|channel| to_byte(channel[i] * light[i]));
-            packed[i] = red | green << 8 | blue << 16;
-        }
-        write_pixels(packed, pixels);
+        write_pixels(packed.as_flattened(), pixels);
     }
+}
 
-    /// Set the numbers of the faces of a row's pixels.
-    #[inline(always)]
-    fn look_up(&mut self, tags: &[[u32; LANES]]) {
-        let Self { faces, lanes, packed, .. } = self;
-        lanes.iter_mut().for_each(|lanes| lanes.resize(tags.len() * LANES, 0.0));
-        packed.resize(tags.len() * LANES, 0);
-        for (block, tags) in tags.iter().enumerate() {
-            let place = block * LANES..(block + 1) * LANES;
-            // Most blocks lie within one face.
-            let different = tags.iter().fold(0, |different, tag| different | (tag ^ tags[0]));
-            if different == 0 {
-                let face = faces[tags[0] as usize].numbers();
-                for (lanes, number) in lanes.iter_mut().zip(face) {
-                    lanes[place.clone()].fill(number);
-                }
-                continue;
-            }
-            for (index, &tag) in place.zip(tags) {
-                let face = faces[tag as usize].numbers();
-                for (lanes, number) in lanes.iter_mut().zip(face) {
-                    lanes[index] = number;
-                }
-            }
+/// Return [`LitFace::numbers`] of the faces of a block's pixels. Most blocks lie within one face.
+#[inline(always)]
+fn numbers(faces: &[LitFace], tags: &[u32; LANES]) -> [[f32; LANES]; 4] {
+    let different = tags.iter().fold(0, |different, tag| different | (tag ^ tags[0]));
+    if different == 0 {
+        return faces[tags[0] as usize].numbers().map(|number| [number; LANES]);
+    }
+    let mut found = [[0.0; LANES]; 4];
+    for (i, &tag) in tags.iter().enumerate() {
+        for (lanes, number) in found.iter_mut().zip(faces[tag as usize].numbers()) {
+            lanes[i] = number;
         }
     }
+    found
 }
 
 /// [`Flat::shade`] and its arguments.
