@@ -71,16 +71,17 @@ class Probe:
             size["style"] = style
         config = SimulatorConfig(**size)
         simulators = self.simulators(config)
-        places = [(int(house), Pose(*place)) for house, *place in self.inputs["views"].tolist()]
+        camera = {"near_m": config.near_m, "far_m": config.far_m, "width_px": width_px, "height_px": height_px}
+        views = []  # made beforehand, as the peer's matrices are
+        for house, *place in self.inputs["views"].tolist():
+            simulator = simulators[int(house)]
+            pose = replace(Pose(*place), y_m=config.camera_height_m)
+            fov_rad = simulator.intrinsics.vertical_fov_rad
+            views.append((simulator, CameraView(pose, **camera, vertical_fov_rad=fov_rad)))
 
         def render(number: int) -> Any:  # noqa: ANN401 - its images
-            house, pose = places[number]
-            view = CameraView(
-                replace(pose, y_m=config.camera_height_m),
-                **{name: getattr(config, name) for name in ("width_px", "height_px", "near_m", "far_m")},
-                vertical_fov_rad=simulators[house].intrinsics.vertical_fov_rad,
-            )
-            return simulators[house].render_camera(view, rgb=style is not None)
+            simulator, view = views[number]
+            return simulator.render_camera(view, rgb=style is not None)
 
         return Operation(render, calls=5, answer=lambda number: _digest(render(number).depth_m, 0.01))
 
