@@ -11,6 +11,12 @@ use crate::geometry::{Vec2, Vec3};
 pub(super) const LANES: usize = 8;
 const LANE_INDEX: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
+/// Return whether all tags of a block are one, without a branch a lane.
+#[inline(always)]
+pub(super) fn shows_only(tags: &[u32; LANES], tag: u32) -> bool {
+    tags.iter().fold(0, |different, other| different | (other ^ tag)) == 0
+}
+
 /// A depth buffer: nearness (inverse depth in perspective views) and a tag (0: nothing drawn) of
 /// each pixel. Rows are padded to whole blocks.
 #[derive(Debug, Clone, Default)]

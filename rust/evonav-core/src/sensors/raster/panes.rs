@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::{
     sensors::raster::{
-        canvas::{Canvas, LANES},
+        canvas::{Canvas, LANES, shows_only},
         lens::Rays,
     },
     world::mesh::SceneMesh,
@@ -59,11 +59,7 @@ impl Panes {
             for (block, index) in canvas.row_blocks(row).enumerate() {
                 let (tags, nearness) = (&mut canvas.tags[index], &mut canvas.nearness[index]);
                 // Most blocks lie within the face of the block before.
-                let mut different = u32::from(last.1);
-                for tag in tags.iter() {
-                    different |= tag ^ last.0;
-                }
-                if different == 0 {
+                if !last.1 && shows_only(tags, last.0) {
                     continue;
                 }
                 for lane in 0..LANES.min(canvas.width_px - block * LANES) {

@@ -6,7 +6,7 @@ use crate::{
     Error,
     sensors::{
         raster::{
-            canvas::LANES,
+            canvas::{LANES, shows_only},
             frame::{FrameBuffer, Want},
             lens::{Lens, Optics},
         },
@@ -107,9 +107,7 @@ fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
 /// Return the instance ids of a block. Most blocks lie within the face that comes last before them.
 #[inline(always)]
 fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES], last: &mut (u32, i32)) -> [i32; LANES] {
-    // Compared without a branch a lane.
-    let different = tags.iter().fold(0, |different, tag| different | (tag ^ last.0));
-    if different == 0 {
+    if shows_only(tags, last.0) {
         return [last.1; LANES];
     }
     tags.map(|tag| {

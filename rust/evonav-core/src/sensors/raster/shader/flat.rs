@@ -8,7 +8,7 @@ use evonav_simd::Kernel;
 use crate::{
     geometry::Vec3,
     sensors::raster::{
-        canvas::{Canvas, LANES},
+        canvas::{Canvas, LANES, shows_only},
         lens::Optics,
         shader::{
             bends::{Bends, Shades},
@@ -150,8 +150,7 @@ impl Flat {
 /// Return [`LitFace::numbers`] of the faces of a block's pixels. Most blocks lie within one face.
 #[inline(always)]
 fn numbers(faces: &[LitFace], tags: &[u32; LANES]) -> [[f32; LANES]; 4] {
-    let different = tags.iter().fold(0, |different, tag| different | (tag ^ tags[0]));
-    if different == 0 {
+    if shows_only(tags, tags[0]) {
         return faces[tags[0] as usize].numbers().map(|number| [number; LANES]);
     }
     let mut found = [[0.0; LANES]; 4];

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::sensors::raster::canvas::{Canvas, LANES};
+use crate::sensors::raster::canvas::{Canvas, LANES, shows_only};
 
 /// Pixels of a row with the same tag, up to the start of the next run.
 #[derive(Debug, Clone, Copy)]
@@ -52,9 +52,6 @@ pub(super) fn spans(runs: &[Run], width_px: usize) -> impl Iterator<Item = (Rang
 #[inline(always)]
 fn run_length(tags: &[u32]) -> usize {
     let (blocks, _) = tags.as_chunks::<LANES>();
-    let is_equal = |block: &&[u32; LANES]| {
-        block.iter().fold(0, |different, tag| different | (tag ^ tags[0])) == 0
-    };
-    let whole = blocks.iter().take_while(is_equal).count() * LANES;
+    let whole = blocks.iter().take_while(|block| shows_only(block, tags[0])).count() * LANES;
     whole + tags[whole..].iter().take_while(|&&tag| tag == tags[0]).count()
 }
