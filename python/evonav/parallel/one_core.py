@@ -8,9 +8,10 @@ import ctypes
 import os
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
-from functools import cache
+from typing import Any
 
-IS_SUPPORTED = hasattr(os, "sched_setaffinity")
+_LIBC: Any = ctypes.CDLL(None) if hasattr(os, "sched_setaffinity") else None
+IS_SUPPORTED = hasattr(_LIBC, "sched_getcpu")
 
 
 class OneCore:
@@ -38,7 +39,7 @@ class OneCore:
             pid: Number of a process that waits for this thread; its main thread is bound to the same core.
         """
         self.remember()
-        if len(self._cores) > 1 and (core := _core()) in self._cores:
+        if len(self._cores) > 1 and (core := int(_LIBC.sched_getcpu())) in self._cores:
             with suppress(OSError):  # the process has ended, or the system does not allow it
                 os.sched_setaffinity(0, {core})
                 if os.sched_getscheduler(0) == os.SCHED_OTHER:
@@ -58,14 +59,3 @@ class OneCore:
         with suppress(OSError):
             os.sched_setaffinity(0, self._cores)
         return True
-
-
-def _core() -> int:
-    """Return the number of the core on which this thread runs; -1 if that is not known."""
-    library = _library()
-    return int(library.sched_getcpu()) if hasattr(library, "sched_getcpu") else -1
-
-
-@cache
-def _library() -> ctypes.CDLL:
-    return ctypes.CDLL(None)
