@@ -10,6 +10,7 @@ from toy_agents import Explorer
 
 from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
 from evonav.agents.hosting import wire
+from evonav.agents.hosting.entries import Entries
 from evonav.errors import DecisionError
 from evonav.world.simulator import Action
 
@@ -232,6 +233,7 @@ class Forging(Explorer):
         super().begin_stage(goal)
         for part in (wire.ENTRIES, wire.DIAGNOSTICS, wire.COSTS, wire.SENSORS):
             part.__dict__.pop("write", None)
+        Entries.write = lambda self, entries: wire.ENTRIES.write(entries)
         if goal.stage <= len(RAW):
             name, text, _ = RAW[goal.stage - 1]
             getattr(wire, name).__dict__["write"] = lambda value: text

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
 from evonav.agents.hosting import wire
+from evonav.agents.hosting.entries import Entries
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
 
@@ -171,3 +172,45 @@ def test_answers_are_read_as_written(number, cpu_s, slot, parts) -> None:
 def test_what_is_no_answer_is_named(message, error) -> None:
     with pytest.raises(InvalidArgumentError, match=error):
         wire.read_answer(message, 1)
+
+
+@given(st.lists(st.lists(ENTRIES, max_size=4), max_size=4))
+def test_a_memory_is_read_as_written_again_and_again(memories) -> None:
+    written, read = Entries(), Entries()
+    for memory in (*memories, *memories[::-1]):
+        text = written.write(memory)
+        assert json.loads(text) == json.loads(wire.ENTRIES.write(memory))
+        assert read.read(text) == read.read(wire.ENTRIES.write(memory)) == memory
+
+
+def test_entries_that_have_not_changed_are_the_same_objects() -> None:
+    first, second, third = (EntryBelief(k, "Mug\t", (0.0, k, 0.0), (1.0, 1.0, 1.0), 1) for k in range(3))
+    written, read = Entries(), Entries()
+    before = read.read(written.write([first, second]))
+    after = read.read(written.write([third, second]))
+    assert after == [third, second]
+    assert after[1] is before[1]
+
+
+def test_an_entry_that_can_change_is_written_anew() -> None:
+    size_m = [1.0, 1.0, 1.0]
+    entry, written = EntryBelief(1, "Mug", (0.0, 0.0, 0.0), size_m, 1), Entries()
+    assert Entries().read(written.write([entry]))[0].size_m == (1.0, 1.0, 1.0)
+    size_m[0] = 2.0
+    assert Entries().read(written.write([entry]))[0].size_m == (2.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("text", [b"", b"{}", b"[1]", b"[,\t]", b"null", b'[{"entry_id":1},\t{}'])
+def test_a_malformed_memory_is_refused_as_a_whole(text) -> None:
+    with pytest.raises(InvalidArgumentError) as whole:
+        wire.ENTRIES.read(text)
+    with pytest.raises(InvalidArgumentError) as found:
+        Entries().read(text)
+    assert str(found.value) == str(whole.value)
+
+
+def test_the_wrong_entry_of_a_memory_is_named() -> None:
+    good, bad = (EntryBelief(k, "Mug", (0.0, 0.0, 0.0), (size_m, 1.0, 1.0), 1) for k, size_m in enumerate((1.0, -1.0)))
+    entries = Entries()
+    with pytest.raises(InvalidArgumentError, match=r"entries\.1 = "):
+        entries.read(entries.write([good, bad]))

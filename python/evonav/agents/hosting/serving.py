@@ -22,6 +22,7 @@ from typing import Any, BinaryIO, Literal, Protocol
 from evonav.agents.agent import Agent, ExplainingAgent
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import sandbox, wire
+from evonav.agents.hosting.entries import Entries
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
 from evonav.agents.hosting.requests import read_request
 from evonav.agents.hosting.shared_slots import SharedSlots
@@ -138,6 +139,7 @@ class _Server:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
         self._explaining: ExplainingAgent | None = None
+        self._entries = Entries()
         self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
@@ -188,7 +190,7 @@ class _Server:
     def do_entries(self) -> dict[str, bytes]:
         """Return the object memory, if the agent explains itself."""
         agent = self._explaining
-        return {} if agent is None else {"entries": wire.ENTRIES.write(list(agent.entries()))}
+        return {} if agent is None else {"entries": self._entries.write(list(agent.entries()))}
 
     def do_costs(self) -> dict[str, bytes]:
         """Return the decision model's costs since it was made, and this process's peak memory."""

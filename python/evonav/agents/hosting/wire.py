@@ -98,8 +98,7 @@ class Part(Generic[T]):
             text = _json_of(value)
         except (TypeError, ValueError, RecursionError) as error:
             raise InvalidArgumentError(f"{self._name}: not JSON-ready: {error}") from error
-        self._check_size(text)
-        return text
+        return self.checked(text)
 
     def read(self, text: bytes) -> T:
         """Return the value of a JSON text.
@@ -107,15 +106,20 @@ class Part(Generic[T]):
         Raises:
             InvalidArgumentError: The text is malformed; the message has the first field that is wrong, and its value.
         """
-        self._check_size(text)
         try:
-            return self._adapter.validate_json(text, strict=True)
+            return self._adapter.validate_json(self.checked(text), strict=True)
         except ValidationError as error:
             raise InvalidArgumentError(_first_problem(error, self._name)) from None
 
-    def _check_size(self, text: bytes) -> None:
+    def checked(self, text: bytes) -> bytes:
+        """Return a JSON text that is not too large.
+
+        Raises:
+            InvalidArgumentError: It is.
+        """
         if len(text) > self._max_bytes:
             raise InvalidArgumentError(f"{self._name}: {len(text)} bytes of JSON: must be at most {self._max_bytes}")
+        return text
 
 
 def _json_of(value: object) -> bytes:
@@ -290,9 +294,10 @@ def write_sensors(agent: Agent) -> bytes:
 DIAGNOSTICS: Part[RoundDiagnostics] = Part(
     "diagnostics", Annotated[RoundDiagnostics, AfterValidator(_possible_diagnostics)], MAX_DIAGNOSTICS_BYTES
 )
-ENTRIES: Part[list[EntryBelief]] = Part(
-    "entries", Annotated[list[Annotated[EntryBelief, AfterValidator(_possible_entry)]], FailFast()], MAX_ENTRIES_BYTES
-)
+_Entry = Annotated[EntryBelief, AfterValidator(_possible_entry)]
+ENTRY: Part[EntryBelief] = Part("entries", _Entry, MAX_ENTRIES_BYTES)
+"""An entry of an object memory."""
+ENTRIES: Part[list[EntryBelief]] = Part("entries", Annotated[list[_Entry], FailFast()], MAX_ENTRIES_BYTES)
 """An object memory."""
 
 

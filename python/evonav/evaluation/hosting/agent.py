@@ -7,6 +7,7 @@ from typing import TypeVar
 from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
 from evonav.agents.explanation import explaining
 from evonav.agents.hosting import wire
+from evonav.agents.hosting.entries import Entries
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
@@ -84,6 +85,7 @@ class LocalAgent(HostedAgent):
         """Host an agent."""
         self._agent = agent
         self._explaining = explaining(agent)
+        self._entries = Entries()
         self._observations: list[Observation] = []
 
     @property
@@ -118,7 +120,7 @@ class LocalAgent(HostedAgent):
         """Return the object memory; None if the agent does not explain itself."""
         if self._explaining is None:
             return None
-        return wire.ENTRIES.read(wire.ENTRIES.write(list(self._explaining.entries())))
+        return self._entries.read(self._entries.write(list(self._explaining.entries())))
 
 
 class RemoteAgent(HostedAgent):
@@ -153,6 +155,7 @@ class RemoteAgent(HostedAgent):
         self._sensors: SensorConfig | None = None
         self._lost_between: AgentFailedError | None = None
         """The loss of the process after a stage, by which the next one fails."""
+        self._entries = Entries()
         self._last_parts: dict[str, bytes] = {}
         """Parts of the answer to the last `begin_stage` or `act`."""
         self._label = name
@@ -213,7 +216,7 @@ class RemoteAgent(HostedAgent):
             raise failure_of(failure, is_sandboxed=self._processes.hosting.is_sandboxed)
         if text is None:
             text = self._ask("entries").get("entries")
-        return None if text is None else wire.ENTRIES.read(text)
+        return None if text is None else self._entries.read(text)
 
     def costs(self) -> Mapping[str, float]:
         """Return what its decision model has cost since it was made; empty if that cannot be read."""
