@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -13,7 +12,7 @@ from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError
 from evonav.world.appearance import Change, changes_json
 from evonav.world.camera import CameraView, Images
-from evonav.world.pose import Pose
+from evonav.world.pose import Pose, canonical_at, moved
 from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
@@ -202,9 +201,8 @@ class EmbeddedSimulator:
         Raises:
             InvalidArgumentError: The pose is not finite.
         """
-        at = (pose or self._pose).canonical()
+        at = canonical_at(self.config.camera_height_m, pose or self._pose)
         depth_m, colours, ids = self._world.render(at, rgb=rgb, instances=instances)
-        at = replace(at, y_m=self.config.camera_height_m)
         return Frame(at, self.intrinsics, depth_m, colours, None if ids is None else unexpanded(ids))
 
     def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
@@ -342,7 +340,7 @@ class EmbeddedSimulator:
         if pose is not None:
             if not core.is_reachable(_on_ground(pose)):
                 x_m, _, z_m = self.nearest_reachable_position(pose.position_m)
-                pose = replace(pose, x_m=x_m, z_m=z_m)
+                pose = moved(pose, x_m, z_m, pose.yaw_rad)
             self._pose = self.config.standing(pose)
         return self._pose
 

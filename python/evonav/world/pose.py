@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 _DECIMALS_DEG = 4
 """Decimals of an angle in degrees: angles are whole multiples of 1e-4 degrees, see `Pose.canonical`."""
@@ -58,9 +59,22 @@ class Pose:
         AI2-THOR uses degrees and evonav radians. Whole multiples of 1e-4 degrees survive the conversion there and back
         bit by bit, so images and steps are the same whichever side computes them.
         """
-        return Pose(
-            self.x_m, self.y_m, self.z_m, canonical_yaw_rad(self.yaw_rad), canonical_horizon_rad(self.horizon_rad)
-        )
+        return canonical_at(self.y_m, self)
+
+
+def canonical_at(y_m: float, pose: Pose) -> Pose:
+    """Return `pose.canonical()` at another height."""
+    return Pose(pose.x_m, y_m, pose.z_m, canonical_yaw_rad(pose.yaw_rad), canonical_horizon_rad(pose.horizon_rad))
+
+
+def moved(pose: Pose, x_m: float, z_m: float, yaw_rad: float) -> Pose:
+    """Return a pose at another point of the floor, with another yaw; `replace` takes thrice as long."""
+    return Pose(x_m, pose.y_m, z_m, yaw_rad, pose.horizon_rad)
+
+
+def turned(pose: Pose, yaw_rad: float) -> Pose:
+    """Return a pose with another yaw."""
+    return moved(pose, pose.x_m, pose.z_m, yaw_rad)
 
 
 def canonical_yaw_rad(yaw_rad: float) -> float:
@@ -68,6 +82,7 @@ def canonical_yaw_rad(yaw_rad: float) -> float:
     return math.radians(canonical_yaw_deg(math.degrees(yaw_rad)))
 
 
+@lru_cache(maxsize=64)  # an agent turns and walks, but hardly ever looks up or down
 def canonical_horizon_rad(horizon_rad: float) -> float:
     """Round a horizon to 1e-4 degrees; see `Pose.canonical`."""
     return math.radians(canonical_deg(math.degrees(horizon_rad)))

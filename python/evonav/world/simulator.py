@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import Literal, Protocol, cast
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav._core import RunImage
-from evonav.world.pose import Pose
+from evonav.world.pose import Pose, canonical_at, moved, turned
 from evonav.world.run_images import stored, with_run_images
 
 
@@ -89,7 +89,7 @@ class SimulatorConfig:
 
     def standing(self, pose: Pose) -> Pose:
         """Return a pose, its angles canonical, at the height of the middle of a standing body."""
-        return replace(pose, y_m=self.agent_height_m / 2).canonical()
+        return canonical_at(self.agent_height_m / 2, pose)
 
     def on_floor(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `(N, 3)` positions of the agent at `(N, 2)` points, `(x, z)`."""
@@ -102,9 +102,9 @@ class SimulatorConfig:
         """Return the pose that an action leads to if nothing is in the way."""
         if action is Action.MOVE_FORWARD:
             x_m = pose.x_m + self.move_m * math.sin(pose.yaw_rad)
-            return replace(pose, x_m=x_m, z_m=pose.z_m + self.move_m * math.cos(pose.yaw_rad))
+            return moved(pose, x_m, pose.z_m + self.move_m * math.cos(pose.yaw_rad), pose.yaw_rad)
         turn_rad = {Action.TURN_LEFT: -1.0, Action.TURN_RIGHT: 1.0}.get(action, 0.0) * math.radians(self.turn_deg)
-        return replace(pose, yaw_rad=pose.yaw_rad + turn_rad).canonical()
+        return turned(pose, pose.yaw_rad + turn_rad).canonical()
 
 
 @with_run_images("instances")

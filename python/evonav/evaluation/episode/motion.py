@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Protocol
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
-from evonav.world.pose import Pose
+from evonav.world.pose import Pose, moved, turned
 from evonav.world.simulator import Action, OccupancyGrid, Simulator
 
 Point2 = tuple[float, float]
@@ -213,7 +213,7 @@ def navigate(
     for point in points:
         x0, z0 = passed[-1]
         yaw_rad = math.atan2(point[0] - x0, point[1] - z0)
-        if not simulator.teleport(replace(simulator.pose, x_m=point[0], z_m=point[1], yaw_rad=yaw_rad)):
+        if not simulator.teleport(moved(simulator.pose, *point, yaw_rad)):
             return Motion(tuple(passed), is_success=False)
         passed.append(point)
     if is_end and action.face_m is not None:
@@ -231,7 +231,7 @@ def walk(simulator: Simulator, leg_m: Sequence[Point2], yaw_rad: float | None = 
     """
     (x0, z0), (x1, z1) = leg_m[-2], leg_m[-1]
     heading_rad = math.atan2(x1 - x0, z1 - z0) if yaw_rad is None else yaw_rad
-    is_success = simulator.teleport(replace(simulator.pose, x_m=x1, z_m=z1, yaw_rad=heading_rad))
+    is_success = simulator.teleport(moved(simulator.pose, x1, z1, heading_rad))
     return Motion(tuple(leg_m), is_success=is_success)
 
 
@@ -240,7 +240,7 @@ def face(simulator: Simulator, point_m: Point2) -> None:
     pose = simulator.pose
     dx_m, dz_m = point_m[0] - pose.x_m, point_m[1] - pose.z_m
     if math.hypot(dx_m, dz_m) > 1e-6:
-        simulator.teleport(replace(pose, yaw_rad=math.atan2(dx_m, dz_m)))
+        simulator.teleport(turned(pose, math.atan2(dx_m, dz_m)))
 
 
 def stay(simulator: Simulator) -> Motion:

@@ -9,7 +9,7 @@ from evonav.evaluation.records.costs import Stopwatch
 from evonav.perception import Percept, Perception, StageScene
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.sensors.visibility import visible_occupancy
-from evonav.world.pose import Pose
+from evonav.world.pose import Pose, turned
 from evonav.world.simulator import Frame, OccupancyGrid, Simulator
 
 
@@ -83,9 +83,7 @@ class Sensors:
         yaws_rad = view_yaws_rad(schedule, pose.yaw_rad)
         with self._stopwatch.timing("simulation"):
             rgb = self._config.needs_rgb or self._perception.needs_rgb
-            frames = [
-                self._simulator.render(replace(pose, yaw_rad=yaw_rad), rgb=rgb, instances=True) for yaw_rad in yaws_rad
-            ]
+            frames = [self._simulator.render(turned(pose, yaw_rad), rgb=rgb, instances=True) for yaw_rad in yaws_rad]
         with self._stopwatch.timing("perception"):
             percepts = self._perception.perceive(frames)
             views = tuple(self._view(frame, percept) for frame, percept in zip(frames, percepts, strict=True))
@@ -104,7 +102,7 @@ class Sensors:
 
     def _view(self, frame: Frame, percept: Percept) -> View:
         # Cells are where the oracle occupancy has them, whatever the perception believes of the pose.
-        place = replace(self._simulator.pose, yaw_rad=frame.pose.yaw_rad)
+        place = turned(self.pose, frame.pose.yaw_rad)
         return View(
             pose=percept.pose,
             intrinsics=frame.intrinsics,
