@@ -21,6 +21,7 @@ from evonav.evaluation.records.changes import Relocation
 from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
+from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, SceneObject
 
 STALE_MARGIN_M = 0.3
@@ -83,8 +84,16 @@ def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]
 
 def distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
     """Return the distance from a point to the axis-aligned box of a body; 0 inside."""
-    gaps_m = (max(0.0, abs(p - c) - s / 2) for p, c, s in zip(point_m, body.centre_m, body.size_m, strict=True))
-    return math.hypot(*gaps_m)
+    (x_m, y_m, z_m), (width_m, height_m, depth_m) = body.centre_m, body.size_m
+    beyond_x_m = max(0.0, abs(point_m[0] - x_m) - width_m / 2)
+    beyond_y_m = max(0.0, abs(point_m[1] - y_m) - height_m / 2)
+    beyond_z_m = max(0.0, abs(point_m[2] - z_m) - depth_m / 2)
+    return math.hypot(beyond_x_m, beyond_y_m, beyond_z_m)
+
+
+def is_near(place_m: Point3, camera: Pose) -> bool:
+    """Return whether a place is within `EVIDENCE_RANGE_M` of a camera."""
+    return math.hypot(place_m[0] - camera.x_m, place_m[2] - camera.z_m) <= EVIDENCE_RANGE_M
 
 
 def shows_place(frame: Frame, belief: EntryBelief) -> bool:
@@ -95,7 +104,7 @@ def shows_place(frame: Frame, belief: EntryBelief) -> bool:
         belief: An entry; what stands in its own box does not hide it.
     """
     pose, intrinsics = frame.pose, frame.intrinsics
-    if math.hypot(belief.centre_m[0] - pose.x_m, belief.centre_m[2] - pose.z_m) > EVIDENCE_RANGE_M:
+    if not is_near(belief.centre_m, pose):
         return False
     ((col, row, depth_m),) = project(np.array([belief.centre_m]), pose, intrinsics).tolist()
     # NaN, for a place behind the camera, is in no range.
@@ -172,9 +181,8 @@ class StalenessTracker:
             self.bodies.setdefault(body.category, []).append(body)
         index_of = {body.id: index for index, body in enumerate(objects)}
         self._target = index_of.get(self._target_id)
-        self._is_object = np.array([body.kind == "object" for body in objects], dtype=np.bool_)
-        self._ground_m = np.array([(body.centre_m[0], body.centre_m[2]) for body in objects]).reshape(-1, 2)
-        self._is_seen = np.array([body.id in self._so_far.seen_ids for body in objects], dtype=np.bool_)
+        self._seen = {index for index, body in enumerate(objects) if body.id in self._so_far.seen_ids}
+        self._movable = {index for index, body in enumerate(objects) if body.kind == "object"}
         origins_m: dict[str, Point3] = {}
         for one in relocations:
             origins_m.setdefault(one.object_id, one.from_m)
@@ -202,7 +210,7 @@ class StalenessTracker:
     @property
     def is_target_seen(self) -> bool:
         """True if the target was seen, now or earlier in the episode, wherever it stood then."""
-        return self._target is not None and bool(self._is_seen[self._target])
+        return self._target in self._seen
 
     def target_box_distance_m(self, point_m: tuple[float, float]) -> float | None:
         """Return the ground-plane distance from a point to the target's box; `None` without a target in the house."""
@@ -246,17 +254,20 @@ class StalenessTracker:
         instances = frame.stored_instances
         if instances is None:
             return
-        is_visible = _core.instance_areas(instances, len(self._objects)) >= self._min_visible_px
-        self.is_target_visible |= self._target is not None and bool(is_visible[self._target])
-        offsets_m = self._ground_m - (frame.pose.x_m, frame.pose.z_m)
-        is_visible &= self._is_object & (np.hypot(offsets_m[:, 0], offsets_m[:, 1]) <= EVIDENCE_RANGE_M)
-        self._is_seen |= is_visible
+        areas_px = _core.instance_areas(instances, len(self._objects))
+        visible = set(np.flatnonzero(areas_px >= self._min_visible_px).tolist())
+        self.is_target_visible |= self._target in visible
+        visible &= self._movable
+        self._seen.update(index for index in visible - self._seen if self._is_near(index, frame.pose))
         for moved in self._moved:
-            if moved.seen_round is None and is_visible[moved.index]:
+            if moved.seen_round is None and moved.index in visible and self._is_near(moved.index, frame.pose):
                 moved.seen_round = self._round
         for stale in self._stale:
             if stale.evident_round is None and shows_place(frame, stale.belief):
                 stale.evident_round = self._round
+
+    def _is_near(self, index: int, camera: Pose) -> bool:
+        return is_near(self._objects[index].centre_m, camera)
 
     @property
     def wants_entries(self) -> bool:
@@ -294,9 +305,7 @@ class StalenessTracker:
         self._so_far.beliefs = movable(beliefs)
 
     def _store_seen(self) -> None:
-        self._so_far.seen_ids.update(
-            body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen
-        )
+        self._so_far.seen_ids.update(self._objects[index].id for index in self._seen)
 
     def stale_entries(self) -> tuple[StaleEntryRecord, ...]:
         """Return the entries that were stale at the start."""
@@ -329,7 +338,7 @@ class StalenessTracker:
 
     def _memory(self, beliefs: Sequence[EntryBelief], matches: Sequence[SceneObject | None]) -> MemoryRecord:
         ids = {body.id for body in matches if body is not None}
-        seen = [body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen]
+        seen = [self._objects[index].id for index in self._seen]
         errors_m = [
             math.dist(belief.centre_m, body.centre_m)
             for belief, body in zip(beliefs, matches, strict=True)
