@@ -14,14 +14,15 @@ from evonav.speed_benchmark.timing import Sampling, one_core
 
 PRODUCT = {"agents", "generation", "gym", "mapping", "navigation", "rendering"}
 """Sections of `evonav bench`, modules of `evonav.speed_benchmark`; the other modules are beside this one."""
-ON_ALL_CORES = {"before_after", "gym"}
-ON_REQUEST = {"before_after"}
-"""Sections that only run when they are named: they need more than this checkout."""
+ON_ALL_CORES = {"before_after", "floors", "gym"}
+ON_REQUEST = {"before_after", "floors"}
+"""Sections that only run when they are named: they need more than this checkout, or minutes and nothing beside them."""
 SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
     "before_after": "Before and after",
     "evaluation": "Evaluation",
+    "floors": "Floors",
     "generation": "Task generation",
     "gym": "Gymnasium",
     "mapping": "Mapping",
