@@ -106,10 +106,10 @@ class EpisodeSpec:
         Raises:
             HouseError: The house is malformed, or has an object of an unknown category.
         """
-        image = image_uri(self.stages[stage - 1].public.reference_image, THUMBNAIL_PX)
-        house, change = self.parsed_house(stage), self.stages[stage - 1].change
-        at_end = None if change is None else house.apply(change.delta_json)
-        return floor_plan_of(house, task_id=self.task_id, stage=stage, reference_image=image, at_end=at_end)
+        spec = self.stages[stage - 1]
+        drawn = _drawn(spec.house_json, self.house, None if spec.change is None else spec.change.delta_json)
+        image = image_uri(spec.public.reference_image, THUMBNAIL_PX)
+        return drawn.model_copy(update={"task_id": self.task_id, "stage": stage, "reference_image": image})
 
     def blank_record(self, agent: str, stage: int) -> StageRecord:
         """Return the record of a stage that was not run; all other records of the stage start from it.
@@ -184,6 +184,14 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
 def _parsed(house_json: str, name: str) -> House:
     """Parse a house once for a stage and its floor plan."""
     return House(house_json, name=name)
+
+
+@lru_cache(maxsize=1)
+def _drawn(house_json: str, name: str, delta_json: str | None) -> FloorPlan:
+    """Draw the floor plan of a house, of no stage yet; every other stage has the house of the stage before."""
+    house = _parsed(house_json, name)
+    at_end = None if delta_json is None else house.apply(delta_json)
+    return floor_plan_of(house, task_id="", stage=0, reference_image=None, at_end=at_end)
 
 
 def _guided_walk(oracle: OracleStage) -> GuidedWalk:
