@@ -17,6 +17,7 @@ from pydantic_core import to_json
 
 from benches import waiting
 from benches.alone.row import Alone, Figure, in_turn, sums
+from evonav.agents.agent import SensorConfig
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import MockServer, serving
 from evonav.evaluation.records.store import RunStore
@@ -24,6 +25,7 @@ from evonav.generation.worker import GenerationOptions, process_house, put_task
 from evonav.house.files import BUNDLED, HouseTexts
 from evonav.memory.views import JPEG_QUALITY
 from evonav.speed_benchmark.timing import one_core
+from evonav.speed_benchmark.views import views_of_houses
 from evonav.tasks.manifest import Task
 from evonav.tasks.records import sha256_of
 from evonav.world.embedded import EmbeddedSimulator
@@ -31,7 +33,8 @@ from evonav.world.simulator import SimulatorConfig
 
 NUM_TASKS, TASKS_A_S = 20, 60
 NUM_FIRST, FIRST_MS = 5, 1000.0
-QUESTIONS_A_S, NUM_CORES, NUM_ENCODED = 50, 2, 5
+QUESTIONS_A_S, NUM_CORES, NUM_ENCODED, NUM_DRAWN_HOUSES = 50, 2, 5, 3
+VIEWS_A_ROUND = SensorConfig().later_rounds.count
 _IMPORTED = """
 import evonav.evaluation.run.worker
 from evonav.evaluation.run.components import Backend
@@ -175,21 +178,24 @@ def _questions() -> Iterator[str]:
             image.save(file, "JPEG", quality=JPEG_QUALITY)
             base64.b64encode(file.getvalue())
 
-    calls = {"encoded": encode, "written": lambda _: [to_json(request) for request in requests]}
+    simulators, views = views_of_houses(SimulatorConfig(), NUM_DRAWN_HOUSES)
+    calls = {
+        "encoded": encode,
+        "written": lambda _: [to_json(request) for request in requests],
+        "drawn": lambda _: [simulators[view.house].render_camera(view.camera) for view in views],
+    }
     with one_core():
         found = in_turn(calls, NUM_ENCODED)
-    parts = {name: [one / len(requests) for one in times_ms] for name, times_ms in found.items()}
+    shares = {"encoded": 1 / len(requests), "written": 1 / len(requests), "drawn": VIEWS_A_ROUND / len(views)}
+    parts = {name: [share * one for one in found[name]] for name, share in shares.items()}
     aim_ms = [1000 * NUM_CORES / QUESTIONS_A_S] * NUM_ENCODED
     work = f"a question with {sum(len(_pictures(one)) for one in requests) / len(requests):.0f} pictures, and its round"
     aim = f"{QUESTIONS_A_S} questions a second on {NUM_CORES} cores"
     yield from Figure(work, [question_ms] * NUM_ENCODED, aim, aim_ms).rows(
-        Alone(
-            f"its {len(pictures) / len(requests):.1f} new pictures as JPEG",
-            parts["encoded"],
-            "drawing, memory, sending",
-        ),
-        Alone("its JSON with all pictures", parts["written"], "the same"),
-        Alone("both", sums(*parts.values()), "the same"),
+        Alone(f"{VIEWS_A_ROUND} views of bundled houses drawn with colours", parts["drawn"], "all but drawing"),
+        Alone(f"its {len(pictures) / len(requests):.1f} new pictures as JPEG", parts["encoded"], "all else"),
+        Alone("its JSON with all pictures", parts["written"], "all else"),
+        Alone("all three", sums(*parts.values()), "object map, agents, perception, the way to the model"),
     )
 
 

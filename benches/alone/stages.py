@@ -2,7 +2,7 @@
 
 import gc
 import statistics
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from functools import partial
@@ -139,7 +139,7 @@ class _Noted(LocalAgent):
     def __init__(self, agent: Agent) -> None:
         super().__init__(agent)
         self.rounds: list[Round] = []
-        self._kept: list[Observation] = []
+        self._kept: deque[Observation] = deque(maxlen=NUM_KEPT)
         self._block = SharedBlock()
         self._slots = SharedSlots(self._block.descriptor)
         self._array_bytes = self._request_bytes = self._answer_bytes = 0
@@ -153,8 +153,7 @@ class _Noted(LocalAgent):
             return places
 
         self._request_bytes = len(write_request(0, "act", (observation, wants_entries), put))
-        if len(self._kept) < NUM_KEPT:
-            self._kept.append(observation)
+        self._kept.append(observation)
         super().look(observation, wants_entries=wants_entries)
 
     def act(self) -> AgentAction:
