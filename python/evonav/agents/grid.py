@@ -48,8 +48,11 @@ class CoarseFrame:
 
 def numbered(cells: NDArray[np.bool_], min_cells: int) -> NDArray[np.int32]:
     """Return the 4-connected groups of at least `min_cells` cells, numbered in row-major order; -1 elsewhere."""
-    parents: list[int] = []
-    runs: list[tuple[int, int, int]] = []
+    edges = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    rows, starts = np.nonzero(edges == 1)
+    _, ends = np.nonzero(edges == -1)
+    runs = list(zip(rows.tolist(), starts.tolist(), ends.tolist(), strict=True))
+    parents = list(range(len(runs)))
 
     def root(one: int) -> int:
         while parents[one] != one:
@@ -57,22 +60,15 @@ def numbered(cells: NDArray[np.bool_], min_cells: int) -> NDArray[np.int32]:
             one = parents[one]
         return one
 
-    previous: list[int] = []
-    edges = np.diff(np.pad(cells.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-    for row in range(len(cells)):
-        starts, ends = np.flatnonzero(edges[row] == 1).tolist(), np.flatnonzero(edges[row] == -1).tolist()
-        present = []
-        for start, end in zip(starts, ends, strict=True):
-            index = len(runs)
-            runs.append((row, start, end))
-            parents.append(index)
-            present.append(index)
-            for other in previous:
-                _, other_start, other_end = runs[other]
-                if other_start < end and start < other_end:
-                    a, b = root(other), root(index)
-                    parents[max(a, b)] = min(a, b)
-        previous = present
+    first = 0  # run that may touch the present one from the row before
+    for index, (row, start, end) in enumerate(runs):
+        while runs[first][0] < row - 1 or (runs[first][0] < row and runs[first][2] <= start):
+            first += 1
+        other = first
+        while runs[other][0] < row and runs[other][1] < end:
+            a, b = root(other), root(index)
+            parents[max(a, b)] = min(a, b)
+            other += 1
     sizes: dict[int, int] = {}
     for index, (_, start, end) in enumerate(runs):
         sizes[root(index)] = sizes.get(root(index), 0) + end - start

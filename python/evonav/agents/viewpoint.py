@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.grid import numbered
 from evonav.decision.candidates import Point2
 from evonav.sensors.observation import MapFrame
-
-_NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 
 
 def observation_point(
@@ -119,23 +118,10 @@ def _window(
 
 def _largest_group(cells: NDArray[np.bool_]) -> NDArray[np.int64] | None:
     """Return the `(N, 2)` cells of the largest 4-connected group, the first of equals; `None` without cells."""
-    # By hand: importing scipy.ndimage takes an agent's process longer than all else that it imports.
-    unseen = {(int(row), int(col)) for row, col in zip(*np.nonzero(cells), strict=True)}
-    largest: list[tuple[int, int]] = []
-    for start in sorted(unseen):
-        if start not in unseen:
-            continue
-        unseen.discard(start)
-        group = [start]
-        for row, col in group:
-            for d_row, d_col in _NEIGHBOURS:
-                after = (row + d_row, col + d_col)
-                if after in unseen:
-                    unseen.discard(after)
-                    group.append(after)
-        if len(group) > len(largest):
-            largest = group
-    return np.array(largest) if largest else None
+    # Not by scipy.ndimage: importing it takes an agent's process longer than all else that it imports.
+    groups = numbered(cells, min_cells=1)
+    sizes = np.bincount(groups[cells])
+    return np.argwhere(groups == sizes.argmax()) if len(sizes) else None
 
 
 def widest_direction_rad(
