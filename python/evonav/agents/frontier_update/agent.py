@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any, Literal
 
 from evonav.agents.agent import AgentAction
@@ -150,7 +151,7 @@ class FrontierUpdate(NavigatorAgent):
     def _ranked(
         self, entries: Sequence[ObjectEntry], remembered: Sequence[ObjectCandidate], observation: Observation
     ) -> list[ObjectCandidate]:
-        """Return the entries that may be candidates, the best first: by image features, by words or by meaning."""
+        """Return the best entries that may be candidates, the best first: by image features, by words or by meaning."""
         here = (observation.pose.x_m, observation.pose.z_m)
         feature = observation.goal_feature if self._goal_input != "image" else None  # it is of the sentence
         if feature is not None:
@@ -159,7 +160,8 @@ class FrontierUpdate(NavigatorAgent):
             order = rank_by_text(self._goal, remembered, here)
         else:
             order = rank_entries(self._matcher, self._goal, remembered, here)
-        return [remembered[index] for index in order if self._is_offered(entries[index])]
+        offered = (remembered[index] for index in order if self._is_offered(entries[index]))
+        return list(islice(offered, self.config.num_candidates))
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
         """Return whether an entry may be a candidate: a window never is."""

@@ -230,8 +230,7 @@ class Matcher:
 
     def room_signs(self, around: Sequence[ObjectCandidate]) -> list[tuple[str, Point2]]:
         """Return the objects that indicate a type of room: that room, and where they stand."""
-        rooms = ((self.sign_of(other.label), other) for other in around)
-        return [(room, other.ground_m) for room, other in rooms if room is not None]
+        return [(room, other.ground_m) for other in around if (room := self.sign_of(other.label)) is not None]
 
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
         """Return the same as `room_around`, from objects that were read before: for many places among the same ones."""
@@ -253,7 +252,7 @@ class Matcher:
         Doors and windows are no hints: every room has them.
         """
         mentioned = {r.noun for r in goal.relations if r.kind != "in" and not is_structure(r.noun)}
-        leads_m = [other.ground_m for other in around if canonical(other.label) in mentioned]
+        leads_m = [other.ground_m for other in around if mentioned and canonical(other.label) in mentioned]
         signs = [] if goal.room is None else self.room_signs(around)
         config, costs_m = self.config, []
         for frontier in frontiers:
