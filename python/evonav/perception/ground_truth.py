@@ -81,7 +81,7 @@ class GroundTruthPerception:
         masks, instances = self.number(frame, objects)
         return Detections(
             masks=unexpanded(masks),
-            labels=tuple(objects[index].category for index in instances),
+            labels=tuple([objects[index].category for index in instances]),
             confidences=np.ones(len(instances), np.float32),
         )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav._core import RunImage
 from evonav.world.pose import Pose
-from evonav.world.run_images import stored, unexpanded, with_run_images
+from evonav.world.run_images import unexpanded, with_run_images
 from evonav.world.simulator import Intrinsics
 
 
@@ -28,10 +28,11 @@ class Detections:
     features: NDArray[np.float32] | None = field(default=None, repr=False)
     """`(N, D)` unit image features (CLIP), if the perception computes them."""
 
-    @property
-    def stored_masks(self) -> NDArray[np.int32] | RunImage:
-        """The masks as they are stored, perhaps as runs of equal pixels; the core takes both."""
-        return cast("NDArray[np.int32] | RunImage", stored(self, "masks"))
+    if TYPE_CHECKING:
+
+        @property
+        def stored_masks(self) -> NDArray[np.int32] | RunImage:
+            """The masks as they are stored, perhaps as runs of equal pixels; the core takes both."""
 
     def taken(self, indices: Sequence[int]) -> "Detections":
         """Return some of the detections, numbered anew in the order given; the pixels of the others become -1."""

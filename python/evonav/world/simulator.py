@@ -4,14 +4,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, Protocol, cast
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav._core import RunImage
 from evonav.world.pose import Pose, canonical_at, moved, turned
-from evonav.world.run_images import stored, with_run_images
+from evonav.world.run_images import with_run_images
 
 
 class Action(Enum):
@@ -122,10 +122,11 @@ class Frame:
     instances: NDArray[np.int32] | None = None
     """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the `SceneObject`; `None` if not requested."""
 
-    @property
-    def stored_instances(self) -> NDArray[np.int32] | RunImage | None:
-        """The instances as they are stored, perhaps as runs of equal pixels; the core takes both."""
-        return cast("NDArray[np.int32] | RunImage | None", stored(self, "instances"))
+    if TYPE_CHECKING:
+
+        @property
+        def stored_instances(self) -> NDArray[np.int32] | RunImage | None:
+            """The instances as they are stored, perhaps as runs of equal pixels; the core takes both."""
 
 
 @dataclass(frozen=True, slots=True)

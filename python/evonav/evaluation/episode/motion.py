@@ -33,7 +33,7 @@ class Motion:
 
 def polyline_length_m(path_m: Sequence[Point2]) -> float:
     """Return the length of a polyline on the ground plane."""
-    return math.fsum(math.dist(a, b) for a, b in pairwise(path_m))
+    return math.fsum(map(math.dist, path_m, path_m[1:]))
 
 
 def length_outside_m(path_m: Sequence[Point2], centre_m: Point2, radius_m: float) -> float:

@@ -255,7 +255,7 @@ class StalenessTracker:
         if instances is None:
             return
         areas_px = _core.instance_areas(instances, len(self._objects))
-        visible = set(np.flatnonzero(areas_px >= self._min_visible_px).tolist())
+        visible = set((areas_px >= self._min_visible_px).nonzero()[0].tolist())
         self.is_target_visible |= self._target in visible
         visible &= self._movable
         self._seen.update(index for index in visible - self._seen if self._is_near(index, frame.pose))
