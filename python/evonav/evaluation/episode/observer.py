@@ -1,7 +1,5 @@
 """Observe episodes, and attribute the errors of a stage."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Protocol
 
 from evonav.agents.hosting import error_text
@@ -44,35 +42,36 @@ class StageFailedError(Exception):
         self.kind = kind
 
 
-@contextmanager
-def attribute_errors(kind: ErrorKind) -> Iterator[None]:
-    """Turn exceptions into a stage failure of `kind`; errors with a cause of their own keep it."""
-    try:
-        yield
-    except StageFailedError:
-        raise
-    except AgentFailedError as error:
-        raise StageFailedError(error.kind, str(error)) from error
-    except DecisionError as error:
-        raise StageFailedError(ErrorKind.DECISION, error_text.message_of(error)) from error
-    except Exception as error:
-        if kind is ErrorKind.AGENT:
-            raise _agent_failed(error) from error
-        if isinstance(error, SimulationError):
-            is_lost = isinstance(error, SimulatorLostError)
-            kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
-            raise StageFailedError(kind, str(error)) from error
-        raise StageFailedError(kind, f"{type(error).__name__}: {error}") from error
-    except (KeyboardInterrupt, EndedError):  # the user's, the driver's
-        raise
-    except BaseException as error:  # `sys.exit()` in an agent ends its stage, not the run
-        if kind is not ErrorKind.AGENT:
-            raise
-        raise _agent_failed(error) from error
+class AttributedErrors:
+    """Turns exceptions of a block into a stage failure of a kind; errors with a cause of their own keep it."""
+
+    def __init__(self, kind: ErrorKind) -> None:
+        """Store the kind."""
+        self._kind = kind
+
+    def __enter__(self) -> None:
+        """Begin the block."""
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Raise the failure, if there is one."""
+        if error is not None and (failure := _failure(error, self._kind)) is not None:
+            raise failure from error
 
 
-def _agent_failed(error: BaseException) -> StageFailedError:
-    return StageFailedError(ErrorKind.AGENT, error_text.describe(error, caller="evonav.evaluation"))
+def _failure(error: BaseException, kind: ErrorKind) -> StageFailedError | None:
+    """Return what an exception in a part of a stage becomes; `None` if it is to go on as it is."""
+    if isinstance(error, StageFailedError | KeyboardInterrupt | EndedError):  # the last two: the user's, the driver's
+        return None
+    if isinstance(error, AgentFailedError):
+        return StageFailedError(error.kind, str(error))
+    if isinstance(error, DecisionError):
+        return StageFailedError(ErrorKind.DECISION, error_text.message_of(error))
+    if kind is ErrorKind.AGENT:  # `sys.exit()` in an agent ends its stage, not the run
+        return StageFailedError(ErrorKind.AGENT, error_text.describe(error, caller="evonav.evaluation"))
+    if isinstance(error, SimulationError):
+        is_lost = isinstance(error, SimulatorLostError)
+        return StageFailedError(ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION, str(error))
+    return StageFailedError(kind, f"{type(error).__name__}: {error}") if isinstance(error, Exception) else None
 
 
 def traceback_of(failure: StageFailedError) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConfig, Stop
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
-from evonav.evaluation.episode.observer import EpisodeObserver, StageFailedError, attribute_errors, traceback_of
+from evonav.evaluation.episode.observer import AttributedErrors, EpisodeObserver, StageFailedError, traceback_of
 from evonav.evaluation.episode.oracle_baseline import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
@@ -98,10 +98,10 @@ class Stage:
     def run(self) -> StageRecord:
         """Run the stage and return its record; if it fails, `failure` and `traceback` hold the cause."""
         try:
-            with attribute_errors(ErrorKind.HARNESS):
+            with AttributedErrors(ErrorKind.HARNESS):
                 self._start()
                 # The agent is told the goal after this, or the time until its first round would tell of the distance.
-                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = [] if self._stage.guided is not None else self._house.path_to_target_m()
                 self._instruct()
                 if self._stage.guided is not None:
@@ -118,7 +118,7 @@ class Stage:
     def _start(self) -> None:
         """Load the stage's house and place the agent."""
         stage = self._record.stage
-        with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+        with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             start = self._house.load(self._requested)
             is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
         self._staleness = StalenessTracker(
@@ -143,7 +143,7 @@ class Stage:
 
     def _instruct(self) -> None:
         """Send the agent the goal, and read its memory as the stage begins."""
-        with attribute_errors(ErrorKind.AGENT):
+        with AttributedErrors(ErrorKind.AGENT):
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
             beliefs = self._entries()
@@ -202,7 +202,7 @@ class Stage:
             if not is_guided and self._house.is_change_due(number, self._sensor_config):
                 self._change_house(number, progress, sensors)
             self._staleness.begin_round(number)
-            with attribute_errors(ErrorKind.SIMULATION):
+            with AttributedErrors(ErrorKind.SIMULATION):
                 observation = sensors.observe(
                     is_first=number == 0,
                     is_action_success=last.is_success,
@@ -213,7 +213,7 @@ class Stage:
             self._show(observation)
             del observation  # an agent in a process of its own has a copy, and may think for long
             action = self._answer()
-            with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+            with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = carry_out(action)
             is_stop = isinstance(action, Stop) and not is_guided
             progress.advance(last.length_m, is_stop=is_stop)
@@ -248,7 +248,7 @@ class Stage:
 
     def _change_house(self, number: int, progress: StageProgress, sensors: Sensors) -> None:
         """Change the house during the stage, before a round's views; the agent is not told."""
-        with attribute_errors(ErrorKind.SIMULATION):
+        with AttributedErrors(ErrorKind.SIMULATION):
             with self._stopwatch.timing("simulation"):
                 during = self._house.change(number, progress.path_length_m)
             sensors.change_scene(self._scene())
@@ -268,7 +268,7 @@ class Stage:
         return StageScene(task_id, self._stage.public, agent, self._perception_seed, self._simulator.objects)
 
     def _sensors(self) -> Sensors:
-        with attribute_errors(ErrorKind.SIMULATION):
+        with AttributedErrors(ErrorKind.SIMULATION):
             return Sensors(
                 self._simulator, self._perception, self._sensor_config, self._scene(), self._staleness, self._stopwatch
             )
@@ -277,7 +277,7 @@ class Stage:
         """Give the agent the observation of a round."""
         if self._observer is not None:
             self._observer.round_begins(observation)
-        with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+        with AttributedErrors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
             if self._baseline is not None:
                 self._baseline.reveal_sighting(
                     Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
@@ -286,7 +286,7 @@ class Stage:
 
     def _answer(self) -> AgentAction:
         """Return the agent's action for what it was shown."""
-        with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+        with AttributedErrors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
             action = self._agent.act()
             if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
                 message = "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
@@ -297,7 +297,7 @@ class Stage:
         self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
         if self._wants_entries:
-            with attribute_errors(ErrorKind.AGENT):
+            with AttributedErrors(ErrorKind.AGENT):
                 self._beliefs = self._entries()
             self._staleness.take_entries(self._beliefs or ())
         if self._observer is not None:
@@ -309,7 +309,7 @@ class Stage:
         return self._memory_at_start is not None and self._staleness.wants_entries
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
-        with attribute_errors(ErrorKind.AGENT):
+        with AttributedErrors(ErrorKind.AGENT):
             diagnostics, bodies = self._agent.diagnostics(), self._staleness.bodies
             chosen = diagnostics.chosen_entry
             if number == 0:
@@ -334,7 +334,7 @@ class Stage:
     ) -> StageRecord:
         end, radius_m = self._simulator.pose, progress.success_radius_m
         score = progress.score((end.x_m, end.z_m))
-        with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+        with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             left_m = self._house.path_to_target_m()
         geodesic_m = motion.polyline_length_m(left_m) if left_m else None
         record = self._with_memory(self._with_trace(self._record)).model_copy(
@@ -365,7 +365,7 @@ class Stage:
 
     def _with_memory(self, record: StageRecord) -> StageRecord:
         """Return the record with the agent's memory at the end, compared with the house."""
-        with attribute_errors(ErrorKind.AGENT):
+        with AttributedErrors(ErrorKind.AGENT):
             beliefs = self._entries() if self._beliefs is None else self._beliefs
         if beliefs is None:
             self._staleness.close(())

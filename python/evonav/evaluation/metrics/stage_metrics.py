@@ -7,8 +7,8 @@ it derives them from the records. Values that old records lack are `None`.
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from itertools import groupby, pairwise
+from dataclasses import dataclass, fields
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from evonav.evaluation.baselines import BASELINES
@@ -196,7 +196,7 @@ def encode_metrics(record: StageRecord) -> str:
         record: The whole record, with its trace.
     """
     last = record.trace[-1].counters if record.trace else {}
-    measures = asdict(metrics_of(record))
+    measures = dict(vars(metrics_of(record)))
     if record.during is None:
         del measures["during"], measures["spl_after_change"]  # as runs without changes during stages have them
     values = {
@@ -339,7 +339,7 @@ def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:
 
 
 def _length_m(taken: RoundRecord) -> float:
-    return math.fsum(math.dist(a, b) for a, b in pairwise(taken.path_m))
+    return math.fsum(map(math.dist, taken.path_m, taken.path_m[1:]))
 
 
 def _travelled_m(trace: Sequence[RoundRecord]) -> list[float]:

@@ -1,11 +1,10 @@
 """Measure the cost of a stage: time by component, questions, tokens, money and memory. Records do not contain it."""
 
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 Part = Literal["simulation", "perception", "agent"]
 
@@ -47,6 +46,23 @@ class StageCosts:
     num_retries: int | None = None
 
 
+class _Share:
+    """The time of one component: that inside its blocks, which must not be nested."""
+
+    def __init__(self, cpu_s: Callable[[], float]) -> None:
+        self._clock = cpu_s
+        self.wall_s = self.cpu_s = 0.0
+        self._begun_s = (0.0, 0.0)
+
+    def __enter__(self) -> None:
+        self._begun_s = (time.perf_counter(), self._clock())
+
+    def __exit__(self, *_: object) -> None:
+        wall_s, cpu_s = self._begun_s
+        self.wall_s += time.perf_counter() - wall_s
+        self.cpu_s += self._clock() - cpu_s
+
+
 class Stopwatch:
     """Measures wall and CPU time by component; the rest is the evaluator's."""
 
@@ -57,19 +73,12 @@ class Stopwatch:
             cpu_s: Returns the CPU time so far of all processes that count.
         """
         self._clock = cpu_s
-        self._spent_s: defaultdict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+        self._shares = {part: _Share(cpu_s) for part in get_args(Part)}
         self._begun_s = (time.perf_counter(), cpu_s())
 
-    @contextmanager
-    def timing(self, part: Part) -> Iterator[None]:
+    def timing(self, part: Part) -> AbstractContextManager[None]:
         """Count the time inside the block for a component. Blocks must not be nested."""
-        wall_s, cpu_s = time.perf_counter(), self._clock()
-        try:
-            yield
-        finally:
-            spent_s = self._spent_s[part]
-            spent_s[0] += time.perf_counter() - wall_s
-            spent_s[1] += self._clock() - cpu_s
+        return self._shares[part]
 
     def costs(self, others: Mapping[str, float] | None = None) -> StageCosts:
         """Return all costs until now.
@@ -79,8 +88,8 @@ class Stopwatch:
         """
         wall_s, cpu_s = time.perf_counter() - self._begun_s[0], self._clock() - self._begun_s[1]
         parts: dict[str, float] = {}
-        for part in ("simulation", "perception", "agent"):
-            parts[f"{part}_wall_s"], parts[f"{part}_cpu_s"] = self._spent_s[part]
-        parts["evaluator_wall_s"] = wall_s - sum(spent_s[0] for spent_s in self._spent_s.values())
-        parts["evaluator_cpu_s"] = cpu_s - sum(spent_s[1] for spent_s in self._spent_s.values())
+        for part, share in self._shares.items():
+            parts[f"{part}_wall_s"], parts[f"{part}_cpu_s"] = share.wall_s, share.cpu_s
+        parts["evaluator_wall_s"] = wall_s - sum(share.wall_s for share in self._shares.values())
+        parts["evaluator_cpu_s"] = cpu_s - sum(share.cpu_s for share in self._shares.values())
         return StageCosts(wall_s=wall_s, cpu_s=cpu_s, **parts, **(others or {}))  # type: ignore[arg-type]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from pydantic import ValidationError
 
@@ -86,7 +86,7 @@ def encode_stage(
         metrics=encode_metrics(valid),
         wall_s=wall_s,
         cpu_s=cpu_s,
-        costs=None if costs is None else {k: v for k, v in asdict(costs).items() if v is not None},
+        costs=None if costs is None else {k: v for k, v in vars(costs).items() if v is not None},
         failure=failure,
         floor_plan=None if floor_plan is None else floor_plan.to_json(),
     )
