@@ -143,7 +143,7 @@ class Planner:
         corners = self._simulator.shortest_path(pose.position_m, (target_m[0], pose.y_m, target_m[1]))
         if len(corners) == 0:
             corners = self._path_near(target_m)
-        return [(float(x), float(z)) for x, _, z in corners]
+        return [(x_m, z_m) for x_m, _, z_m in corners.tolist()]
 
     def into_room_m(self, path_m: list[Point2], target_m: Point2, house: Rooms | None, room_id: str) -> list[Point2]:
         """Return corners to the free point of a target's room that is nearest to the target.
@@ -163,7 +163,7 @@ class Planner:
         for x_m, z_m in islice(in_room, MAX_TRIES):
             corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
             if len(corners) and house.room_of(float(corners[-1][0]), float(corners[-1][2])) == room_id:
-                return [(float(x), float(z)) for x, _, z in corners]
+                return [(x_m, z_m) for x_m, _, z_m in corners.tolist()]
         return path_m
 
     def _path_near(self, target_m: Point2) -> NDArray[np.float64]:

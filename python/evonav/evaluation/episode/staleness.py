@@ -9,6 +9,7 @@ Doors and windows never move, so entries of them count nowhere here: agents diff
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -278,13 +279,17 @@ class StalenessTracker:
 
     def take_entries(self, beliefs: Sequence[EntryBelief]) -> None:
         """Judge the agent's entries after a round's views."""
+        by_label: defaultdict[str, list[EntryBelief]] = defaultdict(list)
+        for belief in beliefs:
+            by_label[belief.label].append(belief)
         for stale in self._stale:
-            if stale.evident_round is not None and stale.cleared_round is None and not self._remains(stale, beliefs):
+            is_open = stale.evident_round is not None and stale.cleared_round is None
+            if is_open and not self._remains(stale, by_label[stale.belief.label]):
                 stale.cleared_round = self._round
         for moved in self._moved:
             if moved.seen_round is not None and moved.found_round is None:
-                alike = [belief for belief in beliefs if belief.label == moved.body.category]
-                if any(body is not None and body.id == moved.body.id for body in matched_objects(alike, self.bodies)):
+                alike = matched_objects(by_label[moved.body.category], self.bodies)
+                if any(body is not None and body.id == moved.body.id for body in alike):
                     moved.found_round = self._round
 
     def end(self, beliefs: Sequence[EntryBelief]) -> tuple[MemoryRecord, int]:
@@ -326,14 +331,10 @@ class StalenessTracker:
             for one in self._moved
         )
 
-    def _remains(self, stale: _StaleEntry, beliefs: Sequence[EntryBelief]) -> bool:
-        """Return whether an entry is still where it was, and still stale; its id may have changed."""
-        old = stale.belief
-        near = [
-            belief
-            for belief in beliefs
-            if belief.label == old.label and math.dist(belief.centre_m, old.centre_m) <= STALE_MARGIN_M
-        ]
+    def _remains(self, stale: _StaleEntry, alike: Sequence[EntryBelief]) -> bool:
+        """Return whether an entry is still where it was, among those of its label, and still stale; ids may change."""
+        centre_m = stale.belief.centre_m
+        near = [belief for belief in alike if math.dist(belief.centre_m, centre_m) <= STALE_MARGIN_M]
         return any(body is None for body in matched_objects(near, self.bodies))
 
     def _memory(self, beliefs: Sequence[EntryBelief], matches: Sequence[SceneObject | None]) -> MemoryRecord:
