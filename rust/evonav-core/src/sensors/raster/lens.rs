@@ -138,7 +138,11 @@ impl Lens {
     #[inline(always)]
     pub fn collect_visible(&self, layer: Layer<'_>, visible: &mut Vec<(f64, u32)>) {
         visible.clear();
-        for body in layer.bodies.iter().filter(|body| self.may_see(&body.aabb)) {
+        for body in layer.bodies {
+            // An adaptor of iterators is not compiled for wide vectors.
+            if !self.may_see(&body.aabb) {
+                continue;
+            }
             for index in body.parts.clone() {
                 let aabb = &layer.parts[index].aabb;
                 if body.parts.len() == 1 || self.may_see(aabb) {
