@@ -40,9 +40,12 @@ impl Kernel for Resolve<'_> {
             ..
         } = out;
         let num_pixels = canvas.width_px * canvas.height_px;
-        // Appended, since filling it first would take as long as the depths themselves.
+        let has_pixels = want.instances && !*has_runs;
+        // Appended, since filling images first would take as long as the numbers themselves.
         depth_m.clear();
         depth_m.reserve(num_pixels);
+        instances.clear();
+        instances.reserve(if has_pixels { num_pixels } else { 0 });
         let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
         let empty_m = empty_depth_m.unwrap_or(f32::INFINITY);
         for row in 0..canvas.height_px {
@@ -56,16 +59,14 @@ impl Kernel for Resolve<'_> {
                     depth_m.extend(nearness.map(|near| depth(near, horizon_m - near)));
                 }
             }
-        }
-        let has_pixels = want.instances && !*has_runs;
-        instances.resize(if has_pixels { num_pixels } else { 0 }, 0);
-        for (row, bodies) in instances.chunks_exact_mut(canvas.width_px).enumerate() {
-            let tags = &canvas.tags[canvas.row_blocks(row)];
-            match want.rgb {
-                Some(_) => to_bodies(mesh, tags, bodies),
-                None => {
-                    for (body, &tag) in bodies.iter_mut().zip(tags.as_flattened()) {
-                        *body = tag as i32;
+            // In the same turn as depth, whose divisions leave the processor idle.
+            if has_pixels {
+                let tags = &canvas.tags[canvas.row_blocks(row)];
+                match want.rgb {
+                    Some(_) => add_bodies(mesh, tags, canvas.width_px, instances),
+                    None => {
+                        let tags = &tags.as_flattened()[..canvas.width_px];
+                        instances.extend(tags.iter().map(|&tag| tag as i32));
                     }
                 }
             }
@@ -90,17 +91,16 @@ fn body_of(mesh: &SceneMesh, tag: u32) -> i32 {
     tag.checked_sub(1).map_or(0, |face| mesh.faces[face as usize].body as i32 + 1)
 }
 
-/// Set the instance ids of a row by its face tags.
+/// Add the instance ids of a row by its face tags.
 #[inline(always)]
-fn to_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], bodies: &mut [i32]) {
-    let mut last = (0, 0);
-    let (blocks, rest) = bodies.as_chunks_mut();
-    for (bodies, tags) in blocks.iter_mut().zip(tags) {
-        *bodies = bodies_of(mesh, tags, &mut last);
+fn add_bodies(mesh: &SceneMesh, tags: &[[u32; LANES]], width_px: usize, instances: &mut Vec<i32>) {
+    let (mut last, whole) = ((0, 0), width_px / LANES);
+    for tags in &tags[..whole] {
+        instances.extend_from_slice(&bodies_of(mesh, tags, &mut last));
     }
-    if !rest.is_empty() {
-        let bodies = bodies_of(mesh, &tags[blocks.len()], &mut last);
-        rest.copy_from_slice(&bodies[..rest.len()]);
+    if let Some(tags) = tags.get(whole) {
+        let bodies = bodies_of(mesh, tags, &mut last);
+        instances.extend_from_slice(&bodies[..width_px % LANES]);
     }
 }
 
