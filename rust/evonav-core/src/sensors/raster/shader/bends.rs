@@ -30,45 +30,32 @@ impl Bends {
     /// Set `light` for a row.
     #[inline(always)]
     pub fn darken(&mut self, canvas: &Canvas, row: usize, optics: Optics, shades: Shades) {
-        let corner_px = corner_reach_px(canvas);
-        self.light.clear();
+        let (corner_px, width) = (corner_reach_px(canvas), canvas.width_px);
+        // Lanes beyond the row may hold anything.
         self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
-        self.pad(canvas.row(row), canvas.width_px, corner_px);
-        let (is_orthographic, scale_px) = match optics {
-            Optics::Perspective { focal_px } => (false, focal_px as f32),
-            Optics::Orthographic { pixels_per_m } => (true, pixels_per_m as f32),
+        self.pad(canvas.row(row), width, corner_px);
+        let (light, centre) = (&mut self.light[..width], &canvas.row(row)[..width]);
+        let row = |reach_px: usize, scale_px: f64| BentRow {
+            centre,
+            neighbours: neighbours(&self.padded, canvas, row, [corner_px, reach_px]),
+            scale: scale_px as f32 / reach_px as f32,
         };
-        let line = shades.line.map(|shade| (1, true, shade));
-        for (reach_px, is_line, most) in
-            [Some((corner_px, false, shades.corner)), line].into_iter().flatten()
-        {
-            let scale = scale_px / reach_px as f32;
-            let width = canvas.width_px;
-            let neighbours = neighbours(&self.padded, canvas, row, [corner_px, reach_px]);
-            let (light, centre) = (&mut self.light[..width], &canvas.row(row)[..width]);
-            // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
-            let in_perspective = |nearness: f32| nearness + 1e-6;
-            let orthographic = |_: f32| 1.0;
-            match (is_line, is_orthographic) {
-                (true, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, |bend| {
-                        most * line_shade(bend)
-                    })
+        let corner = |bend: f32| 1.0 - corner_shade(bend, shades.corner);
+        let line = |most: f32| move |bend: f32| 1.0 - most * line_shade(bend);
+        match optics {
+            // A bend counts relative to depth, as a pixel's width grows with it.
+            Optics::Perspective { focal_px } => {
+                let unit = |nearness: f32| nearness + 1e-6;
+                row(corner_px, focal_px).each(light, unit, |light, bend| *light = corner(bend));
+                if let Some(line) = shades.line.map(line) {
+                    row(1, focal_px).each(light, unit, |light, bend| *light *= line(bend));
                 }
-                (false, false) => {
-                    darken_row(light, centre, neighbours, scale, in_perspective, |bend| {
-                        corner_shade(bend, most)
-                    })
-                }
-                (true, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, |bend| {
-                        most * line_shade(bend)
-                    })
-                }
-                (false, true) => {
-                    darken_row(light, centre, neighbours, scale, orthographic, |bend| {
-                        corner_shade(bend, most)
-                    })
+            }
+            Optics::Orthographic { pixels_per_m } => {
+                let unit = |_: f32| 1.0;
+                row(corner_px, pixels_per_m).each(light, unit, |light, bend| *light = corner(bend));
+                if let Some(line) = shades.line.map(line) {
+                    row(1, pixels_per_m).each(light, unit, |light, bend| *light *= line(bend));
                 }
             }
         }
@@ -117,23 +104,25 @@ impl Bends {
     }
 }
 
-/// Darken `light` by the `shade` of the bend of each pixel's surroundings.
-///
-/// Nearness is linear on a plane. The bend is the difference of nearness between the surroundings
-/// and a plane, in `unit`s and relative to the neighbours' spacing.
-#[inline(always)]
-fn darken_row(
-    light: &mut [f32],
-    centre: &[f32],
-    [left, right, above, below]: [&[f32]; 4],
+/// Nearness of a row's pixels and of what surrounds them.
+struct BentRow<'a> {
+    centre: &'a [f32],
+    neighbours: [&'a [f32]; 4],
     scale: f32,
-    unit: impl Fn(f32) -> f32,
-    shade: impl Fn(f32) -> f32,
-) {
-    for i in 0..light.len() {
-        let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
-        let bend = (around - centre[i]) / unit(centre[i]) * scale;
-        light[i] *= 1.0 - shade(bend);
+}
+
+impl BentRow<'_> {
+    /// Change each pixel's light by the bend of its surroundings.
+    ///
+    /// Nearness is linear on a plane. The bend is the difference of nearness between the
+    /// surroundings and a plane, in `unit`s and relative to the neighbours' spacing.
+    #[inline(always)]
+    fn each(self, light: &mut [f32], unit: impl Fn(f32) -> f32, change: impl Fn(&mut f32, f32)) {
+        let Self { centre, neighbours: [left, right, above, below], scale } = self;
+        for i in 0..light.len() {
+            let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
+            change(&mut light[i], (around - centre[i]) / unit(centre[i]) * scale);
+        }
     }
 }
 
