@@ -58,15 +58,17 @@ pub fn unproject_masks(
         return Err(Error::invalid("depth_m", depth, "not NaN"));
     }
     let depth_of = |run: &Run| &depth_m[run.row * camera.width_px..][run.cols[0]..run.cols[1]];
-    let mut found: Vec<(usize, Run)> = Vec::new();
+    // Detection of each run, and the number of its pixels that have a depth.
+    let mut found: Vec<(usize, Run, usize)> = Vec::new();
     let mut num_px = vec![0; num_detections];
     for run in masks.runs() {
         let Ok(detection) = usize::try_from(run.value) else { continue };
         let count = num_px.get_mut(detection).ok_or_else(|| {
             Error::invalid("masks", run.value, "negative or the index of a detection")
         })?;
-        *count += depth_of(&run).iter().filter(|&&depth| has_depth(depth)).count();
-        found.push((detection, run));
+        let num = depth_of(&run).iter().filter(|&&depth| has_depth(depth)).count();
+        *count += num;
+        found.push((detection, run, num));
     }
     let strides: Vec<usize> =
         num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
@@ -75,29 +77,32 @@ pub fn unproject_masks(
         .zip(&strides)
         .map(|(num, stride)| Vec::with_capacity(num.div_ceil(*stride)))
         .collect();
+    // Number of pixels of each detection before its next point.
     let mut skips = vec![0_usize; num_detections];
     // A pixel's ray is affine in its coordinates.
     let first = camera.ray([0.5, 0.5]);
     let [along_u, along_v] = [camera.ray([1.5, 0.5]), camera.ray([0.5, 1.5])]
         .map(|ray| [0, 1, 2].map(|i| ray[i] - first[i]));
-    for (detection, run) in found {
+    for (detection, run, num) in found {
         let start = [0, 1, 2].map(|i| first[i] + along_v[i] * run.row as f64);
-        let (skip, cloud) = (&mut skips[detection], &mut clouds[detection]);
-        for (col, &depth) in (run.cols[0]..).zip(depth_of(&run)) {
-            if !has_depth(depth) {
-                continue;
-            }
-            if *skip > 0 {
-                *skip -= 1;
-                continue;
-            }
-            *skip = strides[detection] - 1;
-            let depth = f64::from(depth);
-            cloud.push([0, 1, 2].map(|i| {
-                let ray = start[i] + along_u[i] * col as f64;
+        let depths = depth_of(&run);
+        let point = |place: usize| {
+            let (col, depth) = ((run.cols[0] + place) as f64, f64::from(depths[place]));
+            [0, 1, 2].map(|i| {
+                let ray = start[i] + along_u[i] * col;
                 (camera.position_m[i] + ray * depth) as f32
-            }));
+            })
+        };
+        let (skip, stride) = (&mut skips[detection], strides[detection]);
+        let cloud = &mut clouds[detection];
+        if num == depths.len() {
+            cloud.extend((*skip..num).step_by(stride).map(point));
+        } else {
+            let places = (0..depths.len()).filter(|&place| has_depth(depths[place]));
+            cloud.extend(places.skip(*skip).step_by(stride).map(point));
         }
+        *skip += num.saturating_sub(*skip).div_ceil(stride) * stride;
+        *skip -= num;
     }
     Ok(clouds)
 }

@@ -7,6 +7,7 @@ pub mod cloud;
 pub mod dbscan;
 pub(super) mod density;
 pub(super) mod largest_cluster;
+mod overlap;
 pub(super) mod point_blocks;
 pub mod voxel_filter;
 pub mod voxels;

@@ -53,15 +53,11 @@ impl PointBlocks {
         let mut index = VoxelIndex::between(corners, 0, points.len());
         let mut blocks: Vec<(Voxel, u64)> = Vec::with_capacity(points.len() / 4);
         let mut spots = Vec::with_capacity(points.len());
-        let (mut block, mut number) = ([i32::MAX; 3], 0);
         for voxel in voxels_of(points, inverse_edge).into_iter().map(clamped) {
-            let own = voxel.map(|i| i >> 2);
-            if own != block {
-                block = own;
-                number = index.entry(block, blocks.len() as u32);
-                if number as usize == blocks.len() {
-                    blocks.push((block, 0));
-                }
+            let block = voxel.map(|i| i >> 2);
+            let number = index.entry(block, blocks.len() as u32);
+            if number as usize == blocks.len() {
+                blocks.push((block, 0));
             }
             let spot = Spot(number << 6 | place(voxel) as u32);
             blocks[number as usize].1 |= spot.bit();

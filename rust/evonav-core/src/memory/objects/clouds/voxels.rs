@@ -220,20 +220,24 @@ fn key_of(voxel: Voxel) -> u64 {
 /// Return the smallest and the largest corner of the box around points; `None` without points.
 pub(crate) fn bounds(points: &[Point]) -> Option<[Point; 2]> {
     let &first = points.first()?;
+    // One instruction each, as `f32::min` and `f32::max` are not.
+    let min = |a: f32, b: f32| if a < b { a } else { b };
+    let max = |a: f32, b: f32| if a > b { a } else { b };
     // Four points at a time.
     let (fours, rest) = points.as_flattened().as_chunks::<12>();
     let mut low: [f32; 12] = std::array::from_fn(|i| first[i % 3]);
     let mut high = low;
     for four in fours {
-        low = std::array::from_fn(|i| low[i].min(four[i]));
-        high = std::array::from_fn(|i| high[i].max(four[i]));
+        low = std::array::from_fn(|i| min(four[i], low[i]));
+        high = std::array::from_fn(|i| max(four[i], high[i]));
     }
     for (i, &value) in rest.iter().enumerate() {
-        (low[i], high[i]) = (low[i].min(value), high[i].max(value));
+        (low[i], high[i]) = (min(value, low[i]), max(value, high[i]));
     }
-    let lowest = |i: usize| (3..12).step_by(3).fold(low[i], |value, step| low[i + step].min(value));
+    let lowest =
+        |i: usize| (3..12).step_by(3).fold(low[i], |value, step| min(low[i + step], value));
     let highest =
-        |i: usize| (3..12).step_by(3).fold(high[i], |value, step| high[i + step].max(value));
+        |i: usize| (3..12).step_by(3).fold(high[i], |value, step| max(high[i + step], value));
     Some([[0, 1, 2].map(lowest), [0, 1, 2].map(highest)])
 }
 
