@@ -220,25 +220,35 @@ fn key_of(voxel: Voxel) -> u64 {
 /// Return the smallest and the largest corner of the box around points; `None` without points.
 pub(crate) fn bounds(points: &[Point]) -> Option<[Point; 2]> {
     let &first = points.first()?;
-    // One instruction each, as `f32::min` and `f32::max` are not.
-    let min = |a: f32, b: f32| if a < b { a } else { b };
-    let max = |a: f32, b: f32| if a > b { a } else { b };
-    // Four points at a time.
-    let (fours, rest) = points.as_flattened().as_chunks::<12>();
-    let mut low: [f32; 12] = std::array::from_fn(|i| first[i % 3]);
-    let mut high = low;
-    for four in fours {
-        low = std::array::from_fn(|i| min(four[i], low[i]));
-        high = std::array::from_fn(|i| max(four[i], high[i]));
+    Some(evonav_simd::compute(Bounds { points, first }))
+}
+
+struct Bounds<'a> {
+    points: &'a [Point],
+    first: Point,
+}
+
+impl Kernel for Bounds<'_> {
+    type Output = [Point; 2];
+
+    #[inline(always)]
+    fn compute(self) -> [Point; 2] {
+        // Coordinates of eight points at a time.
+        let (eights, rest) = self.points.as_chunks::<8>();
+        let mut low = [self.first; 8];
+        let mut high = low;
+        for eight in eights {
+            let extremes = low.as_flattened_mut().iter_mut().zip(high.as_flattened_mut());
+            for ((low, high), &value) in extremes.zip(eight.as_flattened()) {
+                (*low, *high) = (low.min(value), high.max(value));
+            }
+        }
+        let corner = |points: &[Point], pick: fn(f32, f32) -> f32| {
+            let both = |a: Point, b: &Point| [0, 1, 2].map(|i| pick(a[i], b[i]));
+            points.iter().chain(rest).fold(self.first, both)
+        };
+        [corner(&low, f32::min), corner(&high, f32::max)]
     }
-    for (i, &value) in rest.iter().enumerate() {
-        (low[i], high[i]) = (min(value, low[i]), max(value, high[i]));
-    }
-    let lowest =
-        |i: usize| (3..12).step_by(3).fold(low[i], |value, step| min(low[i + step], value));
-    let highest =
-        |i: usize| (3..12).step_by(3).fold(high[i], |value, step| max(high[i + step], value));
-    Some([[0, 1, 2].map(lowest), [0, 1, 2].map(highest)])
 }
 
 #[cfg(test)]
