@@ -61,7 +61,13 @@ class Navigator:
     """Integrates observations, and turns choices into places to go."""
 
     def __init__(
-        self, map_frame: MapFrame, config: NavigatorConfig, *, names_colours: bool = False, keeps_layouts: bool = False
+        self,
+        map_frame: MapFrame,
+        config: NavigatorConfig,
+        *,
+        names_colours: bool = False,
+        keeps_layouts: bool = False,
+        keeps_detections: bool = True,
     ) -> None:
         """Create an empty memory.
 
@@ -70,6 +76,7 @@ class Navigator:
             config: Parameters.
             names_colours: True to keep what views show by name, for rules that look, in place of their images.
             keeps_layouts: True to keep, with `names_colours`, what surrounds objects in views, too.
+            keeps_detections: False to keep no detections of views, for an agent that never looks at them again.
         """
         self.config = config
         self._background = frozenset(canonical(noun) for noun in config.background)
@@ -77,12 +84,16 @@ class Navigator:
         self.explorer = Explorer(map_frame, config.explorer)
         self.objects = ObjectMap(config.objects)
         self._forgetting = forgetting.make(config.forgetting)
-        self.views = ViewStore(names_colours=names_colours, keeps_layouts=keeps_layouts)
+        self.views = ViewStore(
+            names_colours=names_colours, keeps_layouts=keeps_layouts, keeps_detections=keeps_detections
+        )
         self.observers: list[Callable[[ObjectMap, View, ObjectUpdate], None]] = []
         """Functions that are called after the object map has taken in a view, before anything is forgotten."""
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
         """Views of the last round, the heading view last."""
+        self._detected_ids: list[int | None] = []
+        """Ids that the entries of the last round's detections had then."""
         self._first_map_view = 0
         """Id of the first view in the present map."""
         self.stage = 1
@@ -109,9 +120,11 @@ class Navigator:
         """
         self.round += 1
         self.round_views = []
+        self._detected_ids = []
         for view in self.without_background(observation).views:
             update = self.objects.update(view)
             self.views.follow(update.merged)
+            self._detected_ids += update.entry_ids
             self.round_views.append(self.views.add(view, update.entry_ids, stage=self.stage, round_=self.round))
             for observer in self.observers:
                 observer(self.objects, view, update)
@@ -153,8 +166,7 @@ class Navigator:
 
     def is_detected(self, entry_id: int) -> bool:
         """Return whether a view of the last round detects an entry."""
-        seen = (one.entry_id for view in self.round_views for one in view.seen)
-        return any(one is not None and self.views.resolve(one) == entry_id for one in seen)
+        return any(one is not None and self.views.resolve(one) == entry_id for one in self._detected_ids)
 
     def observation_point(self, centre_m: Point2) -> Point2 | None:
         """Return where to stand to look at a place; `None` if the map knows no free floor around it."""

@@ -31,6 +31,9 @@ from evonav.tasks.public import Goal, TaskInfo
 class NavigatorAgent(ABC):
     """An agent with a map, object entries, stored views and a decision model."""
 
+    _rereads_detections = True
+    """Whether the agent reads the detections of stored views even if its decision model does not look."""
+
     def __init__(
         self,
         config: NavigatorConfig,
@@ -81,6 +84,7 @@ class NavigatorAgent(ABC):
             self._navigator_config,
             names_colours=self._names_colours,
             keeps_layouts=self._names_colours and self._goal_input != "text",
+            keeps_detections=self._rereads_detections or self._shows_images or self._names_colours,
         )
 
     def _unseen_m2(self) -> float:

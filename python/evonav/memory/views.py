@@ -56,7 +56,7 @@ class StoredView:
     """Pose of the camera itself."""
     intrinsics: Intrinsics
     seen: tuple[Seen, ...]
-    """The view's detections, in their order."""
+    """The view's detections, in their order; none if the store keeps none."""
     jpeg: bytes | None
     """The image; `None` if the view had no colours."""
 
@@ -64,14 +64,18 @@ class StoredView:
 class ViewStore:
     """Views in the order of their arrival."""
 
-    def __init__(self, *, names_colours: bool = False, keeps_layouts: bool = False) -> None:
+    def __init__(
+        self, *, names_colours: bool = False, keeps_layouts: bool = False, keeps_detections: bool = True
+    ) -> None:
         """Create an empty store.
 
         Args:
             names_colours: True to keep the colours of detections by name, in place of the views' images.
             keeps_layouts: True to keep, with `names_colours`, those around detections as well.
+            keeps_detections: False to keep no detections; then no view shows any entry.
         """
         self.views: list[StoredView] = []
+        self._keeps_detections = keeps_detections
         self._names_colours = names_colours
         self._keeps_layouts = keeps_layouts
         self._became: dict[int, int] = {}
@@ -88,16 +92,7 @@ class ViewStore:
             stage: Stage of the task.
             round_: Round of the stage.
         """
-        detections = view.detections
-        boxes = boxes_of(detections)
-        named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
-        around = self._layouts(view, boxes) if self._keeps_layouts else [None] * len(boxes)
-        seen = tuple(
-            Seen(entry_id, label, confidence, area_px, box_px, colours, layout)
-            for entry_id, label, confidence, (area_px, box_px), colours, layout in zip(
-                entry_ids, detections.labels, detections.confidences.tolist(), boxes, named, around, strict=True
-            )
-        )
+        seen = self._seen(view, entry_ids) if self._keeps_detections else ()
         jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)
         stored = StoredView(len(self.views), stage, round_, view.pose, view.intrinsics, seen, jpeg)
         self.views.append(stored)
@@ -107,6 +102,18 @@ class ViewStore:
                 self._latest[entry_id] = stored.id
                 self._keep_largest(entry_id, [(stored.id, one)])
         return stored
+
+    def _seen(self, view: View, entry_ids: Sequence[int | None]) -> tuple[Seen, ...]:
+        detections = view.detections
+        boxes = boxes_of(detections)
+        named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
+        around = self._layouts(view, boxes) if self._keeps_layouts else [None] * len(boxes)
+        return tuple(
+            Seen(entry_id, label, confidence, area_px, box_px, colours, layout)
+            for entry_id, label, confidence, (area_px, box_px), colours, layout in zip(
+                entry_ids, detections.labels, detections.confidences.tolist(), boxes, named, around, strict=True
+            )
+        )
 
     def _layouts(self, view: View, boxes: Sequence[tuple[int, Box]]) -> Sequence[Layout]:
         if view.rgb is None:

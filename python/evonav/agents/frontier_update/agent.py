@@ -42,6 +42,8 @@ class FrontierUpdateConfig:
 class FrontierUpdate(NavigatorAgent):
     """Walks to what it remembers, explores when it remembers nothing that fits, and believes its entries."""
 
+    _rereads_detections = False
+
     def __init__(self, config: FrontierUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or FrontierUpdateConfig()
         if self.config.ranking == "text":
