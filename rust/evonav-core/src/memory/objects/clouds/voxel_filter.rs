@@ -12,36 +12,33 @@ pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
 /// Return the same as [`voxel_filter`], and its points by block: rounding takes no mean out of its
 /// voxel.
 pub(crate) fn one_a_voxel(points: &[Point], edge_m: f64) -> (Vec<Point>, PointBlocks) {
-    const ALONE: u32 = u32::MAX;
+    const IS_SUM: u32 = 1 << 31;
     let PointBlocks { blocks, spots } = PointBlocks::new(points, 1.0 / edge_m);
     let num_voxels: u32 = blocks.iter().map(|(_, bits)| bits.count_ones()).sum();
     if num_voxels as usize == points.len() {
         return (points.to_vec(), PointBlocks { blocks, spots });
     }
-    // The voxels still to be met in each block, and number of the average of the others.
-    let mut left: Vec<u64> = blocks.iter().map(|&(_, bits)| bits).collect();
+    // Of the points met so far in each voxel: 0 without points, one more than the number of the
+    // average that is a single point, or the number of the sum of several.
     let mut numbers = vec![[0_u32; 64]; blocks.len()];
     let mut averages: Vec<Point> = Vec::with_capacity(num_voxels as usize);
     let mut spots_of_averages = Vec::with_capacity(num_voxels as usize);
-    // Of the voxels with several points: sum, number of points, and number of the average.
+    // Sum and number of points, and number of the average.
     let mut sums: Vec<([f64; 3], f64, u32)> = Vec::new();
-    let mut sum_of: Vec<u32> = Vec::with_capacity(num_voxels as usize);
     for (&point, &spot) in points.iter().zip(&spots) {
-        let average = &mut numbers[spot.block()][spot.place()];
-        if left[spot.block()] & spot.bit() != 0 {
-            left[spot.block()] ^= spot.bit();
-            *average = averages.len() as u32;
+        let number = &mut numbers[spot.block()][spot.place()];
+        if *number == 0 {
             averages.push(point);
             spots_of_averages.push(spot);
-            sum_of.push(ALONE);
+            *number = averages.len() as u32;
             continue;
         }
-        let sum = &mut sum_of[*average as usize];
-        if *sum == ALONE {
-            *sum = sums.len() as u32;
-            sums.push((averages[*average as usize].map(f64::from), 1.0, *average));
+        if *number & IS_SUM == 0 {
+            let average = *number - 1;
+            *number = IS_SUM | sums.len() as u32;
+            sums.push((averages[average as usize].map(f64::from), 1.0, average));
         }
-        let (sum, count, _) = &mut sums[*sum as usize];
+        let (sum, count, _) = &mut sums[(*number & !IS_SUM) as usize];
         for (sum, value) in sum.iter_mut().zip(point) {
             *sum += f64::from(value);
         }
