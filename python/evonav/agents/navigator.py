@@ -121,7 +121,7 @@ class Navigator:
         self.round += 1
         self.round_views = []
         self._detected_ids = []
-        for view in self.without_background(observation).views:
+        for view in map(self._without_background, observation.views):
             update = self.objects.update(view)
             self.views.follow(update.merged)
             self._detected_ids += update.entry_ids
@@ -197,6 +197,10 @@ class Navigator:
         if not (self._names_colours and with_looks):
             return candidate
         return replace(candidate, appearance=self._appearance(entry))
+
+    def candidates(self, entries: Sequence[ObjectEntry]) -> list[ObjectCandidate]:
+        """Return entries as `candidate` describes each."""
+        return [self.candidate(entry) for entry in entries] if self._names_colours else [*map(_candidate_of, entries)]
 
     def _appearance(self, entry: ObjectEntry) -> Appearance | None:
         """Return what the views of an entry show; `None` without any."""

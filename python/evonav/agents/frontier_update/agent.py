@@ -97,7 +97,7 @@ class FrontierUpdate(NavigatorAgent):
     def _decide(self, observation: Observation) -> AgentAction:
         """Ask where to go: to one of the best entries, or to a frontier."""
         entries = self._believed()
-        remembered = [self._navigator.candidate(entry) for entry in entries]
+        remembered = self._navigator.candidates(entries)
         return self._choose(self._ranked(entries, remembered, observation), remembered, observation)
 
     def _believed(self) -> Sequence[ObjectEntry]:

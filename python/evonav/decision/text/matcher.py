@@ -7,8 +7,9 @@ own rule: the method `by_rule(matcher)`, which returns an answer and the reason 
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
@@ -90,6 +91,18 @@ class Best:
     reason: str
 
 
+class _WorkedOut(dict[str, float]):
+    """Scores by label, each worked out once: agents ask for the same ones in every round."""
+
+    def __init__(self, score_of: Callable[[str], float]) -> None:
+        super().__init__()
+        self._score_of = score_of
+
+    def __missing__(self, label: str) -> float:
+        self[label] = score = self._score_of(label)
+        return score
+
+
 class Matcher:
     """Compares goals with remembered objects."""
 
@@ -97,8 +110,7 @@ class Matcher:
         self.config = config or TextMatchConfig()
         self._scored: ParsedGoal | None = None
         """The goal of `_scores`."""
-        self._scores: dict[str, float] = {}
-        """Scores by label: agents ask for the same ones in every round."""
+        self._scores: Mapping[str, float] = {}
 
     def parsed(self, goal: Goal) -> ParsedGoal:
         """Return the parsed instruction."""
@@ -113,11 +125,13 @@ class Matcher:
 
         Doors and windows score 0 even where they are named: every room has them.
         """
+        return self.label_scores(goal)[label]
+
+    def label_scores(self, goal: ParsedGoal) -> Mapping[str, float]:
+        """Return `label_score` by label, for any label."""
         if goal is not self._scored:
-            self._scored, self._scores = goal, {}
-        if label not in self._scores:
-            self._scores[label] = self._label_score(goal, label)
-        return self._scores[label]
+            self._scored, self._scores = goal, _WorkedOut(partial(self._label_score, goal))
+        return self._scores
 
     def _label_score(self, goal: ParsedGoal, label: str) -> float:
         if is_structure(label):
@@ -230,7 +244,8 @@ class Matcher:
 
     def room_signs(self, around: Sequence[ObjectCandidate]) -> list[tuple[str, Point2]]:
         """Return the objects that indicate a type of room: that room, and where they stand."""
-        return [(room, other.ground_m) for other in around if (room := self.sign_of(other.label)) is not None]
+        room_of = _ROOM_OF_SIGN.get
+        return [(room, other.ground_m) for other in around if (room := room_of(canonical(other.label))) is not None]
 
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
         """Return the same as `room_around`, from objects that were read before: for many places among the same ones."""
@@ -252,7 +267,7 @@ class Matcher:
         Doors and windows are no hints: every room has them.
         """
         mentioned = {r.noun for r in goal.relations if r.kind != "in" and not is_structure(r.noun)}
-        leads_m = [other.ground_m for other in around if mentioned and canonical(other.label) in mentioned]
+        leads_m = [other.ground_m for other in around if canonical(other.label) in mentioned] if mentioned else []
         signs = [] if goal.room is None else self.room_signs(around)
         config, costs_m = self.config, []
         for frontier in frontiers:

@@ -30,8 +30,7 @@ def rank_entries(matcher: Matcher, goal: Goal, entries: Sequence[ObjectCandidate
         entries: All remembered objects.
         position_m: `(x, z)` of the agent.
     """
-    parsed = matcher.parsed(goal)
-    return _ranked({label: matcher.label_score(parsed, label) for label in _labels(entries)}, entries, position_m)
+    return _ranked(matcher.label_scores(matcher.parsed(goal)), entries, position_m)
 
 
 def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
@@ -48,20 +47,17 @@ def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Poi
         InvalidArgumentError: The extra is missing or broken.
     """
     instruction = goal.unified_instruction
-    scores = {label: similarity_of_label(instruction, label) for label in _labels(entries)}
+    scores = {label: similarity_of_label(instruction, label) for label in {entry.label for entry in entries}}
     return _ranked(scores, entries, position_m)
-
-
-def _labels(entries: Sequence[ObjectCandidate]) -> set[str]:
-    return {entry.label for entry in entries}
 
 
 def _ranked(scores: Mapping[str, float], entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     keys = [
-        (-scores[entry.label], -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index)
+        (-scores[entry.label], -entry.num_detections, math.dist(entry.centre_m[::2], position_m), entry.entry_id, index)
         for index, entry in enumerate(entries)
     ]
-    return [key[-1] for key in sorted(keys)]
+    keys.sort()
+    return [key[-1] for key in keys]
 
 
 def rank_by_feature(
