@@ -4,6 +4,7 @@ import math
 import pickle
 import weakref
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -156,6 +157,23 @@ def test_simulators_share_a_house_as_long_as_one_of_them_has_it() -> None:
     assert house() is not None
     second.close()
     assert house() is None
+
+
+def test_a_simulator_keeps_the_houses_that_it_loaded_last() -> None:
+    simulator = EmbeddedSimulator(SMALL, max_houses=2)
+    cores, grids, objects = [], [], []
+    for house in (*HOUSES[:2], *HOUSES[:2]):
+        simulator.reset(house)
+        cores.append(weakref.ref(simulator.core))
+        grids.append(simulator.occupancy())
+        objects.append(simulator.objects)
+    assert cores[:2] == cores[2:]
+    assert grids[0] is grids[2] is not grids[1] is grids[3]
+    assert objects[0] is objects[2] is not objects[1] is objects[3]
+    copy(simulator).close()
+    assert all(core() is not None for core in cores)
+    simulator.reset(HOUSES[2])
+    assert [core() is None for core in cores[:2]] == [True, False]
 
 
 def test_styles_differ_in_colours_alone() -> None:

@@ -1,9 +1,11 @@
 """Simulate AI2-THOR's agent in a ProcTHOR house with the Rust core, without Unity."""
 
 import json
+from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
-from weakref import WeakValueDictionary
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,18 @@ _LOADED: WeakValueDictionary[tuple[str, str, SimulatorConfig, bool], _core.Embed
 """Houses that are in use in this process, by JSON, name and settings: episodes of a task share them."""
 
 
+@dataclass
+class _Facts:
+    """The objects and the occupancy of a house, computed at the first request; its look changes neither."""
+
+    objects: tuple[SceneObject, ...] | None = None
+    occupancy: OccupancyGrid | None = None
+
+
+_FACTS: WeakKeyDictionary[_core.EmbeddedSimulator, _Facts] = WeakKeyDictionary()
+"""Facts about the houses that are in use."""
+
+
 class EmbeddedSimulator:
     """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second per CPU core.
 
@@ -34,13 +48,16 @@ class EmbeddedSimulator:
         (300, 300)
     """
 
-    def __init__(self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False) -> None:
+    def __init__(
+        self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False, max_houses: int = 1
+    ) -> None:
         """Make a simulator without a house; call `reset` next.
 
         Args:
             config: Camera, body and steps; AI2-THOR's by default.
             allow_unknown_assets: Whether to draw assets that the catalogue lacks (Objaverse's) in the usual size of
                 their category; otherwise such a house is refused.
+            max_houses: Largest number of houses in memory, those that were loaded last; each takes about 1.5 MB.
         """
         if config is not None and not isinstance(config, SimulatorConfig):
             raise InvalidArgumentError(
@@ -50,18 +67,17 @@ class EmbeddedSimulator:
         self.allow_unknown_assets = allow_unknown_assets
         self.intrinsics = self.config.intrinsics
         self._loaded: _core.EmbeddedSimulator | None = None
-        self._last: _core.EmbeddedSimulator | None = None
-        """The house that was last loaded, before changes."""
+        self._recent: deque[_core.EmbeddedSimulator] = deque(maxlen=max_houses)
+        """The houses that were last loaded, before changes."""
         self._house_name = "house"
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
-        self._objects: tuple[SceneObject, ...] | None = None
-        self._occupancy: OccupancyGrid | None = None
+        self._facts = _Facts()
         self._appearance: tuple[Change, ...] = ()
 
     def reset(self, house: str | _core.House, pose: Pose | None = None, *, name: str | None = None) -> Pose:
         """Load a house in its own look; the agent stands at `pose`, or at the house's own start.
 
-        A house that this simulator or another one in this process has loaded last is not built again.
+        A house that this simulator or another one in this process keeps is not built again.
 
         If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
@@ -84,9 +100,9 @@ class EmbeddedSimulator:
             house = house.to_json()
         self._house_name = name or "house"
         config, allows_all = self.config, self.allow_unknown_assets
-        self._last = core_of(house, config, name=self._house_name, allow_unknown_assets=allows_all)
+        self._recent.append(core_of(house, config, name=self._house_name, allow_unknown_assets=allows_all))
         self._appearance = ()
-        return self._enter(self._last, pose)
+        return self._enter(self._recent[-1], pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
         """Change the current house; only what moved is built again.
@@ -161,12 +177,12 @@ class EmbeddedSimulator:
     @property
     def objects(self) -> Sequence[SceneObject]:
         """Bodies in instance order (instance id = index + 1)."""
-        if self._objects is None:
-            self._objects = tuple(
+        if self._facts.objects is None:
+            self._facts.objects = tuple(
                 SceneObject(body_id, category, kind, (x_m, y_m, z_m), (width_m, height_m, depth_m))
                 for body_id, category, kind, (x_m, y_m, z_m), (width_m, height_m, depth_m) in self._world.bodies()
             )
-        return self._objects
+        return self._facts.objects
 
     def step(self, action: Action) -> bool:
         """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing.
@@ -285,11 +301,11 @@ class EmbeddedSimulator:
         The body moves straight along the grid, beginning at the centre nearest to the start where it fits. The grid has
         the same shape for all arrangements of a house.
         """
-        if self._occupancy is None:
+        if self._facts.occupancy is None:
             cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
             cells.flags.writeable = False
-            self._occupancy = OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
-        return self._occupancy
+            self._facts.occupancy = OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
+        return self._facts.occupancy
 
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
         """Return all surfaces, for other renderers and for export.
@@ -301,20 +317,20 @@ class EmbeddedSimulator:
         return self._world.triangles()
 
     def close(self) -> None:
-        """Release the house; safe to call twice."""
-        self._loaded = self._last = None
-        self._objects = self._occupancy = None
+        """Release the houses; safe to call twice."""
+        self._loaded, self._facts = None, _Facts()
+        self._recent.clear()
 
     def __copy__(self) -> "EmbeddedSimulator":
         """Return another simulator of the same house; both share it, since `apply` replaces the house."""
         twin = type(self).__new__(type(self))
-        twin.__dict__.update(self.__dict__)
+        twin.__dict__.update(self.__dict__ | {"_recent": self._recent.copy()})
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
         """Return house and pose; see the class."""
         house_json = self._loaded and self._loaded.house_json()
-        return self.__dict__ | {"_loaded": house_json, "_last": None, "_objects": None, "_occupancy": None}
+        return self.__dict__ | {"_loaded": house_json, "_recent": deque(maxlen=self._recent.maxlen), "_facts": _Facts()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Load the house again."""
@@ -334,7 +350,7 @@ class EmbeddedSimulator:
 
     def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
         if core is not self._loaded:
-            self._loaded, self._objects, self._occupancy = core, None, None
+            self._loaded, self._facts = core, _FACTS.setdefault(core, _Facts())
         start_m, yaw_rad, horizon_rad = core.start()
         self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad).canonical()
         if pose is not None:
