@@ -3,6 +3,7 @@
 import math
 import pickle
 import weakref
+from collections import deque
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
@@ -160,7 +161,7 @@ def test_simulators_share_a_house_as_long_as_one_of_them_has_it() -> None:
 
 
 def test_a_simulator_keeps_the_houses_that_it_loaded_last() -> None:
-    simulator = EmbeddedSimulator(SMALL, max_houses=2)
+    simulator = EmbeddedSimulator(SMALL, recent=deque(maxlen=2))
     cores, grids, objects = [], [], []
     for house in (*HOUSES[:2], *HOUSES[:2]):
         simulator.reset(house)

@@ -19,6 +19,7 @@ from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 _Position = tuple[float, float, float]
+Houses = deque[_core.EmbeddedSimulator]
 _LOADED: WeakValueDictionary[tuple[str, str, SimulatorConfig, bool], _core.EmbeddedSimulator] = WeakValueDictionary()
 """Houses that are in use in this process, by JSON, name and settings: episodes of a task share them."""
 
@@ -49,7 +50,7 @@ class EmbeddedSimulator:
     """
 
     def __init__(
-        self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False, max_houses: int = 1
+        self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False, recent: Houses | None = None
     ) -> None:
         """Make a simulator without a house; call `reset` next.
 
@@ -57,7 +58,7 @@ class EmbeddedSimulator:
             config: Camera, body and steps; AI2-THOR's by default.
             allow_unknown_assets: Whether to draw assets that the catalogue lacks (Objaverse's) in the usual size of
                 their category; otherwise such a house is refused.
-            max_houses: Largest number of houses in memory, those that were loaded last; each takes about 1.5 MB.
+            recent: Keeps the houses that were loaded last, 1.5 MB each, also for simulators that share it; else one.
         """
         if config is not None and not isinstance(config, SimulatorConfig):
             raise InvalidArgumentError(
@@ -67,8 +68,7 @@ class EmbeddedSimulator:
         self.allow_unknown_assets = allow_unknown_assets
         self.intrinsics = self.config.intrinsics
         self._loaded: _core.EmbeddedSimulator | None = None
-        self._recent: deque[_core.EmbeddedSimulator] = deque(maxlen=max_houses)
-        """The houses that were last loaded, before changes."""
+        self._recent = Houses(maxlen=1) if recent is None else recent
         self._house_name = "house"
         self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._facts = _Facts()

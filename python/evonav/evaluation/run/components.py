@@ -1,5 +1,6 @@
 """Name the parts of a run by import path, so that workers build them for themselves."""
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
@@ -38,8 +39,8 @@ EMBEDDED: Component[Simulator] = Component(
 )
 TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
 TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
-MAX_HOUSES = 8
-"""Largest number of houses in a simulator: the next agent in a task finds those of its stages there."""
+RECENT_HOUSES: deque[Any] = deque(maxlen=8)
+"""Houses of this process's simulators: the next agent in a task finds those of its stages there."""
 HEADER_KEYS = {"cases": "tasks", "simulator": "simulator", "perception": "perception", "decision": "decision"}
 """Field of `Backend` by its key in the headers of runs; options are under `KEY_options`."""
 
@@ -217,14 +218,14 @@ def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # 
     """Make evonav's own simulator, with AI2-THOR's defaults; headers of runs without a style mean `outlined`."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(_config(style=style, **camera), max_houses=MAX_HOUSES)
+    return EmbeddedSimulator(_config(style=style, **camera), recent=RECENT_HOUSES)
 
 
 def lenient_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA`
     """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(_config(style=style, **camera), allow_unknown_assets=True, max_houses=MAX_HOUSES)
+    return EmbeddedSimulator(_config(style=style, **camera), allow_unknown_assets=True, recent=RECENT_HOUSES)
 
 
 def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA` and `Ai2ThorOptions`
