@@ -16,7 +16,8 @@ NOTES = """Two checkouts, each with its core built in release mode, run in turn:
 each, on one core and on the same inputs, the fastest of up to four calls after a first; evaluations eight tasks a turn,
 on tasks that the earlier version made. Times are CPU time, medians; *gain* is the median of the ratios of pairs (of
 sums where stages are counted): above 1 the later version is better. *Peer's*: how many times better each version is
-than the best peer, which takes its turn in the same loop. A dash: the earlier version has no such thing.
+than the best peer, which takes its turn in the same loop. A dash: the earlier version has no such thing. An agent's own
+process: the least of four turns of each stage, and the median of eight tasks each.
 Again: `python -m benches before_after --before FOLDER [--houses FILE]`.
 """
 
