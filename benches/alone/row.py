@@ -1,11 +1,10 @@
 """Rows of the table of floors: a figure with its aim, and the parts of it that were measured alone."""
 
 import gc
-import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from benches.versions.lines import pairwise
+from benches.versions.lines import milliseconds, pairwise
 from evonav.speed_benchmark.timing import cpu_ms
 
 HEAD = (
@@ -36,10 +35,10 @@ class Figure:
     def rows(self, *parts: Alone) -> Iterator[str]:
         """Return a row a part in Markdown; the figure is in the first."""
         aim = "" if self.aim_ms is None else f"{pairwise(self.aim_ms, self.times_ms):.2f}"
-        figure = [self.work, self.aim, _said(self.times_ms), aim]
+        figure = [self.work, self.aim, milliseconds(self.times_ms), aim]
         for part in parts:
             share = f"{pairwise(part.times_ms, self.times_ms):.2f}"
-            cells = [*figure, part.what, _said(part.times_ms), share, part.left_out]
+            cells = [*figure, part.what, milliseconds(part.times_ms), share, part.left_out]
             yield f"| {' | '.join(cells)} |"
             figure = [""] * len(figure)
 
@@ -76,9 +75,3 @@ def in_turn(
 def sums(*columns: Sequence[float]) -> list[float]:
     """Return the sums of parts, turn by turn."""
     return [sum(turn) for turn in zip(*columns, strict=True)]
-
-
-def _said(times_ms: Sequence[float]) -> str:
-    """Return the median."""
-    median_ms = statistics.median(times_ms)
-    return f"{median_ms:.3g} ms" if median_ms < 1000 else f"{median_ms / 1000:.2f} s"

@@ -23,6 +23,7 @@ from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
+from evonav.parallel.work import look_rarely_for_garbage
 from evonav.sensors.observation import Observation
 from evonav.speed_benchmark.timing import cpu_ms
 
@@ -34,7 +35,8 @@ BACKEND = Backend()
 
 def rows(what: str, agents: Sequence[str], tasks: Sequence[Path], aim: str, pair: BarePair | None) -> Iterator[str]:
     """Rows of stages of agents at tasks, and, with a bare pair of processes, of the agent's process."""
-    _look_for_garbage_as_workers_do()
+    gc.collect()
+    look_rarely_for_garbage()
     found: dict[str, list[float]] = defaultdict(list)
     with closing(AgentProcesses(AgentHosting())) as processes:
         for task in tasks:
@@ -105,12 +107,6 @@ def _measured(task: Path, agent: str, processes: AgentProcesses, pair: BarePair 
 
 def _drop(_: object) -> None:
     """Let objects of the core be freed within the time."""
-
-
-def _look_for_garbage_as_workers_do() -> None:
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
 
 
 def _made(agent: str) -> Agent:

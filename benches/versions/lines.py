@@ -36,8 +36,9 @@ class Line:
 
 
 def milliseconds(times_ms: Sequence[float]) -> str:
-    """Return the median of times."""
-    return f"{statistics.median(times_ms):.3g} ms"
+    """Return the median of times, in seconds from one second on."""
+    median_ms = statistics.median(times_ms)
+    return f"{median_ms:.3g} ms" if median_ms < 1000 else f"{median_ms / 1000:.2f} s"
 
 
 def pairwise(above: Sequence[float], below: Sequence[float]) -> float:
