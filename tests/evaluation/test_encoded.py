@@ -3,12 +3,12 @@
 import json
 
 import pytest
-from made_up_stage import made_up_record
+from made_up_stage import made_up_record, taken
 from pydantic import ValidationError
 
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.encoded import encode_stage
-from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
+from evonav.evaluation.records.schema import EndState, ErrorKind, RoundRecord, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.worker import EVENT
 
@@ -31,6 +31,14 @@ def test_a_record_that_was_copied_with_invalid_parts_is_refused():
     for update in ({"stage": 0}, {"path_length_m": "far"}, {"target": wrong_target}):
         with pytest.raises(ValidationError):
             encode_stage(record.model_copy(update=update), wall_s=0.0, cpu_s=0.0)
+
+
+def test_a_round_is_validated_once_when_it_is_made():
+    one = taken(0)
+    for wrong in ({"round": 2**63}, {"pose": dict(one.pose) | {"x_m": 2e9}}, {"path_m": ((0.0, "north"),)}):
+        with pytest.raises(ValidationError):
+            RoundRecord.model_validate(dict(one) | wrong)
+    assert StageRecord.model_validate(made_up_record(stage=2, trace=(one,))).trace[0] is one
 
 
 def test_the_store_keeps_the_text_of_the_worker(tmp_path, monkeypatch):

@@ -28,7 +28,11 @@ class Record(BaseModel):
     )
 
 
-class PlacesRecord(Record):
+class CheckedRecord(Record, revalidate_instances="never"):
+    """A part of a record that is valid once it is made: nobody changes it with `model_copy`. A stage has hundreds."""
+
+
+class PlacesRecord(CheckedRecord):
     """Belief of an agent of where the target is: see `evonav.agents.agent.PlaceBelief`."""
 
     cell_m: Real

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
-from evonav.evaluation.records.base import BeliefRecord, Point2, Point3, Real, Record, Whole
+from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Point2, Point3, Real, Record, Whole
 from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
 
 SCHEMA_VERSION = 1
@@ -100,7 +100,7 @@ class StageFailure:
     traceback: str = ""
 
 
-class PoseRecord(Record):
+class PoseRecord(CheckedRecord):
     """A pose of the agent."""
 
     x_m: Real
@@ -134,7 +134,7 @@ class TargetRecord(Record):
     """Its place in stage 1, if `is_relocated`."""
 
 
-class EntryRecord(Record):
+class EntryRecord(CheckedRecord):
     """An object entry as the agent believed it, judged by the evaluator."""
 
     entry_id: Whole
@@ -183,7 +183,7 @@ class MovedObjectRecord(Record):
     """The round, from that one on, after which an entry stands for it."""
 
 
-class ActionRecord(Record):
+class ActionRecord(CheckedRecord):
     """The agent's answer."""
 
     kind: Literal["move", "navigate_to", "stop"]
@@ -211,7 +211,7 @@ class SensingRecord(Record):
     occupancy_range_m: Real
 
 
-class RoundRecord(Record):
+class RoundRecord(CheckedRecord):
     """One decision round: where the agent stood, what it chose, how it went."""
 
     round: Whole
