@@ -79,7 +79,7 @@ def test_nothing_of_a_walk_is_scored(walked, name):
     assert metrics_of(first).success is None
     assert metrics_of(first).cause is None
     assert metrics_of(third).success is not None
-    assert StageRecord.model_validate_json(first.model_dump_json()) == first
+    assert StageRecord.model_validate_json(first.to_json()) == first
 
 
 def test_what_was_seen_on_the_way_is_remembered(walked):
@@ -115,7 +115,7 @@ def test_arms_share_all_that_precedes_the_change():
 
 def test_runs_are_the_same_again():
     first, again = (run("ftu", pair_case(is_evolved=True)) for _ in range(2))
-    assert [record.model_dump_json() for record in first] == [record.model_dump_json() for record in again]
+    assert [record.to_json() for record in first] == [record.to_json() for record in again]
 
 
 def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():

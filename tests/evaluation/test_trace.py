@@ -133,7 +133,7 @@ def test_a_replay_equals_the_records_and_has_every_round(tmp_path, agent):
     stages = replay_of(run_dir, agent, on_round=lambda stage, number: told.append((stage, number)))
     with RunStore(run_dir) as store:
         stored = list(store.record_texts(agent, "toy-moved"))
-    assert [stage.record.model_dump_json() for stage in stages] == stored
+    assert [stage.record.to_json() for stage in stages] == stored
     assert all(stage.differences == () and stage.is_replayed for stage in stages)
     for stage in stages:
         assert [step.record for step in stage.rounds] == list(stage.record.trace)

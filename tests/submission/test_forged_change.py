@@ -139,7 +139,7 @@ FORGERIES: dict[str, tuple[Callable[[Row], None], str]] = {
 
 def written(parts: ForgedPack, folder: Path) -> Path:
     """The pack with its lines as evonav writes them; JSON of Python writes small numbers in another way."""
-    lines = [[StageRecord.model_validate(row, strict=False).model_dump_json() for row in mine] for mine in parts.rows]
+    lines = [[StageRecord.model_validate(row, strict=False).to_json() for row in mine] for mine in parts.rows]
     return parts.write(folder / "f.zip", members=["".join(f"{line}\n" for line in mine).encode() for mine in lines])
 
 

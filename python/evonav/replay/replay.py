@@ -229,4 +229,4 @@ def _differences(stored: str | None, stage: ReplayedStage) -> tuple[str, ...]:
     """Return where a replayed record differs from the stored one."""
     if stored is None or not stage.is_replayed:
         return ()
-    return record_differences(stored, stage.record.model_dump_json(), "replayed")
+    return record_differences(stored, stage.record.to_json(), "replayed")

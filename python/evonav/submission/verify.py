@@ -238,7 +238,7 @@ def read_records(file: SubmissionFile, part: PackedRecords) -> Iterator[StageRec
         where = f"{file.path}: {part.member}, line {number}"
         try:
             record = StageRecord.model_validate_json(text)
-            is_ours = record.model_dump_json() == text
+            is_ours = record.to_json() == text
         except ValidationError as error:
             raise SubmissionError(f"{where}: {first_problem(error)}") from error
         if not is_ours:
@@ -382,7 +382,7 @@ def _rescore(
 
 
 def _episode_text(path: Path, records: Iterable[StageRecord]) -> str:
-    return json.dumps({"path": str(path), "records": [record.model_dump_json() for record in records]})
+    return json.dumps({"path": str(path), "records": [record.to_json() for record in records]})
 
 
 def _check(name: str, findings: Iterator[str], if_none: str) -> Check:

@@ -82,7 +82,7 @@ def encode_stage(
         task_id=valid.task_id,
         stage=valid.stage,
         state=valid.state,
-        record=valid.model_dump_json(),
+        record=valid.to_json(),
         metrics=encode_metrics(valid),
         wall_s=wall_s,
         cpu_s=cpu_s,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Point2, Point3, Real, Record, Whole
 from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
@@ -329,14 +329,10 @@ class StageRecord(Record):
         during = self.during
         return self.target.position_m if during is None or not during.target_position_m else during.target_position_m
 
-    @model_serializer(mode="wrap")
-    def _without_untold(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what is newer than the records of agents and tasks that do not have it."""
-        values: dict[str, Any] = handler(self)
-        for name in ("belief_at_start", "during"):
-            if values[name] is None:
-                del values[name]
-        return values
+    def to_json(self) -> str:
+        """Return the JSON, without what is newer than the records of agents and tasks that do not have it."""
+        untold = {name for name in ("belief_at_start", "during") if getattr(self, name) is None}
+        return self.model_dump_json(exclude=untold)
 
 
 class RoomFootprint(Record):
