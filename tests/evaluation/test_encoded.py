@@ -38,6 +38,9 @@ def test_a_round_is_validated_once_when_it_is_made():
     for wrong in ({"round": 2**63}, {"pose": dict(one.pose) | {"x_m": 2e9}}, {"path_m": ((0.0, "north"),)}):
         with pytest.raises(ValidationError):
             RoundRecord.model_validate(dict(one) | wrong)
+        with pytest.raises(ValidationError):
+            one.model_copy(update=wrong)
+    assert one.model_copy(update={"round": 7}).round == 7
     assert StageRecord.model_validate(made_up_record(stage=2, trace=(one,))).trace[0] is one
 
 

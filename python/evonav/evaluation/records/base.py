@@ -1,8 +1,11 @@
 """Define the numbers and points of records, and the record of an agent's probabilities."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
+
+CheckedT = TypeVar("CheckedT", bound="CheckedRecord")
 
 Real = Annotated[float, Field(ge=-1e9, le=1e9)]
 """Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
@@ -29,7 +32,12 @@ class Record(BaseModel):
 
 
 class CheckedRecord(Record, revalidate_instances="never"):
-    """A part of a record that is valid once it is made: nobody changes it with `model_copy`. A stage has hundreds."""
+    """A part of a record that is validated when it is made or copied, and not again: a stage has hundreds."""
+
+    def model_copy(self: CheckedT, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> CheckedT:
+        """Return a copy, validated if some values are others."""
+        copy = super().model_copy(deep=deep)
+        return copy if update is None else self.model_validate(dict(copy) | dict(update))
 
 
 class PlacesRecord(CheckedRecord):
