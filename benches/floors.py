@@ -21,7 +21,7 @@ to do this part; if it is below, the rest stands between, of which the last colu
 that the rest can go. *The core's calls again*: every call of a stage into the core is recorded, and made once more in
 one process with nothing around it, checked to end with the same object maps; its images come from memory, where a
 stage finds them in caches. Were Python free, a stage would gain now / alone. *Two bare processes*: a fork over a
-socket, bytes of the sizes that rounds have, both on one core. It takes three minutes or more.
+socket, bytes of the sizes that rounds have, both on one core. It takes some minutes.
 Again: `python -m benches floors [--houses FILE] [--tasks NUMBER] [--parts stages,kernels,commands]`.
 """
 
