@@ -123,7 +123,6 @@ def optional_module(name: str, purpose: str, install: str) -> Any:  # noqa: ANN4
     """Return a module of a library that only some installations have.
 
     Args:
-        name: Name of the module.
         purpose: Reason why the library is needed, for the message.
         install: Argument of `pip install` that installs it, in quotes where a shell needs them.
 

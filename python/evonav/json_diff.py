@@ -31,8 +31,6 @@ def json_differences(
     object are the same.
 
     Args:
-        left: A JSON value.
-        right: Another JSON value.
         is_equal: Compares two values that are neither both objects nor both arrays of the same length.
         path: The place of the two values, for `JsonDifference.path`.
     """

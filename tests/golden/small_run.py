@@ -3,7 +3,8 @@
     python tests/golden/small_run.py    # prints what differs from digests.json
     python tests/golden/small_run.py --write    # accepts it; the commit says which numbers changed, and why
 
-Digests are of canonical JSON and of pixels, so they do not depend on the layout of a file, only on its values.
+Digests are of canonical JSON and of pixels, so they do not depend on the layout of a file, only on its values. Those of
+`decisions` are of actions, poses and scores alone: a change of a file's format leaves them as they are.
 """
 
 import gzip
@@ -132,11 +133,25 @@ def _run(out: Path) -> Iterator[tuple[str, str]]:
     with sqlite3.connect(out / "records.sqlite") as db:
         for agent, task, stage, record in db.execute("SELECT agent, task_id, stage, record FROM stages"):
             yield f"record/{agent}/{task}/{stage}", _of_bytes(record.encode())
+            yield f"decisions/{agent}/{task}/{stage}", _of_json(_decisions(json.loads(record)))
         for task, stage, text in db.execute("SELECT task_id, stage, map FROM stage_maps"):
             yield f"map/{task}/{stage}", _of_json(json.loads(text))
         for agent, task, stage, text in db.execute("SELECT agent, task_id, stage, measures FROM measures"):
             yield f"metrics/{agent}/{task}/{stage}", _of_json(json.loads(text))
     yield "summary.json", _of_json(json.loads((out / "summary.json").read_bytes()))
+
+
+def _decisions(record: dict[str, Any]) -> list[Any]:
+    """Actions, poses and scores of a stage: no change of a file's format may change them."""
+    rounds = [
+        [
+            *(answer["pose"][name] for name in ("x_m", "y_m", "z_m", "yaw_rad", "horizon_rad")),
+            *(answer["action"].get(name) for name in ("kind", "action", "position_m", "face_m", "reason")),
+            answer["path_m"],
+        ]
+        for answer in record["trace"]
+    ]
+    return [record["state"], record["spl"], record["soft_spl"], record["terminal_distance_m"], rounds]
 
 
 def _evonav(*arguments: object) -> None:

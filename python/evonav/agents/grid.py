@@ -104,9 +104,7 @@ def owners_of(
     """Return the frontier behind which each coarse cell lies.
 
     Args:
-        frontiers: The frontiers.
         is_open: `(R, C)` coarse cells that a frontier can lead to.
-        coarse: The grid.
         reach_m: Number of steps over such cells, times their edge, up to which they count as behind a frontier.
 
     Returns:

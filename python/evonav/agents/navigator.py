@@ -73,7 +73,6 @@ class Navigator:
 
         Args:
             map_frame: Shape and place of the map.
-            config: Parameters.
             names_colours: True to keep what views show by name, for rules that look, in place of their images.
             keeps_layouts: True to keep, with `names_colours`, what surrounds objects in views, too.
             keeps_detections: False to keep no detections of views, for an agent that never looks at them again.
@@ -190,7 +189,6 @@ class Navigator:
         """Return an entry of the object memory as questions describe it, without images.
 
         Args:
-            entry: The entry.
             with_looks: False to leave out what its views show, which takes time.
         """
         candidate = _candidate_of(entry)

@@ -45,7 +45,6 @@ class NavigatorAgent(ABC):
         """Create the agent; its memory is made when a task begins.
 
         Args:
-            config: Parameters of the navigator.
             decision: Decision model; default: the text matcher.
             num_tries: Number of tries before a question without a valid answer counts as failed.
             sensors: The sensors that the agent needs, apart from colours.

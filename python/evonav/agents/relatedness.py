@@ -24,7 +24,6 @@ class Relatedness:
 
         Args:
             matcher: Compares labels with the goal.
-            goal: The parsed goal.
             feature: `(D,)` unit feature of the goal's text; `None` compares labels.
         """
         self._matcher = matcher
@@ -36,7 +35,6 @@ class Relatedness:
         """Return how much a thing has to do with the goal, 0 to 1.
 
         Args:
-            label: Its label.
             feature: Its `(D,)` unit image feature, if there is one.
 
         Returns:

@@ -21,9 +21,7 @@ def observation_point(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        frame: Frame of the map.
         object_m: `(x, z)` of the object's middle.
-        distance_m: Distance from the object.
 
     Returns:
         `(x, z)` of a cell's middle, or `None` if no cell within `distance_m` is known to be free.
@@ -64,7 +62,6 @@ def places_around(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        frame: Frame of the map.
         object_m: `(x, z)` of the object's middle.
         first_m: `(x, z)` of the first place.
         distance_m: Wanted distance from the object. Places may be up to two cells farther away.
@@ -131,7 +128,6 @@ def widest_direction_rad(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        frame: Frame of the map.
         here_m: `(x, z)` of the agent.
         reach_m: Distance over which the floor has to be free.
         num_directions: Number of directions to try, evenly spaced from +z clockwise.

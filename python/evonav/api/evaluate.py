@@ -141,9 +141,7 @@ def read_settings(
     """Return settings from what an argument may be: a word, a mapping, or the settings themselves.
 
     Args:
-        model: The model of the settings.
         word: The field that a string sets.
-        value: The argument.
         name: The argument's name, for errors.
 
     Raises:

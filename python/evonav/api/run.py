@@ -46,9 +46,6 @@ class Run:
     def __init__(self, path: str | Path) -> None:
         """Open a run.
 
-        Args:
-            path: Its folder.
-
         Raises:
             StoreError: There is no run there.
         """
@@ -96,7 +93,6 @@ class Run:
 
         Args:
             a: Name of an agent, or of its class.
-            b: Name of another.
 
         Raises:
             InvalidArgumentError: The run has no such agent.

@@ -140,7 +140,6 @@ def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> N
     """Print a table of checks.
 
     Args:
-        title: Title of the table.
         checks: Name, result, style of the result, and finding of each check.
     """
     from rich.console import Console

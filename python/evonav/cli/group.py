@@ -112,8 +112,6 @@ def new_app(name: str | None = None, *, help: str | None = None, cls: type[Group
 
     Args:
         name: Its name; default: the one it gets when it is added.
-        help: Its purpose.
-        cls: Its class.
     """
     return typer.Typer(
         name=name,
@@ -130,7 +128,6 @@ def add_commands(app: typer.Typer, *commands: Callable[..., None], panel: str | 
     """Add commands to a group.
 
     Args:
-        app: The group.
         *commands: Functions; a command is named as its function is.
         panel: Heading in the group's help.
     """

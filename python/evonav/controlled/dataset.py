@@ -151,11 +151,7 @@ def _write(
     limit: int | None,
     outcomes: list[Outcome],
 ) -> ControlledRecord:
-    """Write each arm's `dataset.json`, and `controlled.json` last.
-
-    Raises:
-        TaskError: There is no task, or two have the same id.
-    """
+    """Write each arm's `dataset.json`, and `controlled.json` last."""
     made = sorted((done.task_id, done.house_sha256) for done in outcomes if done.task_id and done.house_sha256)
     rejections = tuple(outcome.rejection for outcome in outcomes if outcome.rejection is not None)
     task_ids = tuple(task_id for task_id, _ in made)

@@ -29,7 +29,6 @@ def evaluate_controlled(
     Args:
         directory: Holds `controlled.json`.
         agents: Names, see `evonav agents`.
-        config: Configuration of the runs.
         workforce: The workers that all arms share. Default: one process, with one episode at a time.
         num_retries: Number of retries of a stage, see `evaluate_all`.
         retry_errored: Run errored stages again.

@@ -37,7 +37,6 @@ def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> Decisi
     """Make the text matcher, which draws no random numbers.
 
     Args:
-        seed: Seed of the agent.
         noise: Rates of mistakes, by the names of `NoiseRates`; all models accept them.
     """
     return _with_noise(TextMatch(), noise, seed)

@@ -45,8 +45,6 @@ class CustomClient(CachingClient):
 
         Args:
             name: Name of the model in the keys of the cache: another name, other exchanges.
-            model: The model that answers.
-            store: Cache of exchanges.
             mode: Default `auto` with a store, else `live`.
             account: Account that counts questions.
             keeps_images: True to store the images' files beside their hashes.
@@ -117,7 +115,6 @@ def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
     Made once a process and used for all its episodes, unless it has a parameter `seed`: then once an episode.
 
     Args:
-        path: Import path.
         seed: Seed of the agent, for a factory with a parameter `seed`.
 
     Raises:

@@ -93,7 +93,6 @@ class Noisy(ModelWrapper):
         """Create a model that makes mistakes.
 
         Args:
-            model: The model that answers.
             rates: Shares of the mistakes.
             seed: Seed of the episode's agent.
             sleep: Waits for a number of seconds.

@@ -50,7 +50,6 @@ class QuerySession:
         """Return the first valid answer, or `None`, a failed decision, if no try gives one.
 
         Args:
-            question: The question.
             num_tries: Number of tries in place of the session's own, where it is part of an algorithm.
 
         Raises:

@@ -31,8 +31,6 @@ class AnswerError(DecisionError):
         """Create an error.
 
         Args:
-            fault: The reason.
-            message: An explanation.
             text: The model's text, which is no valid answer.
         """
         super().__init__(f"{fault}: {message}")
@@ -162,7 +160,6 @@ class DecisionModel(Protocol):
         """Answer a question.
 
         Args:
-            question: The question.
             attempt: Number of earlier tries of this question without a valid answer.
 
         Raises:

@@ -176,7 +176,6 @@ def label_point(
     The place is right to about a `num`-th of the polygon's size.
 
     Args:
-        polygon_m: The room.
         num: Places tried, along each axis.
         taken_m: Boxes that it should not cover.
         size_m: Width and height of the label.

@@ -29,7 +29,6 @@ def cells_layer(cells: NDArray[np.uint8], cell_m: float, corner_m: Point) -> str
 
     Args:
         cells: `(R, C)`: 0 unknown, 1 free, 2 blocked, 3 explored.
-        cell_m: Edge of a cell.
         corner_m: `(x, z)` of the smallest corner of cell (0, 0).
     """
     rows, cols = cells.shape

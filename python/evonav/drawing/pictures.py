@@ -77,7 +77,6 @@ def house_picture(
     """Draw a house with the names of its rooms and furniture.
 
     Args:
-        house: The house.
         path_m: A path, `(x, z)` points.
         pose: Pose of an agent to draw.
         fov_rad: Horizontal field of view of the agent.

@@ -199,7 +199,6 @@ class _Run:
         """Process every house without an outcome.
 
         Args:
-            pool: The workers.
             wanted: Indices of the houses to process; default all.
 
         Raises:
@@ -310,11 +309,7 @@ def _dataset_record(
 
 
 def _check_tasks(record: DatasetRecord, journal: Journal) -> None:
-    """Check that there are tasks and that their ids differ.
-
-    Raises:
-        TaskError: No house gives a task, or two houses give tasks with the same id.
-    """
+    """Check that there are tasks and that their ids differ."""
     seen: set[str] = set()
     for outcome in journal.ordered_outcomes():
         if outcome.task_id in seen:

@@ -58,7 +58,6 @@ def check_house(name: str, text: str, *, allow_unknown_assets: bool = False) -> 
     """Check a house.
 
     Args:
-        name: Name of the house.
         text: ProcTHOR JSON.
         allow_unknown_assets: Give assets without a known size the usual one of their category.
     """

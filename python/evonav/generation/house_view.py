@@ -29,7 +29,6 @@ def house_view(found: HouseCheck, *, allow_unknown_assets: bool = False) -> Hous
     """Collect what is shown of a house.
 
     Args:
-        found: The house's check.
         allow_unknown_assets: Give assets without a known size the usual one of their category.
     """
     house = found.house

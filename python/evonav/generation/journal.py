@@ -64,7 +64,6 @@ class Journal:
         """Open the journal of a run, or begin it.
 
         Args:
-            folder: Folder of the tasks.
             run: Identity of the run: everything that determines its tasks, as JSON values.
 
         Raises:

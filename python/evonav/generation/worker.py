@@ -115,7 +115,6 @@ def outcome_of(answer: Answer, name: str) -> Outcome:
 
     Args:
         answer: The answer of a worker made by `worker_of`.
-        name: The name of the house.
 
     Raises:
         InvalidArgumentError: An option is outside its domain.
@@ -145,7 +144,6 @@ def process_house(index: int, name: str, text: str, generate: Callable[[House], 
 
     Args:
         index: Index of the house in its source.
-        name: Name of the house.
         text: ProcTHOR JSON.
         generate: Function from the house to its tasks, by the folder that each is written to.
 
@@ -185,8 +183,6 @@ def put_task(task: Task, out: Path, label: str) -> Path:
     """Write a task's folder atomically, and replace one of the same name.
 
     Args:
-        task: The task.
-        out: Folder of the tasks.
         label: Label of this process, different from those of all others.
 
     Returns:

@@ -83,8 +83,6 @@ class MapView:
 
         Args:
             config: Settings of the environment.
-            at: The stage.
-            start: Pose of the agent.
         """
         self._config, self._at = config, at
         self._path_m: list[Point2] = [(start.x_m, start.z_m)]

@@ -59,7 +59,6 @@ def task_source(
     Args:
         tasks: Folder of tasks; the bundled ones if neither is given.
         houses: Houses, as `evonav.house.stream_houses` takes them.
-        subset: Named subset of the folder.
 
     Raises:
         InvalidArgumentError: Both are given, or a subset of houses.

@@ -25,7 +25,6 @@ class Stages:
         """Make room for stages, which `begin` begins.
 
         Args:
-            config: The environments'.
             num_envs: Number B of environments.
         """
         self._config, self._budget = config, config.budget
@@ -47,10 +46,8 @@ class Stages:
         """Begin a stage; stage 1 begins a task.
 
         Args:
-            index: The environment.
             stage: 1-based.
             target_m: `(x, z)` of the target's centre.
-            start: Pose of the agent.
             reference_length_m: Length L* of the reference path; `None` without one.
             distance_m: Geodesic distance to the end of the reference path; infinite without one.
         """
@@ -143,9 +140,7 @@ class Stages:
         """Return the infos of a stage's end.
 
         Args:
-            index: The environment.
             stage: 1-based.
-            end: Pose of the agent.
             is_last: Whether the task ends, too.
         """
         results = self._results[index]

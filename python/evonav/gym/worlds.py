@@ -70,7 +70,6 @@ class WorldLoader:
         """Make a loader.
 
         Args:
-            source: Source of the tasks.
             config: Configuration of the camera.
             max_bytes: Approximate memory for houses without an agent.
         """

@@ -84,7 +84,6 @@ def made_split(
     """Return the file of a split, checked; make it if it is not there, and go on if it was interrupted.
 
     Args:
-        split: The split.
         cache: Folder of datasets. Default: `EVONAV_CACHE`, else `~/.cache/evonav`.
         workforce: The workers that make houses. Default: this process.
         on_progress: Called at the beginning and after every house that is made.
@@ -116,11 +115,7 @@ def made_split(
 
 
 def _sha256_of_text(path: Path) -> str:
-    """Return the SHA-256 of an unpacked file.
-
-    Raises:
-        HousesDifferError: The file cannot be unpacked.
-    """
+    """Return the SHA-256 of an unpacked file."""
     digest = hashlib.sha256()
     try:
         with gzip.open(path, "rb") as text:

@@ -72,7 +72,6 @@ def make_houses(
 
     Args:
         out: A file `.jsonl` or `.jsonl.gz` that does not exist; an unfinished one is resumed.
-        count: Number of houses.
         seed: Seed of every random choice.
         first: Number of the first house, from 0.
         parameters: Parameters as JSON (`read_house_parameters`).
@@ -134,11 +133,7 @@ def _in_order(pool: Pool, numbers: range) -> Iterator[str]:
 
 @contextmanager
 def _unfinished(out: Path, identity: dict[str, object]) -> Iterator[tuple[IO[bytes], int]]:
-    """Open the unfinished file for appending, and count the whole houses that it holds.
-
-    Raises:
-        StoreError: It cannot be written, or was begun with other arguments.
-    """
+    """Open the unfinished file for appending, and count the whole houses that it holds."""
     partial, identity_file = _partial(out), _identity_file(out)
     text = json.dumps(identity, indent=1) + "\n"
     try:

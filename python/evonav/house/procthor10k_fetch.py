@@ -64,7 +64,6 @@ def fetch_procthor10k(
 
     Args:
         revision: Commit id, tag or branch of the dataset's repository.
-        splits: Splits to download.
         cache: Folder to use instead of `cache_folder()`.
         on_progress: Called with what is being done.
 

@@ -34,9 +34,6 @@ Shares = NDArray[np.float32]
 def colour_shares(view: View) -> Shares:
     """Return the share of each colour word in each detection of a view.
 
-    Args:
-        view: View with colours.
-
     Returns:
         `(N, len(COLOURS))`; rows add up to 1, or to 0 for a detection without pixels.
 

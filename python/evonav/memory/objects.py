@@ -242,7 +242,6 @@ class ObjectMap:
         nearer, and supported if the depths are equal within a band, `max(band_m, band_share * depth)`.
 
         Args:
-            entry_ids: The entries.
             view: View with depth, pose and intrinsics.
             config: Number of points and width of the band.
 
@@ -277,7 +276,6 @@ class ObjectMap:
 
         Args:
             view: View with depth, pose and intrinsics.
-            config: The conditions.
 
         Returns:
             The entries that lost points, by ascending id.

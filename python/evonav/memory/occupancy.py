@@ -83,7 +83,6 @@ class OccupancyMap:
 
         Args:
             map_frame: Shape and place of the cells.
-            frontiers: Parameters of the frontiers.
             explored_range_m: Distance within which seen cells are explored (3D-Mem: 1.7 m).
 
         Raises:

@@ -78,7 +78,6 @@ def judge_presence(
     Args:
         evidence: The object's points compared with a depth image.
         is_detected: Whether something with the object's label was detected at its place.
-        config: The thresholds.
 
     Examples:
         >>> judge_presence(DepthEvidence(num_see_through=200, num_occluded=20), is_detected=False)

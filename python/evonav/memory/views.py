@@ -87,10 +87,7 @@ class ViewStore:
         """Store a view.
 
         Args:
-            view: The observed view.
             entry_ids: Entry of each detection, as in `ObjectUpdate`.
-            stage: Stage of the task.
-            round_: Round of the stage.
         """
         seen = self._seen(view, entry_ids) if self._keeps_detections else ()
         jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)

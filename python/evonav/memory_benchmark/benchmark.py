@@ -84,7 +84,6 @@ def benchmark(
 
     Args:
         memories: Memories; those of earlier commands stay in the folder.
-        streams: Streams, and recordings.
         out: Holds `memory.json` and `records/`.
         settings: Must be the folder's own if it holds records.
         num_workers: Number of processes; 0 runs everything in this one.

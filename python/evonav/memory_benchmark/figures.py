@@ -41,7 +41,6 @@ def estimates(result: MemoryResult, kind: str | None = None) -> dict[str, Estima
     """Return all figures of a memory that its streams give, by name.
 
     Args:
-        result: The memory.
         kind: Kind of streams, such as `S1`; default: all. Streams in which it failed are left out.
     """
     streams = result.of_kind(kind)
@@ -68,7 +67,6 @@ def ratios(result: MemoryResult, baseline: MemoryResult, kind: str | None = None
     """Return times and sizes of a memory divided by those of another in the same run, over the streams of both.
 
     Args:
-        result: The memory.
         baseline: The other one, `BASELINE` in tables.
         kind: Kind of streams; default: all.
     """

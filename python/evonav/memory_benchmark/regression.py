@@ -34,8 +34,6 @@ def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASEL
     baseline of its own run, and only beyond `TIME_TOLERANCE`; without the baseline in both results, times are left out.
 
     Args:
-        now: The new result.
-        before: The earlier one.
         baseline: Name of the memory that times are divided by.
 
     Returns:

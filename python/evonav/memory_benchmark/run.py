@@ -119,7 +119,6 @@ def measure_all(
 
     Args:
         memories: The memories; fresh ones are made.
-        stream: The stream.
         settings: Place and limits of the run, and how often a memory is asked.
         alive: Called after every frame of every memory.
 
@@ -151,7 +150,6 @@ def judge_memories(
 
     Args:
         new_memories: Each makes a memory, which is closed at the end.
-        stream: The stream.
         settings: They say how often a memory is asked.
         alive: Called after every frame of every memory.
     """

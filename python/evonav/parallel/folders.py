@@ -137,8 +137,6 @@ def put_folder(written: Path, root: Path, *, aside: Path) -> None:
     If the process is killed, the old or the new folder is in place, or the old one is whole at `aside`.
 
     Args:
-        written: The folder to move.
-        root: Its place.
         aside: A path in the same file system for the old folder meanwhile; what is there is removed.
 
     Raises:

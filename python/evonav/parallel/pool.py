@@ -99,7 +99,6 @@ def open_pool(
     Args:
         work: `module:factory`.
         settings: Text with which the factory is called.
-        workforce: The workers.
         timeout_s: Longest silence of a job before it is abandoned.
         max_losses: Number of workers that a job may lose before it fails.
         prelude: See `evonav.parallel.local.Program`.

@@ -81,8 +81,6 @@ def serve(
     Args:
         work_name: `module:factory`.
         settings: Text with which the factory is called.
-        jobs: Keys and texts of the jobs.
-        send: Sends a message.
         has_threads: Run each job on a thread of its own, as it comes. Otherwise the next one is taken when the one
             before has ended.
     """

@@ -31,7 +31,6 @@ class DetectorPerception:
         """Make a perception over models that may be shared.
 
         Args:
-            detector: Detector that finds objects.
             filters: Filters on detections; default: 3D-Mem's values.
             embedder: Computes the features of the remaining detections; default: the detector's own, if it has any.
         """

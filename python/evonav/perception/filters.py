@@ -67,7 +67,6 @@ def filtered(found: Found, config: FilterConfig) -> Found:
 
     Args:
         found: Detections in one image.
-        config: Filters of the stack.
     """
     remaining = without_small_and_doubtful(found, config)
     remaining = without_doubles(remaining, config)
@@ -100,7 +99,6 @@ def without_doubles(found: Found, config: FilterConfig) -> Found:
 
     Args:
         found: The most confident first.
-        config: Filters of the stack.
     """
     ious = mask_ious(found.masks)
     areas_px = box_areas_px(found.boxes_px)

@@ -215,9 +215,6 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
     """Load a stack's models; a model that this process has loaded before is not loaded again.
 
     Args:
-        stack: Its name.
-        config: Its options.
-        models: Folder of weights.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
 
     Raises:

@@ -135,7 +135,6 @@ def located(weights: Weights, folder: Path | None) -> Path:
     """Locate weights; missing ones are fetched if no folder was named.
 
     Args:
-        weights: Weights of a model.
         folder: See `models_folder`.
 
     Returns:
@@ -152,7 +151,6 @@ def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
     """Return the checked SHA-256 of each file.
 
     Args:
-        weights: Weights of a model.
         folder: See `models_folder`.
 
     Raises:
@@ -185,7 +183,6 @@ def places(weights: Weights, folder: Path | None) -> list[tuple[WeightFile, Path
     """Return the place of each file, whether it exists or not; nothing is fetched.
 
     Args:
-        weights: Weights of a model.
         folder: See `models_folder`.
     """
     return [(file, _path_of(file, folder)) for file in weights.files]

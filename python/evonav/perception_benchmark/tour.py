@@ -21,7 +21,6 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
     Places of a room lie as far apart as they can, the first one drawn; so is the heading that a place begins with.
 
     Args:
-        case: The task.
         stage: 1-based; the simulator has its house.
         simulator: Simulator at the task's start.
         views_per_room: Largest number of views, rounded up to whole places.

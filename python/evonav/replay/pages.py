@@ -43,8 +43,6 @@ def write_episode(
     """Write an episode's page, or one per stage where one would be too large.
 
     Args:
-        stages: Replayed stages, in order.
-        out_dir: Folder to write to.
         budget: Rounds that the agent had in a stage.
         success_radius_m: Radius of the ring around the target.
         only: The one stage to show.

@@ -74,7 +74,6 @@ class Recorder:
         """Start without rounds.
 
         Args:
-            agent: The one that runs.
             on_round: Called with the stage and the round, from 0, as they begin.
             losses: Losses of the agent's process, by stage: there the agent does not act.
             heading_px: Longer edge of the heading views, where pages' own size is too small.

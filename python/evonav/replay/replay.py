@@ -56,7 +56,6 @@ class RunReplay:
         """Read a run's header.
 
         Args:
-            run_dir: A run.
             task_path: Folder of a task, by its id.
             response_cache: Stored answers of a model; default: the file in the run's folder.
             heading_px: Longer edge of the heading views; default: that of the pages of `evonav view`.
@@ -108,7 +107,6 @@ class RunReplay:
 
         Args:
             agent: One of the run's.
-            task_id: One of its tasks.
             on_round: Called with the stage and the round, from 0, as they begin.
             last_stage: Last stage to yield; default all.
 

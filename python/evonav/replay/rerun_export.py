@@ -49,7 +49,6 @@ def write_recording(
     """Write an episode as a recording, with the timelines `step`, `stage` and `round`.
 
     Args:
-        stages: Replayed stages, in order.
         maps: Floor plans of the task, by stage.
         path: `.rrd` file.
         success_radius_m: Radius of the ring around the target.

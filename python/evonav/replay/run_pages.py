@@ -27,7 +27,6 @@ def write_pages(
     """Replay episodes and write their pages and the index.
 
     Args:
-        run: A run.
         episodes: Agent and task id of each.
         stages: The stages to show, each on a page of its own; default: all, on one page.
         tasks: Folder of the run's tasks; default: where the run found them.
@@ -68,7 +67,6 @@ def unwritten_highlights(run: RecordedRun, num: int | None) -> list[tuple[str, s
     """Return the highlights (agent and task id) that have no page of the run's present records.
 
     Args:
-        run: A run.
         num: Number of highlights to look at, the best first; `None` for all episodes.
     """
     written = {

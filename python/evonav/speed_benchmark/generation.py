@@ -36,8 +36,6 @@ def measure(sampling: Sampling, *, houses: Path | str = BUNDLED, title: str = "b
 
     Args:
         sampling: Its `limit` is the number of tasks, by default 1000.
-        houses: File or folder of houses.
-        title: Name of the row.
 
     Raises:
         HouseError: The houses cannot be read.

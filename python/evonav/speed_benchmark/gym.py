@@ -43,7 +43,6 @@ def measure(sampling: Sampling, *, num_envs: Sequence[int] = NUM_ENVS, num_steps
     Args:
         sampling: Its `limit` is the number of houses of which images are drawn.
         num_envs: Sizes of the vector environments.
-        num_steps: Steps of a round.
 
     Raises:
         StoreError: A named peer is not installed.

@@ -144,7 +144,6 @@ def rows_of(
     """Return the rows of an operation from its measurements.
 
     Args:
-        operation: Name of the row.
         ours_ms: `(N,)` times.
         peers_ms: `(N,)` times of each peer on the same inputs.
         houses: `(N,)` names of houses.

@@ -82,7 +82,6 @@ class ClusterBootstrap:
             strata: `N` names or numbers, the same for all rows of a house; houses are resampled within them. For rows
                 pooled from sets whose sizes were chosen, such as a thousand small houses and seventy large ones.
             num_resamples: R, more make steadier ends.
-            seed: Seed of the draws.
 
         Raises:
             ValueError: A house lies in two strata.

@@ -102,8 +102,6 @@ def paired_effects(
         b: `(N, M)`, of the other, on the same stages.
         clusters: `N` names of houses; rows of one are drawn together.
         strata: `N` names, the same for all rows of a house; houses are resampled within them.
-        num_resamples: Resamples of the bootstrap.
-        seed: Seed of all that is drawn.
 
     Raises:
         ValueError: The arrays have no row, or a house lies in two strata.

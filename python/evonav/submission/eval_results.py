@@ -15,7 +15,6 @@ def write_eval_results(pack: Path, dataset: str) -> list[Path]:
     """Write `.eval_results/PACK-AGENT.yaml` beside a packed run, for each of its agents.
 
     Args:
-        pack: The packed run.
         dataset: Repository of its tasks on the Hub, with `@REVISION` if one is meant.
 
     Returns:

@@ -157,11 +157,7 @@ def rank(
 
 
 def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
-    """Return the set with the most tasks of a file.
-
-    Raises:
-        SubmissionError: No set has any.
-    """
+    """Return the set with the most tasks of a file."""
     packed = {(task.task_id, task.digest) for task in header.tasks}
     digests = [{(task.task_id, digest) for task in one.tasks for digest in _digests(task)} for one in task_sets]
     common = [len(packed & there) for there in digests]

@@ -31,8 +31,6 @@ def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
 
     Args:
         board: Verified runs.
-        path: The file to write.
-        title: Title of the page.
 
     Raises:
         StoreError: It cannot be written.

@@ -37,7 +37,6 @@ def pack(
     """Write a submission.
 
     Args:
-        run_dir: A complete run.
         out: The file to write, whole or not at all.
         agents: Names of agents of the run; default: all but baselines.
         about: Title, authors and other statements.

@@ -21,7 +21,6 @@ def change_findings(record: StageRecord, stage: StageSpec, protocol: ProtocolCon
     """Yield where a record's change during the stage is not the task's, or cannot have taken place as recorded.
 
     Args:
-        record: The record, with its rounds.
         stage: The task's stage.
         protocol: The run's protocol.
     """

@@ -29,7 +29,6 @@ def path_findings(record: StageRecord, before: StageRecord | None, protocol: Pro
     The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
 
     Args:
-        record: The record.
         before: The record of the stage before, at whose end this one has to begin; `None` for stage 1.
         protocol: The run's protocol.
     """

@@ -109,7 +109,6 @@ def unseal(folder: Path, private_key: Path, out: Path) -> None:
     Args:
         folder: A sealed set.
         private_key: File of `new_key`.
-        out: Folder to write to.
 
     Raises:
         InvalidArgumentError: The file is no private key.

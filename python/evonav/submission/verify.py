@@ -167,7 +167,6 @@ def verify(
     """Verify a submission.
 
     Args:
-        path: The file.
         tasks: All tasks that the submission has to contain.
         limit: Require only the first tasks, and execute only their actions again. Default: all.
         scores_only: Compute scores from the recorded paths instead of executing the actions again.

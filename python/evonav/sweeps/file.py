@@ -105,7 +105,6 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     """Read a sweep file.
 
     Args:
-        path: A file of TOML.
         changes: `KEY=VALUE` that override the file; a key with dots names an entry of a table, a value is JSON or text.
 
     Raises:

@@ -18,10 +18,7 @@ def write_sweep_page(out_dir: Path, name: str, rows: Sequence[SweepRow], reports
     """Write `report.html`: a plot of what was swept, tables, and links to the reports of cells.
 
     Args:
-        out_dir: Folder to write.
-        name: Name of the sweep.
         rows: Rows of `evonav.sweeps.summary.sweep_rows`.
-        reports: Name and report of each cell.
 
     Returns:
         The page.

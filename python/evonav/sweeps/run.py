@@ -134,8 +134,6 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
     """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
 
     Args:
-        sweep: The file.
-        cell: One of its cells.
         out: Folder of the sweep. If the sweep has begun, simulators keep their styles, and the protocol its paths.
         resources: Files for answers and costs.
 
@@ -206,11 +204,6 @@ def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
 
     Cells and agents may be added; of what has begun, none may be changed or left out.
 
-    Args:
-        out: Folder of the sweep.
-        sweep: The file.
-        runs: The runs of all its cells.
-
     Raises:
         StoreError: The folder holds another sweep, or cannot be written; it says what differs.
     """
@@ -263,9 +256,6 @@ def run_sweep(
     """Run the missing stages of a sweep, with one set of workers.
 
     Args:
-        sweep: The file.
-        out: Folder of the sweep.
-        runs: The runs of all cells.
         only: Patterns of cells' names; others are left as they are.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called as a cell begins and after each of its recorded stages.

@@ -16,7 +16,6 @@ def apply(raw: dict[str, Any], change: str, path: Path) -> None:
     """Set a value, as `--set KEY=VALUE` does.
 
     Args:
-        raw: Changed.
         change: A key with dots reaches into tables; a value is JSON, or text.
         path: Named in errors.
 

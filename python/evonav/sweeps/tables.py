@@ -16,8 +16,6 @@ def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str,
     """Write `summary.json`, `summary.csv` and `summary.md` of a sweep.
 
     Args:
-        out: The sweep's folder.
-        rows: Its rows.
         content: Content of `summary.json`.
 
     Raises:

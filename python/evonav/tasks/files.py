@@ -193,7 +193,6 @@ def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task
     """Read a data set, one task at a time, in order of task id.
 
     Args:
-        directory: Folder with one folder a task.
         limit: Largest number of tasks to read; default all.
 
     Raises:

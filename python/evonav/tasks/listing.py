@@ -37,7 +37,6 @@ def task_files(directory: Path, limit: int | None = None, subset: str | None = N
     """List the tasks of a folder in order of task id; only their headers are read.
 
     Args:
-        directory: Folder with one folder a task.
         limit: Number of tasks to list, from the first; default all.
         subset: List only the tasks of this named subset (`evonav.tasks.subsets`).
 

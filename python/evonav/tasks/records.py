@@ -90,9 +90,7 @@ def parse_record(model: type[RecordT], data: bytes, path: Path) -> RecordT:
     """Parse a record from JSON.
 
     Args:
-        model: Type of the record.
         data: UTF-8 JSON.
-        path: Path of the file, for errors.
 
     Raises:
         TaskError: The first problem, with file, field and value.

@@ -167,7 +167,6 @@ def find_receptacle(
 
     Args:
         bottom_m: Height of the object's lowest point.
-        centre_m: Centre of the object.
         low_m: `(N, 3)` least corners of the receptacles' boxes.
         high_m: `(N, 3)` greatest corners of the receptacles' boxes.
 

@@ -80,8 +80,6 @@ class Surfaces:
         """Return the indices of the bodies that have some surface in a box.
 
         Args:
-            centre_m: Centre of the box.
-            half_m: Half its edges.
             axes: The box's own axes as columns, `(3, 3)`.
         """
         reach_m = np.abs(axes) @ half_m

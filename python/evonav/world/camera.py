@@ -49,7 +49,6 @@ def thinned(
 
     Args:
         depth_m: `(H, W)` planar depth.
-        intrinsics: Intrinsics of the image.
         strides_px: Values for n; the first that divides height and width is taken, else 1.
 
     Returns:
@@ -68,7 +67,6 @@ def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) 
     Args:
         depth_m: `(H, W)` planar depth.
         pose: Pose of the camera itself, as `Frame.pose`.
-        intrinsics: Intrinsics of the image.
 
     Returns:
         `(H, W, 3)` metres, not finite where the depth is not.
@@ -89,7 +87,6 @@ def unproject_pixels(
         cols: `(N,)` of the pixels.
         depth_m: `(H, W)` planar depth.
         pose: Pose of the camera itself, as `Frame.pose`.
-        intrinsics: Intrinsics of the image.
 
     Returns:
         `(N, 3)` metres.
@@ -130,7 +127,6 @@ def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -
     Args:
         points_m: `(N, 3)`, world frame.
         pose: Pose of the camera itself, as `Frame.pose`.
-        intrinsics: Intrinsics of the image.
 
     Returns:
         `(N, 3)` image column and row in pixels (a pixel's centre is at half-integers; the borders are not checked) and

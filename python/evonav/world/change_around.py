@@ -15,7 +15,6 @@ def change_around(
     computed from the house alone, so it is the same for every simulator.
 
     Args:
-        house_json: The house before the change.
         delta_json: The change, as `House.apply` takes it.
         config: The simulator's, for the agent's body.
         pose: The agent's pose.

@@ -107,7 +107,6 @@ def belief_of(
         places: Other sites, and how likely an object of its kind is there, relative to one another.
         unknown_share: Share of the home that the agent does not know, 0 to 1.
         coverage: The evidence of this stage.
-        config: The constants.
     """
     total_ratio = 1.0 + sum(one.ratio for one in seen.values())  # 1: the target was never seen
     prior = {site: one.ratio / total_ratio * config.persistence**one.num_stages for site, one in seen.items()}
@@ -130,7 +129,6 @@ def p_present(num_stages: int, weight: float, config: BeliefConfig) -> float:
     Args:
         num_stages: Number of stages since it was last seen.
         weight: The likelihood of this stage's looks if it is there, relative to that if it is not.
-        config: The constants.
     """
     prior = config.persistence**num_stages
     return prior * weight / (prior * weight + (1.0 - prior))

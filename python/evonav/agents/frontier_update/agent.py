@@ -111,8 +111,6 @@ class FrontierUpdate(NavigatorAgent):
 
         Args:
             ranked: The objects that may be chosen, the best first.
-            remembered: Everything that is remembered.
-            observation: The present observation.
         """
         navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)

@@ -211,8 +211,6 @@ def identity_question(
     """Ask about an entry of the object memory, among everything remembered.
 
     Args:
-        goal: The goal.
-        entry: The entry.
         navigator: The agent's memory.
         with_images: Whether the question shows images.
         remembered: Everything in this memory, if it was described already: with the looks of the goal's namesakes.

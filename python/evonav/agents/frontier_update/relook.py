@@ -58,9 +58,7 @@ def place_from_another_side(
 
     Args:
         navigator: The agent's map and object entries.
-        entry: The entry to look at.
         first: Pose of the first look's camera, whose height is that of the second's.
-        max_way_m: Longest way to the place.
         config: The other conditions.
 
     Returns:

@@ -25,7 +25,6 @@ def describe(error: BaseException, *, caller: str | None = None) -> str:
     The text is the same in whatever process and at whatever address the exception was raised.
 
     Args:
-        error: The exception.
         caller: Package that called the agent in this process; its own places are left out.
     """
     text = _bounded(_ADDRESS.sub("0x...", f"{_type_name(error)}: {_message(error)}"))

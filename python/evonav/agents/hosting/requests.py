@@ -34,8 +34,6 @@ def write_request(
     """Return a request.
 
     Args:
-        number: Its number.
-        operation: Its name.
         arguments: Its arguments; the first one of `act` is an observation.
         put: Copies arrays into the shared memory, and returns where they are.
     """

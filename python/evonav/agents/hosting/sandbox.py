@@ -191,11 +191,7 @@ def _limit(memory_mb: int) -> None:
 
 
 def _call(name: str, *arguments: object) -> int:
-    """Call a function of the C library.
-
-    Raises:
-        InvalidArgumentError: It failed.
-    """
+    """Call a function of the C library."""
     done = int(getattr(_LIBC, name)(*arguments))
     if done < 0:
         raise InvalidArgumentError(f"isolation = sandbox: {name}: {os.strerror(ctypes.get_errno())}")

@@ -75,8 +75,6 @@ class Part(Generic[T]):
         """Name the part.
 
         Args:
-            name: Name in errors.
-            kind: Type of the value.
             max_bytes: Limit of the JSON that is written or read.
         """
         self._name = name

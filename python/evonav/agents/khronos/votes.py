@@ -51,7 +51,6 @@ def change_of(bins: Mapping[int, tuple[int, int]], config: VotesConfig, *, forwa
     in Khronos.
 
     Args:
-        bins: The votes.
         config: Window and shares.
         forward: Whether to go through the rounds forwards or backwards.
     """
@@ -163,7 +162,6 @@ def rays_of(view: View, stride_px: int) -> View:
     """Return a view with fewer pixels and without detections: the rays that are kept of it.
 
     Args:
-        view: The view.
         stride_px: Every such pixel of every such row is kept, if the size of the image allows it; else all are.
     """
     depth_m, intrinsics, _ = thinned(view.depth_m, view.intrinsics, stride_px)

@@ -97,7 +97,6 @@ class GraphMemory:
 
         Args:
             num_rounds: Number of rounds, this one included.
-            max_views: Largest number of views.
         """
         navigator = self.navigator
         recent: list[StoredView] = []

@@ -54,7 +54,6 @@ def visible_viewpoint(
         objects: Remembered objects, which may hide the target.
         target_m: `(N, 3)` points of the object, at least one.
         is_free: `(R, C)`, cells known to be free.
-        frame: Frame of the map.
         here_m: `(x, z)` of the agent.
         config: MSGNav's constants.
     """

@@ -25,9 +25,6 @@ LOOK_DOWN_RAD, DROP_M = math.radians(30.0), 0.8
 def visible_range_m(noun: str) -> float:
     """Return the distance on the ground plane up to which a usual object of a type is large enough to be detected.
 
-    Args:
-        noun: A canonical noun.
-
     Returns:
         Metres, for a camera with a field of view of 90 degrees; `inf` for a type without a known size.
     """
@@ -57,10 +54,7 @@ def prior_of(
     """Return how many objects of the goal's type are to be expected at each place, weighted by how they fit the text.
 
     Args:
-        goal: The parsed goal.
-        remembered: Everything remembered.
         sightings: Everything that was detected and is no entry.
-        coarse: The grid.
         unknown: `(R, C)` coarse cells that the map does not know.
         config: The agent's parameters.
 

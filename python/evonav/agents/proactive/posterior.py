@@ -71,7 +71,6 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
     """Return the posterior as probabilities of squares of `SQUARE_CELLS` coarse cells, for records and pictures.
 
     Args:
-        posterior: The posterior.
         placed: Middles of the entries and sightings, and their weights.
         coarse: The grid of the posterior.
     """
@@ -130,10 +129,7 @@ def posterior_of(
     """Return where the target may be.
 
     Args:
-        goal: The parsed goal.
         matcher: Compares the goal with what is remembered.
-        around: The memory.
-        presence: Belief in each entry.
         sightings: Everything that was detected and is no entry.
         searched: Probabilities that the views of this stage, and of all stages, missed the target.
         factors: Further factors of entries, such as of those whose identity was denied; 1 if not given.

@@ -64,7 +64,6 @@ class PresenceBelief:
         """Let things have moved.
 
         Args:
-            stage: Number of the stage.
             room_of: Room of each entry; rooms are numbered anew at each stage.
             visited: Rooms in which the agent was in the last stage.
             here: The agent's room, which does not change; `NO_ROOM` if it is in none.

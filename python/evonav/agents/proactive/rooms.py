@@ -25,7 +25,6 @@ def rooms_of(cells: NDArray[np.uint8], frame: MapFrame, furniture: list[ObjectCa
 
     Args:
         cells: `(R, C)` of the agent's map.
-        frame: Frame of the map.
         furniture: Remembered objects; the floor under them belongs to a room, as they are no walls.
 
     Returns:

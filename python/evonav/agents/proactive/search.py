@@ -50,9 +50,7 @@ def unknown_cells(
     """Return the `(R, C)` coarse cells that are unknown in most of their area and under nothing remembered.
 
     Args:
-        coarse: The grid.
         blocks: The map's cells, as `CoarseFrame.taken` returns them.
-        remembered: Everything remembered.
     """
     unknown: NDArray[np.bool_] = (blocks == UNKNOWN).mean(axis=0) > FULL_KNOWN_SHARE
     for one in remembered:
@@ -74,8 +72,6 @@ def places_to_search(
 
     Args:
         weights: `(R, C)` of the posterior, of the coarse cells that can be searched.
-        coarse: Their grid.
-        around: The memory.
         radius_m: Distance within which a place shows the target.
         config: The agent's parameters.
 
@@ -117,9 +113,7 @@ def shown_from(
 
     Args:
         place_m: `(x, z)`.
-        coarse: The grid.
         walls: `(R, C)` cells of the agent's map that are blocked, and by nothing remembered.
-        radius_m: The distance.
     """
     frame = coarse.frame
     reach = math.ceil(radius_m / frame.cell_m)
@@ -165,7 +159,6 @@ def best_option(
     """Return the option with the largest gain a metre; the last one is kept unless another is clearly better.
 
     Args:
-        options: The options.
         last: The last round's option.
         abandoned: Options from which the agent turned away before it was there.
         config: The agent's parameters.

@@ -30,10 +30,8 @@ def place_by(places: Sequence[Point2], placed: Placed, occupancy: OccupancyMap, 
     """Return the place with most of the posterior within reach, and of those about as good the nearest.
 
     Args:
-        places: Free places.
         placed: Middles of the entries with the goal's name, and their weights.
         occupancy: The agent's map.
-        here_m: Place of the agent.
 
     Returns:
         `(x, z)`; `None` if no known floor leads there.
@@ -52,10 +50,8 @@ def likeliest_places(
     """Return the places on the floor within whose reach most of the posterior is.
 
     Args:
-        posterior: The posterior.
         placed: Middles of entries and sightings, and their weights.
         coarse: The grid of the posterior.
-        around: The memory.
     """
     weights = posterior.moved + posterior.unseen
     for (x_m, z_m), weight in placed:

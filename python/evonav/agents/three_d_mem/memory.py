@@ -49,7 +49,6 @@ class SnapshotMemory:
 
         Args:
             views: The view store, the same at each call.
-            entries: All remembered entries.
             agent_m: `(x, z)` of the agent.
         """
         self._add_frames(views, {entry.id for entry in entries})

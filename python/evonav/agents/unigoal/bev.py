@@ -50,7 +50,6 @@ class BevMap:
         Args:
             centre_m: `(x, z)` of its middle: where the agent starts.
             num_categories: Number of categories that pixels may have.
-            config: Parameters.
 
         Raises:
             InvalidArgumentError: A parameter is outside its domain; the message names it.

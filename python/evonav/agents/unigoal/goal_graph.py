@@ -88,9 +88,6 @@ def match_graphs(
     pair of nodes, so that its full degree would agree with no goal.
 
     Args:
-        goal: A subgraph of the goal graph.
-        nodes: Nodes of the scene.
-        edges: Edges of the scene.
         mode: The names of scene nodes.
         spell: Returns one spelling for a word, such as `sofa` for "couch".
     """

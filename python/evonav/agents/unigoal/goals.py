@@ -64,7 +64,6 @@ class GoalWatch:
         Otherwise an agent that turns towards one chair would see another, and turn back, for ever.
 
         Args:
-            view: The present view.
             category: The goal's category, if it has one.
             seen_ids: Ids of the scene nodes in view.
         """
@@ -129,7 +128,6 @@ def largest_detection(view: View, category: str) -> np.ndarray[tuple[int, int], 
 
     Args:
         view: A view whose detections are labelled with ProcTHOR's types.
-        category: A category of the map.
 
     Returns:
         `(H, W)` mask; `None` without a detection that has a depth.

@@ -92,7 +92,6 @@ class UniGoalPlanner:
         Args:
             bev: The agent's map; the planner adds visited cells and collisions.
             seed: Seed of the random goals to get unstuck.
-            config: Parameters.
         """
         self.bev = bev
         self.config = config or PlannerConfig()

@@ -30,12 +30,7 @@ class ConeMap:
         self.confidences = np.zeros((frame.rows, frame.cols))
 
     def see(self, view: View, value: float) -> None:
-        """Give all cells that a view shows its value: the mean of all views' values, weighted by confidence.
-
-        Args:
-            view: The view.
-            value: Its value.
-        """
+        """Give all cells that a view shows its value: the mean of all views' values, weighted by confidence."""
         config = self.config
         cells = np.concatenate([view.occupancy.free, view.occupancy.blocked])
         if len(cells) == 0:

@@ -119,8 +119,6 @@ def pixel_weights(depth_m: NDArray[np.float32], intrinsics: Intrinsics, config: 
 
     Args:
         depth_m: `(H, W)` planar depth.
-        intrinsics: Its camera.
-        config: The constants.
 
     Returns:
         `(H, W)` weights, 0 to 1; 0 where there is no depth.

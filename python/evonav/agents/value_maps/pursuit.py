@@ -28,7 +28,6 @@ class Pursuit:
         """Return the place to go to: the last one, else the one with the largest value that was not chosen before.
 
         Args:
-            places: The places.
             here_m: `(x, z)` of the agent.
 
         Returns:

@@ -64,13 +64,11 @@ def make_pages(
     """Replay episodes and write their pages and the index.
 
     Args:
-        run: A run.
         task: Id of a task; default: the best highlight.
         agents: Names; default: all of the run's.
         stages: The stages to show, each on a page of its own; default: all, on one page.
         tasks: Folder of the run's tasks.
         exchanges: File of a model's answers.
-        out: Folder to write.
     """
     from evonav.replay.run_pages import highlight_task
     from evonav.report.run import load_run

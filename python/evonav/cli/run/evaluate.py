@@ -194,8 +194,6 @@ def running(out: Path, config: "RunConfig", *, has_bar: bool = True) -> "Iterato
     """Show the progress of a run, which the yielded function updates; an interrupt says how to resume.
 
     Args:
-        out: Folder of the run.
-        config: Its configuration.
         has_bar: Show a bar; a debugger needs the terminal for itself.
     """
     with interruptible(out):

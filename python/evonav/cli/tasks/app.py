@@ -113,12 +113,7 @@ def show(
 
 
 def _one_task(folder: Path, task_id: str | None, stages: "Sequence[int]") -> "Task | None":
-    """Return the chosen task; `None` for all of a dataset.
-
-    Raises:
-        InvalidArgumentError: There is no such task or stage.
-        TaskError: It is malformed.
-    """
+    """Return the chosen task; `None` for all of a dataset."""
     from evonav.errors import InvalidArgumentError
     from evonav.tasks import load_task
 

@@ -73,7 +73,6 @@ class AppearanceMatcher(Matcher):
         """Create a matcher.
 
         Args:
-            config: Numbers of the rules.
             eagerness: 0 believes an object at `threshold`, 1 at `eager_threshold`.
         """
         super().__init__(TextMatchConfig())
@@ -110,7 +109,6 @@ class AppearanceMatcher(Matcher):
         """Return the probability that each object is the goal; the rest is that of "not seen yet".
 
         Args:
-            goal: The parsed instruction.
             named: Objects with the goal's name.
             around: Everything remembered; of it, only what an object's own views show counts.
             unseen_m2: Area that the map does not know.

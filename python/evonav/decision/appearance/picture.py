@@ -36,7 +36,6 @@ def picture_ratio(pictured: Layout, seen: Layout, config: PictureConfig) -> floa
     Args:
         pictured: Layout of the goal's picture.
         seen: Layout around a remembered object.
-        config: Numbers of the ratio.
     """
     near, whole = distance(pictured.near, seen.near), distance(pictured.whole, seen.whole)
     low, high = config.range

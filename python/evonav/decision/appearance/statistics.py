@@ -125,9 +125,6 @@ UNKNOWN_PER_100_M2 = 0.6
 def usual_size(noun: str) -> tuple[float, float] | None:
     """Return the median size of a type, and its median ratio of height to the longer side.
 
-    Args:
-        noun: A canonical noun.
-
     Returns:
         Edge in metres of the cube with an object's volume, and the ratio; `None` for a type with fewer than three
         assets.

@@ -161,7 +161,6 @@ def similarity(noun: str, label: str) -> float:
     """Return how well a label names a canonical noun: 1 the same, 0 no word in common.
 
     Args:
-        noun: A canonical noun.
         label: A detector's word, in any spelling.
     """
     other = canonical(label)

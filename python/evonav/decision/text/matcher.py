@@ -153,7 +153,6 @@ class Matcher:
         """Return which of the objects with the goal's name fits best; of equals, the first.
 
         Args:
-            goal: The parsed instruction.
             named: Objects with the goal's name, at least one.
             around: Everything remembered.
             unseen_m2: Area that the map does not know; only rules that look use it.

@@ -53,11 +53,7 @@ class MiniLm:
     """The encoder with its weights and vocabulary."""
 
     def __init__(self, onnx: bytes) -> None:
-        """Load the model and the vocabulary.
-
-        Args:
-            onnx: The model as an ONNX file.
-        """
+        """Load the model and the vocabulary."""
         from onnxruntime import InferenceSession, SessionOptions
         from tokenizers import BertWordPieceTokenizer
 

@@ -27,7 +27,6 @@ def rank_entries(matcher: Matcher, goal: Goal, entries: Sequence[ObjectCandidate
     Args:
         matcher: Reads the goal.
         goal: The stage's goal.
-        entries: All remembered objects.
         position_m: `(x, z)` of the agent.
     """
     return _ranked(matcher.label_scores(matcher.parsed(goal)), entries, position_m)
@@ -40,7 +39,6 @@ def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Poi
 
     Args:
         goal: The stage's goal.
-        entries: All remembered objects.
         position_m: `(x, z)` of the agent.
 
     Raises:
@@ -90,7 +88,6 @@ def similarity_of_label(instruction: str, label: str) -> float:
     """Return the cosine between an instruction and a label, -1 to 1.
 
     Args:
-        instruction: English text.
         label: ProcTHOR's type or a detector's word.
 
     Raises:
@@ -122,7 +119,6 @@ def choose_candidate(
 
     Args:
         matcher: Reads the goal.
-        stage: The stage whose goal is searched.
         objects: Remembered objects, the best first.
         frontiers: Frontiers that can be explored.
         surroundings: Everything remembered.

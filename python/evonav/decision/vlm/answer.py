@@ -72,11 +72,7 @@ def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
 
 
 def _content(content: Any) -> str:  # noqa: ANN401
-    """Return a message's text, which is a string, or parts of which some are text.
-
-    Raises:
-        VlmError: It is neither.
-    """
+    """Return a message's text, which is a string, or parts of which some are text."""
     if content is None:
         return ""
     if isinstance(content, str):

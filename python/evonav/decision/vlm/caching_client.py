@@ -55,7 +55,6 @@ class CachingClient(ABC):
         """Return the model's answer.
 
         Args:
-            prompt: The question.
             attempt: Number of earlier tries without a valid answer; another attempt is another request.
 
         Raises:
@@ -157,18 +156,9 @@ class CachingClient(ABC):
         """Ask the model itself.
 
         Args:
-            prompt: The question.
             attempt: Number of earlier tries without a valid answer.
-
-        Raises:
-            VlmError: There is no response.
-            DecisionError: There will be none.
         """
 
     @abstractmethod
     def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
-        """Return the answer in a response.
-
-        Raises:
-            VlmError: There is no complete answer.
-        """
+        """Return the answer in a response."""

@@ -139,7 +139,6 @@ class VlmClient(CachingClient):
         """Return the body that is posted to `/chat/completions`.
 
         Args:
-            prompt: The question.
             url_of: Returns the URL of an image; default: the whole image as PNG in a `data:` URL.
             attempt: Number that is added to the seed.
         """
@@ -221,11 +220,7 @@ class VlmClient(CachingClient):
         return read_response(self._without_secrets(text))
 
     def _client(self) -> "openai.OpenAI":
-        """Return the SDK's client, made once.
-
-        Raises:
-            DecisionError: The package is missing, or there is no key.
-        """
+        """Return the SDK's client, made once."""
         with self._lock:
             if self._sdk is None:
                 try:
@@ -247,11 +242,7 @@ class VlmClient(CachingClient):
             return self._sdk
 
     def _key(self) -> str:
-        """Return the key, without the line end of a file that it may have been read from.
-
-        Raises:
-            DecisionError: No header can hold it.
-        """
+        """Return the key, without the line end of a file that it may have been read from."""
         key = (self.config.api_key or os.environ.get(KEY_VARIABLE) or "").strip()
         if not (key.isascii() and key.isprintable()):
             raise DecisionError(f"{KEY_VARIABLE}: holds characters that no key has, such as a line end")

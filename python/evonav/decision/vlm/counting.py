@@ -33,7 +33,6 @@ class Counting:
         """Count the questions to `model`.
 
         Args:
-            model: The model that answers.
             client: Client that estimates and asks nothing.
             ledger: Ledger of requests and tokens, a row a kind of question.
             name: Name of the episode, which precedes the kind.

@@ -62,7 +62,6 @@ class VlmDecision:
         """Create a decision model.
 
         Args:
-            client: Client that asks and caches.
             structured: Answers by JSON Schema: auto, on, off.
             needs_images: True if agents should put images into questions.
             tells_of_change: True if prompts say that things may have been moved, see `with_notice`.

@@ -88,7 +88,6 @@ class RelayedClient:
         """Use an inherited connection.
 
         Args:
-            descriptor: The connection.
             never_asks: True if only cached answers are returned.
         """
         self._descriptor = descriptor

@@ -117,7 +117,6 @@ class ResponseCache(SharedFile):
         Args:
             request: The request, with names in place of its images.
             pictures: The images to store.
-            response: The response.
 
         Returns:
             Its key.

@@ -24,7 +24,6 @@ def without_secrets(text: str, secrets: Iterable[str]) -> str:
     alone or within more, in any case, wrapped or cut at their end.
 
     Args:
-        text: The text.
         secrets: The secrets; those shorter than `MIN_SECRET_CHARACTERS` stay.
     """
     for secret in secrets:

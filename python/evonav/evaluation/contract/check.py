@@ -73,7 +73,6 @@ def check_agent(
             others are made. What cannot be imported by a name runs only in this process: if it ends its process, this
             one ends.
         backend: The parts of the evaluation, such as its decision model.
-        seed: Seed of the agent.
         timeout_s: Time limit of an answer.
 
     Examples:

@@ -33,7 +33,6 @@ def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
     """Yield the checks of an agent that has run one episode.
 
     Args:
-        probe: The agent.
         records: The records of the episode's stages.
     """
     yield _sensors(probe)

@@ -73,10 +73,7 @@ def check_situations(
 
     Args:
         backend: The parts of the evaluation.
-        tasks: Folder of the bundled tasks.
-        name: Name of the agent.
         new_agent: Makes a fresh agent for each script.
-        seed: Seed of the agent.
     """
     with closing(backend.simulator.create()) as simulator:
         for script in _scripts(backend, tasks, simulator):

@@ -93,7 +93,6 @@ def legs(corners_m: Sequence[Point2], travel_m: float) -> list[tuple[Point2, ...
     """Cut a path into pieces of `travel_m`, the last one shorter; each begins where the one before ends.
 
     Args:
-        corners_m: The path.
         travel_m: Length of a piece along the path.
 
     Returns:
@@ -151,9 +150,7 @@ class Planner:
         Args:
             path_m: Path to the nearest free point of the house, which may lie behind a wall. It is returned if it ends
                 in the room, or if no path leads there.
-            target_m: Position of the target.
             house: House of the stage; `None` returns `path_m`, as in runs of earlier versions.
-            room_id: Room of the target.
         """
         if house is None or not path_m or house.room_of(*path_m[-1]) == room_id:
             return path_m

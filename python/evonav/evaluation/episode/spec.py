@@ -232,7 +232,6 @@ def drawn_shift_m(secret: str, agent: str, task_id: str) -> Point2:
     Args:
         secret: The run's own, from its header.
         agent: The name by which the agent was requested.
-        task_id: The task's id.
     """
     digest = hmac.new(secret.encode(), f"shift\0{agent}\0{task_id}".encode(), hashlib.sha256).digest()
     x_m, z_m = ((LEAST_SHIFT_M + byte % NUM_SHIFTS) * (1.0 if byte & 128 else -1.0) for byte in digest[:2])

@@ -63,9 +63,7 @@ class Stage:
         """Prepare a stage.
 
         Args:
-            context: The episode's context.
             state: The episode's state, which the stage updates.
-            record: A blank record of the stage.
             requested: Pose at which the agent should start.
             stopwatch: Adds up the time that the stage takes.
         """

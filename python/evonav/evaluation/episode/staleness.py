@@ -157,7 +157,6 @@ class StalenessTracker:
 
         Args:
             objects: The simulator's bodies, in instance order.
-            target_id: The target of the stage.
             relocations: The objects that the transition before the stage moved.
             so_far: The state of the episode; objects that are seen are added.
             min_visible_px: Number of pixels from which an object counts as in view.
@@ -202,7 +201,6 @@ class StalenessTracker:
 
         Args:
             objects: The simulator's bodies, in instance order.
-            relocations: The objects that it moved.
         """
         self._store_seen()
         self._enter(objects, relocations)

@@ -49,7 +49,6 @@ class HostedAgent(ABC):
         """Take the observation of a decision round. It may be dropped then: an agent may think for long.
 
         Args:
-            observation: The observation.
             wants_entries: Whether `entries` will be asked right after the round, and may be answered with it.
         """
 
@@ -141,9 +140,7 @@ class RemoteAgent(HostedAgent):
 
         Args:
             processes: Processes of agents, which lend it one when it is needed, until `close`.
-            name: Name of the agent.
             decision: Decision model, made in the agent's process.
-            seed: Seed of the model.
             task_id: Name of the task in the log and in errors; default: the name that the agent is given.
         """
         self._processes = processes

@@ -154,8 +154,6 @@ class ForkServer:
             descriptors: Its standard output and error, then those that `forking` numbers.
             agent: Name of its agent: the server imports built-in ones.
             folder: Its working folder; default: this process's.
-            environment: Its environment.
-            path: Its import path.
             is_sandboxed: True if it shuts itself in before it does anything else.
 
         Raises:

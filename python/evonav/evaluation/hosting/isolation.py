@@ -101,7 +101,6 @@ def policy_of(name: str, scratch: Path, hidden: Sequence[str], memory_mb: int | 
     wherever that lies.
 
     Args:
-        name: Name of the agent.
         scratch: The folder in which it may write.
         hidden: Files and folders that it must not read: the run's, the tasks'.
         memory_mb: Largest address space; default: the memory of this machine.

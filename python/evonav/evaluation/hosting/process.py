@@ -66,7 +66,6 @@ class AgentFailedError(EvonavError):
         """Create an error of one of the agent's own kinds (`ErrorKind.is_agents`).
 
         Args:
-            kind: The kind of failure.
             message: A description in one or a few lines.
             traceback: The traceback of the agent's process.
         """
@@ -120,7 +119,6 @@ class AgentProcess:
         """Start the process and import the agent's module in it.
 
         Args:
-            name: Name of the agent.
             hosting: Settings of the process.
             fork_server: Server that forks the process; default: a fresh one is started.
 
@@ -196,10 +194,7 @@ class AgentProcess:
         """Start the process.
 
         Args:
-            fork_server: See above.
             inherited: Its descriptors: of requests, life, memory, and of the model if it has one.
-            stderr: Descriptor of its output.
-            path: Its import path.
         """
         own_environment = None if self._scratch is None else environment(self._scratch)
         if fork_server is not None:
@@ -376,7 +371,6 @@ def check_importable(name: str, hosting: AgentHosting, fork_server: ForkServer |
     """Check that an agent can be imported, in a process of its own, which then ends.
 
     Args:
-        name: Name of the agent.
         hosting: Settings of the process.
         fork_server: See `AgentProcess`.
 

@@ -26,7 +26,6 @@ class AgentProcesses:
         """Remember the settings; processes start when they are needed.
 
         Args:
-            hosting: The settings.
             waiting: Lets other episodes compute while the block waits for a process.
         """
         self.hosting = hosting

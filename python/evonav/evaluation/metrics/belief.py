@@ -51,9 +51,7 @@ def place_score(places: PlacesRecord, target_m: Point2, radius_m: float) -> Plac
     """Score a belief about places.
 
     Args:
-        places: The belief.
         target_m: `(x, z)` of the target.
-        radius_m: The success radius.
     """
     cells = list(zip(places.centres_m, places.probabilities, strict=True))
     p_near = math.fsum(p for centre_m, p in cells if math.dist(centre_m, target_m) < radius_m)
@@ -125,7 +123,6 @@ def belief_summary(beliefs: Sequence[tuple[Point3, BeliefRecord]], radius_m: flo
 
     Args:
         beliefs: The target's position and the belief of each stage as which began the agent told one.
-        radius_m: The success radius.
     """
     presence = calibration(pair for _, belief in beliefs for pair in belief.presence)
     scores = [place_score(b.places, (at[0], at[2]), radius_m) for at, b in beliefs if b.places is not None]

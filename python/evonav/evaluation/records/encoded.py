@@ -64,10 +64,7 @@ def encode_stage(
 
     Args:
         record: The whole record, with its trace. It may have been made by `model_copy`, which does not validate.
-        wall_s: Wall time of the stage.
-        cpu_s: CPU time of the stage.
         costs: All costs of the stage, if they were measured.
-        traceback: The traceback of an errored stage.
         floor_plan: The floor plan of the stage's house, if it is to be stored.
 
     Raises:
@@ -96,7 +93,6 @@ def invalid_record(text: str, error: ValidationError) -> str:
     """Name a record that cannot be read, and its first wrong field with its value, in one sentence.
 
     Args:
-        text: The record as it is stored.
         error: The error of the model that read it.
     """
     problem = error.errors(include_url=False, include_context=False)[0]

@@ -19,8 +19,6 @@ def floor_plan_of(
 
     Args:
         house: A house as it is in the stage.
-        task_id: The task, for the record.
-        stage: The stage, for the record.
         reference_image: The image that the agent was shown, as a `data:` URI.
         at_end: The house after the change during the stage, if there is one.
 

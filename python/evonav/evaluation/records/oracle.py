@@ -10,7 +10,6 @@ def target_record(task: Task, stage: int) -> TargetRecord:
     """Return the target of a stage.
 
     Args:
-        task: The task.
         stage: 1-based.
     """
     target = task.oracle(stage).target

@@ -14,7 +14,6 @@ def record_differences(stored: str, again: str, verb: str) -> tuple[str, ...]:
     """Return the first few differences as text; none if the two records are equal to the byte.
 
     Args:
-        stored: A record as JSON.
         again: Another record of the same stage as JSON.
         verb: The origin of `again`, such as `replayed`.
     """

@@ -171,7 +171,6 @@ def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server
     """Check that workers can make an agent of this name.
 
     Args:
-        name: Name of an agent.
         hosting: Settings of agents' processes: one that is not built in is imported there. Default: in this process.
         fork_server: Server that forks the process; default: a fresh one is started.
 

@@ -58,12 +58,8 @@ def estimate_run(
     """Run a few tasks, spread over all, and extrapolate by the number of stages.
 
     Args:
-        agents: Names.
-        tasks: The run's tasks.
         config: The run's configuration; its decision model is replaced.
         options: Options of `evonav.decision.backends.counting`, without `ledger`.
-        num_tasks: Number of tasks to run.
-        num_workers: Processes.
         on_progress: Called after every stage.
 
     Raises:

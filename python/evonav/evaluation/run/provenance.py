@@ -25,7 +25,6 @@ def note_session(store: RunStore, num_workers: int, isolation: str) -> None:
     """Note the command that is about to evaluate, its machine and versions.
 
     Args:
-        store: The run's store.
         num_workers: Number of processes that evaluate.
         isolation: The isolation of agents, see `isolation_facts`.
     """

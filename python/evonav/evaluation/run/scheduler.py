@@ -172,7 +172,6 @@ class Schedule:
         """Let all jobs wait.
 
         Args:
-            runs: The runs.
             num_retries: Number of retries of a stage whose worker was lost.
         """
         self._runs = runs

@@ -14,7 +14,6 @@ class SettingError(InvalidArgumentError):
         """Create the error.
 
         Args:
-            settings: The model of the settings.
             key: A field of the settings.
             problem: The problem, as the end of a sentence that begins with the field's name.
         """

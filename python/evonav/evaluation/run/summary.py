@@ -19,7 +19,6 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
     """Compute every agent's metrics from the records, and write `summary.json`.
 
     Args:
-        run_dir: A run.
         only: Agents to return, in this order; default all.
 
     Raises:
@@ -38,8 +37,6 @@ def save_summary(run_dir: Path, summaries: Sequence[AgentSummary], pairs: Sequen
     """Write `summary.json`.
 
     Args:
-        run_dir: A run.
-        summaries: The metrics of its agents.
         pairs: Those of every two agents.
 
     Raises:

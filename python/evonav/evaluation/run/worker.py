@@ -143,7 +143,6 @@ class WorkerContext:
         """Store the configuration; simulators start with the first episodes.
 
         Args:
-            config: The configuration.
             alive: Shows that an episode continues.
             waiting: Lets other episodes compute while the block waits for an agent.
         """

@@ -82,7 +82,6 @@ def write_texts(
     """Rewrite the instructions of a folder's tasks, and all checksums that depend on them.
 
     Args:
-        directory: Folder with one folder a task.
         client: Client of the model; its limit on concurrent questions also limits the concurrent tasks.
         images: Show the reference images to the model. Without them, the appearance instructions stay the describer's
             and the model writes the unified ones from the texts alone.
@@ -208,11 +207,7 @@ def _write_task(root: Path, client: VlmClient, images: bool, stop: threading.Eve
 
 
 def _swap(task: Task, root: Path) -> None:
-    """Replace a task's folder atomically.
-
-    Raises:
-        TaskError: The files cannot be written.
-    """
+    """Replace a task's folder atomically."""
     old, new = root.with_name(f".{root.name}.old"), root.with_name(f".{root.name}.new")
     try:
         shutil.rmtree(new, ignore_errors=True)
@@ -223,11 +218,7 @@ def _swap(task: Task, root: Path) -> None:
 
 
 def _roots(directory: Path, limit: int | None) -> list[Path]:
-    """List the tasks' folders in order, after restoring those that an interrupted pass had moved aside.
-
-    Raises:
-        TaskError: The folder holds no task, or a task cannot be restored.
-    """
+    """List the tasks' folders in order, after restoring those that an interrupted pass had moved aside."""
     try:
         for old in directory.glob(".*.old"):
             root = old.with_name(old.name.removeprefix(".").removesuffix(".old"))

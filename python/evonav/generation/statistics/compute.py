@@ -50,7 +50,6 @@ def statistics_of(
     Intervals resample houses, so that several tasks of one house (with other seeds) do not count as independent.
 
     Args:
-        summaries: Summary of each task.
         sources: Names of the sources, recorded in the result.
         mix: Data set to whose rooms the tasks are also reweighted (`evonav.tasks.statistics`).
         house_rejections: Number of houses without a task, by reason.
@@ -99,7 +98,6 @@ def statistics_of_folders(
     """Compute the statistics of the tasks in folders.
 
     Args:
-        folders: Folders with one folder a task.
         mix: Data set to whose rooms the tasks are also reweighted, see `statistics_of`.
         num_workers: Number of processes that read tasks.
         on_task: Called with the number of read tasks and the number of all tasks.

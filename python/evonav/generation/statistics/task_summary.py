@@ -86,10 +86,8 @@ def summary_of(
     """Summarise a task.
 
     Args:
-        header: The task's header.
         oracle: Oracle parts of the task's stages, in order.
         public: Public parts of the task's stages, in order.
-        house_json: The first house.
 
     Raises:
         HouseError: The house is malformed.
@@ -241,10 +239,6 @@ def read_summary(root: Path) -> TaskSummary:
 
 def read_summaries(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[TaskSummary]:
     """Summarise many tasks in order, with worker processes if `num_workers` is at least 2.
-
-    Args:
-        roots: Folders of tasks.
-        num_workers: Number of processes.
 
     Raises:
         TaskError: A file is malformed; names file, field and value.

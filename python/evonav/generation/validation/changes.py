@@ -47,7 +47,6 @@ def check_changes(before: dict[str, Any], after: dict[str, Any], evolution: Evol
     Args:
         before: House before the change, JSON.
         after: House after it, JSON.
-        evolution: The record.
         rooms: House of the stage, for its rooms.
     """
     old, new = entries_of(before), entries_of(after)

@@ -52,7 +52,6 @@ def validate_folder(
     """Validate a folder's tasks, and its `dataset.json` if it exists.
 
     Args:
-        folder: Folder with one folder a task.
         limit: Number of tasks, from the first by id; default all.
         num_workers: Number of processes; 0 for this process.
         allow_unknown_assets: Accept unknown assets even if `dataset.json` does not.

@@ -41,7 +41,6 @@ def check_physics(
 
     Args:
         source: House of stage 1.
-        house: House of the stage.
         source_counts: Counts of the flaws that the source house has, too, by kind; updated.
         allow_unknown_assets: The option with which the task was generated.
     """

@@ -51,7 +51,6 @@ class ForgettingRule(ABC):
 
         Args:
             map_: The map, which has integrated the view; what is forgotten is removed from it.
-            view: The view.
             update: The result of `ObjectMap.update` for it.
             time_s: Time since the first view of all.
 

@@ -42,7 +42,6 @@ class Queries:
         Args:
             objects: All that the question names, where it stands now.
             places: The answer, the best first.
-            state: State of the question.
         """
         counts = self.of_state[state]
         counts.n += 1

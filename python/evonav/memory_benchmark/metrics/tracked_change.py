@@ -96,8 +96,6 @@ def tracked(index: int, change: Change, began: Clocks, num_before: int, *, is_re
     """Begin to follow a change.
 
     Args:
-        index: Index in the stream.
-        change: The change.
         began: Clocks at its first frame.
         num_before: Changes of the same object before it.
         is_remembered: See `TrackedChange.is_remembered`.

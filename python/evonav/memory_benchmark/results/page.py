@@ -18,8 +18,6 @@ def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: i
     """Write the files of a result into a folder.
 
     Args:
-        result: The records.
-        folder: Folder to write to.
         num_missing: Number of streams that were asked for and have no record.
 
     Returns:

@@ -67,7 +67,6 @@ def scores(result: BenchmarkResult, kind: str | None = None) -> dict[str, dict[s
     """Return the figures of all memories, and the ratio of each to the baseline.
 
     Args:
-        result: The records.
         kind: Kind of streams; default: all.
     """
     baseline = next((one for one in result.memories if one.memory == BASELINE), None)

@@ -43,8 +43,6 @@ def changes_between(
     Opening a fridge changes its box, too, and is no change: what counts is the position in the house's file.
 
     Args:
-        before: Objects before.
-        after: Objects after.
         positions_m: Position of each object by id in the file of the house before, and after.
         frame: First frame at which the changes are true.
     """
@@ -68,9 +66,7 @@ def is_taken(place: SceneObject, before: Bodies, now: Bodies) -> bool:
     """Return whether something stands now in the box that an object has left, which did not stand there before.
 
     Args:
-        place: The object at its old place.
         before: All objects while it was there.
-        now: All objects now.
     """
     others = {body for body in before if body.id != place.id}
     return any(body not in others and _overlap(place, body) for body in now)
@@ -124,8 +120,6 @@ def num_looks_through(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intr
     Args:
         depth_m: `(H, W)` planar depth; `inf` is behind everything.
         pose: Pose of the camera itself.
-        intrinsics: Intrinsics of the image.
-        place: The box.
     """
     low_m = np.array(place.centre_m) - np.array(place.size_m) / 2.0
     high_m = low_m + np.array(place.size_m)
@@ -172,7 +166,6 @@ def detected_ids(detections: Detections, frame: Frame, bodies: Bodies) -> tuple[
     """Return the object, door or window of each detection: the one of largest overlap, if it is at least `MIN_IOU`.
 
     Args:
-        detections: The detections.
         frame: The frame in which they were made, with instances.
         bodies: The simulator's bodies, in instance order.
     """

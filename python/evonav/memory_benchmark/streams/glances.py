@@ -49,7 +49,6 @@ def glances(spec: StreamSpec, house: House) -> Plan:
     are partly hidden are preferred; others are taken for places that would have no glance of `EVIDENT_PX` else.
 
     Args:
-        spec: The stream.
         house: The house before the changes.
 
     Raises:

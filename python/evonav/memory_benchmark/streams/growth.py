@@ -39,10 +39,6 @@ def growth(spec: StreamSpec, houses: list[House]) -> Plan:
     """Plan one long visit that goes from house to house, from the first again after the last.
 
     An object is seen at the first frame in which ground-truth perception reports it in the range of evidence.
-
-    Args:
-        spec: The stream.
-        houses: The houses, in order.
     """
     frames, scenes, seen = Frames(), list[Scene](), set[str]()
     goals = sorted({goal for goal in CHECKPOINTS if goal < spec.max_objects} | {spec.max_objects})

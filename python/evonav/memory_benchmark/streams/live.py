@@ -26,7 +26,6 @@ def live(spec: StreamSpec, house: House) -> Plan:
     in view.
 
     Args:
-        spec: The stream.
         house: The house before the change.
 
     Raises:

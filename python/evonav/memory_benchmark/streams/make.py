@@ -18,7 +18,6 @@ def make_stream(spec: StreamSpec, *, rgb: bool = False) -> RenderedStream:
     """Return a stream; its plan comes from the cache folder, or is made and stored there.
 
     Args:
-        spec: All that decides the stream.
         rgb: Whether frames have colours, which cost more than the rest.
 
     Raises:

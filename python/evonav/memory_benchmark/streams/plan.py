@@ -103,7 +103,6 @@ def cached_plan(decides: Mapping[str, Any], make: Callable[[], Plan]) -> Plan:
 
     Args:
         decides: Everything that decides the plan, as JSON.
-        make: Makes the plan.
     """
     text = json.dumps({"plan": PLAN_VERSION, "evonav": __version__, **decides}, sort_keys=True)
     path = plan_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.json.xz"

@@ -54,8 +54,6 @@ class RenderedStream:
         """Make a stream; nothing is rendered yet.
 
         Args:
-            spec: All that decides the stream.
-            plan: Its plan.
             rgb: Whether frames have colours, which cost more than the rest.
         """
         self.spec = spec

@@ -115,9 +115,6 @@ def reference_specs(
     Args:
         houses: `bundled`, or a file or folder of houses as for `evonav.load_houses`.
         quick: Take one house and one seed.
-        kinds: Kinds of streams.
-        width_px: Width of the images.
-        height_px: Their height.
 
     Raises:
         HouseError: The houses cannot be read, or none has at least three rooms.

@@ -66,8 +66,6 @@ def walk_in(spec: StreamSpec, house_json: str, at: Pose | None, name: str) -> It
     """Yield the poses of a walk without an end.
 
     Args:
-        spec: The stream.
-        house_json: The house.
         at: Pose to begin at, or near it; `None` for the house's own start.
         name: Name of the walk: every walk has draws of its own.
     """

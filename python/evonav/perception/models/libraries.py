@@ -48,7 +48,6 @@ def versions_of(modules: tuple[str, ...], extra: str) -> dict[str, str]:
 
     Args:
         modules: Modules of `EXTRA_OF`.
-        extra: Extra that installs them all.
 
     Raises:
         PerceptionError: One is not installed.
@@ -97,7 +96,6 @@ def loading(path: str, kind: str, files: str = "the file") -> Iterator[None]:
     """Load weights in the block; libraries have errors of their own kinds, of pickle, of zip files, of shapes.
 
     Args:
-        path: Path or name of the weights.
         kind: Name of the model, for the error.
         files: A noun for what to get again if they cannot be loaded.
 

@@ -20,8 +20,6 @@ class OpenClip(CropEmbedder):
         Args:
             model: Model of `open_clip`.
             preprocess: Function from an image of PIL to the model's input.
-            tokenizer: Tokenizer of the model.
-            device: Device to compute on.
         """
         self._model = model
         self._preprocess = preprocess
@@ -59,9 +57,7 @@ def load_open_clip(architecture: str, path: str, device: str) -> OpenClip:
     """Return the model of a file, loaded once a process.
 
     Args:
-        architecture: Architecture, as open_clip names it.
         path: File of its weights; empty: random ones.
-        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.

@@ -23,7 +23,6 @@ class MaskRcnn:
         Args:
             model: Network of torchvision.
             categories: Names of its labels, by number.
-            device: Device to compute on.
         """
         self._model = model
         self._categories = tuple(categories)
@@ -66,7 +65,6 @@ def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
 
     Args:
         path: File of its weights; empty: random ones.
-        device: Device to compute on.
         min_score: Limit below which the network itself drops detections.
 
     Raises:

@@ -28,7 +28,6 @@ class YoloWorld:
         Args:
             model: `ultralytics.YOLOWorld`.
             encoder: OpenAI's ViT-B/32.
-            device: Device to compute on.
         """
         self._model = model
         self._encoder = encoder
@@ -79,7 +78,6 @@ class UltralyticsSam:
 
         Args:
             model: `ultralytics.SAM`.
-            device: Device to compute on.
         """
         self._model = model
         self._device = device
@@ -113,7 +111,6 @@ def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
     Args:
         path: `.pt`, or a `.yaml` of the library for random weights.
         text_path: Weights of OpenAI's ViT-B/32; empty: random ones.
-        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
@@ -133,7 +130,6 @@ def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
 
     Args:
         path: Its name says which SAM it is: `sam_l.pt`, `sam_b.pt`, `mobile_sam.pt`.
-        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.

@@ -30,7 +30,6 @@ class Confusion:
         """Draw the label that a category is mistaken for.
 
         Args:
-            category: The true one.
             is_similar: Whether from its row of the matrix, if that has entries; otherwise by frequency.
             share: Uniform in 0..1: decides which.
         """
@@ -53,9 +52,6 @@ def _pick(labels: Sequence[str], weights: NDArray[np.float64], share: float) -> 
 @cache
 def read_confusion(path: str = "") -> Confusion:
     """Read a file of frequencies, groups and pairs (`confusion.toml` shows the form).
-
-    Args:
-        path: Empty: that file.
 
     Raises:
         InvalidArgumentError: It cannot be read, or a part of it is malformed.

@@ -31,7 +31,6 @@ class PoseDrift:
         """Add the drift of the way to the agent's new pose.
 
         Args:
-            pose: The true one.
             normals: `(3,)` standard normals.
         """
         last, self._last = self._last, pose

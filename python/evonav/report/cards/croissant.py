@@ -94,7 +94,6 @@ def croissant(tasks: TaskSet, sha256s: dict[str, str], about: dict[str, str]) ->
     """Describe the folder of a set of tasks.
 
     Args:
-        tasks: The set.
         sha256s: Checksum of each file at the top of the folder, by name.
         about: Name, description, licence, date and other properties of the set, by their names in schema.org.
     """

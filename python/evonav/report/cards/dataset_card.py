@@ -51,7 +51,6 @@ def write_dataset_card(folder: Path, out: Path, statistics: TaskStatistics, opti
     Args:
         folder: A folder of tasks with its `dataset.json`, or that file.
         out: Folder to write to; the tasks' own folder gets the cards beside the tasks.
-        statistics: Statistics of the same tasks.
         options: Repository, licence, title and date.
 
     Returns:

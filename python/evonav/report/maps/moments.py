@@ -22,7 +22,6 @@ def moments(record: StageRecord, maps: Mapping[int, FloorPlan]) -> list[Moment]:
     """Return the moments of a stage: one, or two if its house changed before the stage ended.
 
     Args:
-        record: The record of the stage.
         maps: Floor plans of the task's stages.
     """
     k, during, here = record.stage, record.during, maps.get(record.stage)

@@ -27,7 +27,6 @@ def write_strip(
     """Write a task as a strip.
 
     Args:
-        run_dir: A run.
         task_id: One of its tasks; `None` for the `best_highlight` one.
         agents: One of its agents, or several: a row each.
         path: The `.svg`, `.png` or `.pdf` file to write.

@@ -19,7 +19,6 @@ def best_highlight(run: RecordedRun, agents: Sequence[str]) -> tuple[str, list[i
     then for moved targets, and for change and success on the way there. The first of equals.
 
     Args:
-        run: A run.
         agents: Agents whose episodes to show; the last one should succeed.
 
     Raises:

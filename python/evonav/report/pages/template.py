@@ -40,9 +40,6 @@ def page_text(
     """Render a page with its style, its script and the policy that allows these alone.
 
     Args:
-        template: Name of the template.
-        css: Style of the page.
-        js: Script of the page.
         has_drawings: Whether the page holds drawings, which carry styles of their own.
         values: Other values of the template.
     """

@@ -42,7 +42,6 @@ def plot_elements(plots: Sequence[Plot], *, are_even: bool = False) -> list[Mark
     """Return plots as `svg` elements for a page that has `plot_css()`.
 
     Args:
-        plots: The plots.
         are_even: Whether all plots have the width of the widest, and all of a kind the height of the highest, so that
             they fill the rows of a page.
 
@@ -80,7 +79,6 @@ def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
     """Write plots as one file; the same plots give the same bytes.
 
     Args:
-        plots: The plots, one or more.
         path: `.svg`, `.png` or `.pdf` file; folders are made.
         columns: Number of plots side by side.
 

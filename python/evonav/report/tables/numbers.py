@@ -11,10 +11,8 @@ def number(value: float | None, *, scale: float = 1, digits: int = 1, is_signed:
 
     Args:
         value: `None` where there is nothing to show.
-        scale: Factor of the value.
         digits: Digits after the point.
         is_signed: Show the sign of a positive number, too.
-        unit: Text behind the value.
     """
     return NONE if value is None else f"{scale * value:{_form(digits, is_signed)}}{unit}"
 
@@ -33,10 +31,8 @@ def with_interval(
     Args:
         value: `None` where there is nothing to show.
         interval: `None` where resampling gives none, for a single house or houses that all agree: `61.1 [–]`.
-        scale: Factor of value and interval.
         digits: Digits after the point.
         is_signed: Show the sign of a positive number, too.
-        unit: Text behind the value.
     """
     if value is None:
         return NONE

@@ -13,8 +13,6 @@ def house_page(
     """Return a page in one file.
 
     Args:
-        name: Name of the house.
-        summary: Its numbers in one line.
         task: Whether it gives a task, and why not.
         rooms: Id, type, floor area and number of objects of each room.
         findings: Its flaws, wrong or odd.

@@ -63,7 +63,6 @@ def write_gallery(
     Args:
         tasks: Any number, taken one at a time.
         out_dir: Folder of the pages; the path of the index is returned.
-        name: Heading.
         on_task: Called with each task's id when its page is written.
 
     Raises:

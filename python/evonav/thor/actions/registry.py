@@ -117,7 +117,6 @@ def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Ca
     The function is `function(engine, *, parameters as on the wire) -> actionReturn`, or takes one model of `Arguments`.
 
     Args:
-        names: Names of the action.
         unused: Types of AI2-THOR's parameters that have no effect here, by name.
     """
 
@@ -201,7 +200,6 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     """Execute an action.
 
     Args:
-        engine: The engine that executes it.
         message: The action as the client sent it.
 
     Returns:

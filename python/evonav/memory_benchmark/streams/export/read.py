@@ -35,7 +35,6 @@ def read_exported(folder: Path, *, oracle: Path | None = None) -> "ExportedStrea
     """Return a stream that `export_stream` wrote; its images are read while it is read.
 
     Args:
-        folder: The folder.
         oracle: File of the truth. Default: `oracle.jsonl.xz` in the folder, if it is there.
 
     Raises:
@@ -154,8 +153,6 @@ def read_detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> De
     """Return the detections of a frame; none if it has no masks.
 
     Args:
-        folder: Folder of the stream.
-        line: The frame's line.
         shape: `(H, W)` of the image.
 
     Raises:

@@ -71,7 +71,6 @@ def read_recording(folder: Path, *, up: UpAxis = "z") -> "Recording":
     Cameras are made level, with the principal point in the middle: pixels are taken over from the nearest ones.
 
     Args:
-        folder: The folder.
         up: The axis of the recording's right-handed world that points up. The floor is at height 0.
 
     Raises:

@@ -39,8 +39,6 @@ def export_stream(
     Colours are written if the stream has them (`make_stream(spec, rgb=True)`).
 
     Args:
-        stream: The stream.
-        folder: A new or empty folder.
         layout: `tum` or `replica`.
         oracle: File of the truth. Default: `oracle.jsonl.xz` in the folder.
 
