@@ -14,15 +14,11 @@ from evonav.speed_benchmark.timing import Sampling, one_core
 
 PRODUCT = {"agents", "generation", "gym", "mapping", "navigation", "rendering"}
 """Sections of `evonav bench`, modules of `evonav.speed_benchmark`; the other modules are beside this one."""
-ON_ALL_CORES = {"before_after", "floors", "gym"}
-ON_REQUEST = {"before_after", "floors"}
-"""Sections that only run when they are named: they need more than this checkout, or minutes and nothing beside them."""
+ON_ALL_CORES = {"gym"}
 SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
-    "before_after": "Before and after",
     "evaluation": "Evaluation",
-    "floors": "Floors",
     "generation": "Task generation",
     "gym": "Gymnasium",
     "mapping": "Mapping",
@@ -48,7 +44,7 @@ def main() -> None:
         _run(names[0], options)
         return
     # Each in a process of its own, or a section's memory would be that of the peers of those before it.
-    for name in names or sorted(SECTIONS.keys() - ON_REQUEST):
+    for name in names or sorted(SECTIONS):
         subprocess.run([sys.executable, "-m", "benches", name, *options], check=True)
 
 

@@ -32,12 +32,9 @@ from evonav.world.pose import Pose
 from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Intrinsics
 
-NOTES = """A round: the observation to an agent that does nothing, and its answer. The peer sends the observation by
-`multiprocessing.Pipe`, pickled. CPU is the sum of both processes; wall time is the least of all rounds, since both want
-a core at once. An evaluation: `fu` on bundled tasks, CPU of the worker and the agent by the records' timings, medians
-of pairs of runs in turn; stages a second are wall time, with the start of all processes, at 1 and 2 workers. A
-sandbox: the same with `--isolation sandbox` and one worker, against `--isolation process`; a start is of one process,
-with the import of the agent.
+NOTES = """\
+A round: the observation to an agent that does nothing, and its answer; the peer sends it pickled, by
+`multiprocessing.Pipe`. CPU is the sum of both processes. Below: `fu`; stages/s at 1 and 2 workers.
 """
 SIDE_PX = 300
 NUM_ROUNDS = 200

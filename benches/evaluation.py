@@ -15,14 +15,9 @@ from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
 
-NOTES = """`evonav evaluate` as a user runs it: embedded simulator, ground-truth perception, text matcher, an agent in
-a process of its own beside each worker, every stage committed with fsync. Stages a second: by the wall clock, starting
-and ending included. *Stages a CPU second*: of the driver, and of workers and agents while they are at stages; one
-worker's. *Efficiency*: of two workers, stages a second over twice those of one. By the wall clock it says something
-where the machine has nothing else to do; where it is shared, as the load named below says, by CPU time: what a stage
-costs with one worker over what it costs with two. Peak memory: resident, of one worker and of its agent's process.
-Records are checked to be the same, byte for byte, for one worker and two.
-Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset] [--workers 1,2]`.
+NOTES = """\
+`evonav evaluate` as a user runs it; stages/s are by the wall clock. *Efficiency*: of two workers, compared with twice
+the rate of one. Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu] [--workers 1,2]`.
 """
 EVERY_S = 0.5
 """Looks at memory."""

@@ -22,17 +22,9 @@ from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
 
-NOTES = """Visibility: one view of 90 degrees and 3 m on 0.1 m cells; the peer casts 300 rays in steps of half a cell
-with NumPy and misses what lies between them. Frontiers: a 400x400 map; the peer finds the agent's island, the cells
-with 8 unexplored neighbours and their components with OpenCV (checked to be the same regions), but no
-directions and view positions. Distances to frontiers: from one place over the free cells of that map to its
-frontiers, by fast marching; the peer goes from cell to cell in 8 directions (checked to be within 10%), on a
-graph that it makes of the map in each call, since the map changes in each round. Object memory: one 300x300
-frame with 20 masks against 100 entries of about 7,000 points at 3D-Mem's voxel of 0.01 m: unproject, voxel
-filter, DBSCAN, overlap, association and merge; the peer does so as ConceptGraphs and 3D-Mem do, with Open3D
-clouds and a flat faiss index an entry, and its associations are checked to be the same. Depth evidence: 256
-points of each of the 100 entries in that frame's depth image; the peer projects the points of all entries at
-once, and its counts are checked to be the same.
+NOTES = """\
+Made-up inputs; the peers' results are checked to be evonav's (distances: within 10%). Object memory: one 300x300
+frame with 20 masks, 100 entries of about 7,000 points, voxels of 0.01 m.
 """
 
 MADE = "made"

@@ -21,10 +21,9 @@ from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame
 
-NOTES = """Rounds of three views of bundled houses, 300x300. *Margins*: every mask of a view grows or shrinks by up to 2
-pixels; SciPy does it mask by mask with a disk, and leaves who gets a contested pixel open. *Depth*: axial noise, steps,
-dropouts, no values at edges; NumPy draws from a generator of its own, with SciPy's filters for the edges. Whole
-perceptions stand beside rendering the same views with what they need: below 1, perceiving takes longer than rendering.
+NOTES = """\
+Rounds of three views of bundled houses, 300x300. *Margins*: every mask grows or shrinks by up to 2 pixels. *Depth*:
+noise, steps, dropouts. The peer of a whole perception is the rendering of its views.
 """
 NUM_HOUSES, ROUNDS_PER_HOUSE = 8, 3
 NOISE = {"sigma_m": 0.0012, "sigma_per_m": 0.0014, "step_per_m": 0.0028, "dropout": 0.02, "edge_dropout": 0.5}

@@ -8,10 +8,9 @@ from evonav.speed_benchmark.records import Row
 
 README = Path(__file__).with_name("README.md")
 _INTRODUCTION = """# Benchmarks
-Written by `python -m benches` (`make bench`); `python -m benches NAME` runs and rewrites one section. Every figure is
-CPU time of this process on one core, evonav and its peer in turn on the same input in the same run. *Ratio* is the
-median of the pairwise ratios peer / evonav: above 1 evonav is faster. Machines differ and drift; the ratios say more
-than the milliseconds.
+Written by `python -m benches` (`make bench`); `python -m benches NAME` runs and rewrites one section. Figures are CPU
+time on one core; evonav and its peer take turns on the same input. *Ratio*: median of peer / evonav by pairs; above 1
+evonav is faster. `evonav bench NAME --against FILE` compares with an earlier run. Machine: below each table.
 """
 
 
@@ -23,7 +22,7 @@ def write_section(title: str, notes: str, rows: Sequence[Row] | str) -> str:
         columns = ["operation", "evonav", "peer", "its time", "ratio", *facts]
         lines += [f"| {' | '.join(columns)} |", f"|{' --- |' * len(columns)}"]
         lines += [_line(row, facts) for row in rows]
-    body = "\n".join([f"## {title}", notes.strip(), "", *lines, "", f"Measured on {machine_name()}.", ""])
+    body = "\n".join([f"## {title}", notes.strip(), "", *lines, "", f"{machine_name()}.", ""])
     sections = _sections(README.read_text(encoding="utf-8")) if README.exists() else {}
     sections[title] = body
     README.write_text("\n".join([_INTRODUCTION, *sections.values()]), encoding="utf-8")

@@ -22,11 +22,9 @@ from evonav.speed_benchmark.timing import rows_of
 from evonav.thor.engine import Engine
 from evonav.thor.events.emitter import Emitter
 
-NOTES = """Steps of the unmodified `ai2thor` 5.0.0 `Controller`, 300x300, in bundled houses: `RotateRight` by 30
-degrees and, every third step, `MoveAhead`. The time is CPU time of both processes, client and engine, pinned to one
-core. The peer is the floor: an engine that answers every action with the same bytes, so that what is left is the client
-and the pipes. *Objects* are those of the metadata, which the client decodes in every step. Starting is wall time until
-`Controller(scene=house)` returns; the floor's starts a Python that imports nothing.
+NOTES = """\
+Steps of the unmodified `ai2thor` 5.0.0 `Controller`, 300x300, bundled houses; CPU time of client and engine. The
+peer answers every action with the same bytes: its time is that of the client and the pipes.
 """
 _IMAGES = {
     "RGB": {},

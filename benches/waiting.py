@@ -16,13 +16,9 @@ from typing import Any
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS, MockReply, MockServer, serving
 
-NOTES = """`evonav evaluate --decision vlm` on the bundled tasks with images, agents in their usual isolation, against a
-model on this machine that answers after 1 s; 5% of the questions, chosen by what they ask, meet an error of the
-server, a broken or truncated response or a refusal. Everything is measured for half a minute, once all episodes
-have asked. CPU is that of the driver, workers and agents; the model's own comes on top. Memory is the greatest sum of
-all processes' proportional set sizes: shared pages count once. The aims, 50 questions a second on two cores and 100
-episodes within 4 GB, are reached. A question costs the CPU time of its round, of which drawing views with colours,
-object maps and the way to the model are the most.
+NOTES = """\
+`evonav evaluate --decision vlm` on the bundled tasks; the model answers after 1 s, 5% of the questions meet an error
+of the server. CPU and memory are those of driver, workers and agents.
 """
 LATENCY_S = 1.0
 WINDOW_S = 30.0

@@ -41,14 +41,10 @@ TASK = "bundled-0101-298696-s0"
 NUM_ENTRIES = 100
 MAX_ROUND_MS = 50.0
 MAX_GROWTH_MB = 500.0
-NOTES = f"""One decision round of each agent in `{TASK}` (8 rooms, 155 objects), on ground-truth views of 300x300:
-mapping, memory, candidates, questions, and the text matcher's answers; rendering and all else outside of the agent is
-not counted. When stage 1 begins the agent is led through the whole house; then it plays all stages by its own choices,
-and rounds count while it remembers at least {NUM_ENTRIES} objects (`stage-reset`: in stage 1). `unigoal` remembers
-things of its own categories alone, and all its steps count. Limit: {MAX_ROUND_MS:g} ms.
-Memory: growth of a fresh process's peak RSS over all five stages with every budget spent to its end, 50 rounds a stage
-(`unigoal`: 500 actions), colours kept and candidates with images as for a VLM; the simulator's growth is in it. Limit:
-{MAX_GROWTH_MB:g} MB.
+NOTES = f"""\
+Decision rounds in `{TASK}` (8 rooms, 155 objects), 300x300, without rendering, while the agent remembers at least
+{NUM_ENTRIES} objects (`unigoal`: all steps). Limit: {MAX_ROUND_MS:g} ms. Memory: growth of a fresh process's peak over
+five stages with every budget spent. Limit: {MAX_GROWTH_MB:g} MB.
 """
 
 

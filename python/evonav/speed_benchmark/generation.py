@@ -19,13 +19,9 @@ from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import Sampling, rows_of
 
 NAME, TITLE = "generation", "Task generation"
-NOTES = """One process, the paper's parameters, everything written: houses, records and images of all stages. Times are
-CPU time, kernel included. *Core* is Algorithm 1 in Rust with the reference images drawn, *files* packing and writing,
-*rest* is parsing the house, instructions, records and checksums. Memory is the process's greatest resident set after
-the first 100 tasks and after all; where a file has fewer houses than tasks, it is gone through again with other seeds.
-There is no peer to run beside it: EvoNav-Bench's own generator is not published. Nearest is the object placement of the
-published `procthor` package, which asks Unity about every collision.
-A task is some 17 small files, and the file system's own time for them counts: `TMPDIR=/dev/shm` leaves it out.
+NOTES = """\
+One process, the paper's parameters, all files written. *Core*: Algorithm 1 with the reference images; *files*:
+packing and writing; *rest*: reading the house, instructions, checksums; *MB*: peak memory.
 """
 NUM_TASKS = 1000
 NUM_WARM_UP = 10

@@ -20,11 +20,9 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid
 
 NAME, TITLE = "mapping", "Mapping"
-NOTES = """Bundled houses, 36 views in each: at three reachable places, a turn in steps of 30 degrees; 300x300, range
-3 m. Every map begins empty in each house. Maps differ in what they are: evonav's agents know cells on the ground,
-cast on the oracle occupancy as in the paper; OctoMap's octree and Open3D's TSDF (a `VoxelBlockGrid` of blocks of 8
-voxels) are volumes made of the depth image, with voxels as wide as evonav's cells. So the ratio says what one sort of
-map costs beside the other, not which code is faster. Points, images and matrices are prepared beforehand and not timed.
+NOTES = """\
+Bundled houses, 36 views of 300x300 in each, range 3 m. evonav's agents keep cells on the ground; OctoMap and Open3D
+keep volumes with voxels as wide.
 """
 NUM_HOUSES = 4
 PLACES_PER_HOUSE, VIEWS_PER_PLACE = 3, 12

@@ -15,11 +15,9 @@ from evonav.speed_benchmark.timing import Sampling, compare
 from evonav.world.embedded import EmbeddedSimulator
 
 NAME, TITLE = "navigation", "Navigation"
-NOTES = """Bundled houses, 20 pairs of reachable positions in each. The peers search the 8-connected grid of all
-positions that are reachable in steps of 0.05 m, made (and for SciPy, turned into a graph) beforehand; evonav's paths
-are any-angle and exact. *First path*: the house was just loaded, nothing is cached; *path*: every pair was asked for
-once before. *Longer* is the median length of the peer's paths over evonav's, none of which is longer than the peer's.
-(pyastar2d counts a diagonal as one step.)
+NOTES = """\
+Bundled houses, 20 pairs of positions in each. The peers search a grid of 0.05 m that was made beforehand; evonav's
+paths are any-angle and exact. *First path*: the house was just loaded. *Longer*: the peer's paths, median.
 """
 NUM_HOUSES = 12
 PAIRS_PER_HOUSE = 20

@@ -132,8 +132,7 @@ def gym(
         typer.Option(
             "--envs",
             metavar="N",
-            help="Number of environments. Repeat the option for more, or separate them by "
-            "commas. Default: 1,2,4,8,16,32,64.",
+            help="Number of environments. Repeat the option for more, or separate them by commas. Default: 1,8,64.",
         ),
     ] = None,
     num_steps: Annotated[int, typer.Option("--steps", min=1, metavar="N", help="Steps of each of three rounds.")] = 64,

@@ -1,1 +1,0 @@
-"""Measure parts of evonav alone, which bound what is around them from below."""

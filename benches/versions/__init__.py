@@ -1,1 +1,0 @@
-"""Measure two versions of evonav in turn."""
