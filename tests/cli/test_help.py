@@ -119,28 +119,6 @@ def test_completion_does_not_slow_the_start():
     assert printed.strip() == "[]"
 
 
-def test_old_names_still_work(tmp_path):
-    """For one version: the note says the new name, and the help does not show the old one."""
-    out = str(tmp_path / "run")
-    run = CliRunner().invoke(
-        app, ["evaluate", "--agents=shortest-path", "--limit", "1", "--workers", "0", "--out", out]
-    )
-    assert run.exit_code == 0
-    assert "note: --agents is now --agent" in run.stderr
-    old = CliRunner().invoke(app, ["measures", out, "--agents", "shortest-path", "--out", str(tmp_path / "old.md")])
-    new = CliRunner().invoke(app, ["report", out, "--text", "--md", str(tmp_path / "new.md")])
-    assert (old.exit_code, new.exit_code) == (0, 0)
-    assert (tmp_path / "old.md").read_text() == (tmp_path / "new.md").read_text()
-    assert "`evonav measures` is now `evonav report --text`" in old.stderr
-    task = next(line.split()[0] for line in CliRunner().invoke(app, ["tasks", "list"]).stdout.splitlines()[1:])
-    for words in (["strip", out, task, "--agents", "shortest-path", "--stages", "1"], ["generate", "--help"]):
-        assert CliRunner().invoke(app, words).exit_code == 0, words
-    assert (tmp_path / "run/strip.svg").is_file()
-    for words in ([], ["strip"], ["evaluate"]):
-        shown = CliRunner().invoke(app, [*words, "--help"], env={"COLUMNS": "160"}).stdout
-        assert not re.search(r"measures|--agents|--stages|\[TASK\]", shown)
-
-
 def test_every_help_is_short_plain_and_complete():
     """Flags have no type, brackets are not taken for styles, and each purpose fits on a line."""
     shown = CliRunner().invoke(app, ["-h"], env={"COLUMNS": "80"}).stdout

@@ -22,7 +22,6 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
-from evonav.sweeps.file import read_sweep
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
@@ -174,10 +173,3 @@ def test_the_environment_is_a_list_of_what_is_allowed(tmp_path, monkeypatch):
     assert given["LANG"] == "C.UTF-8"
     assert given["HOME"] == given["TMPDIR"] == str(tmp_path)
     assert given["PATH"] == os.environ["PATH"]
-
-
-@pytest.mark.parametrize(("said", "isolation"), [("in_process = true", "none"), ("in_process = false", None)])
-def test_older_sweep_files_say_in_process(tmp_path, said, isolation):
-    path = tmp_path / "sweep.toml"
-    path.write_text(f'name = "old"\nagents = ["fu"]\ntasks = ["bundled:1"]\n{said}\n')
-    assert read_sweep(path).isolation == isolation

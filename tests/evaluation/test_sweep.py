@@ -30,7 +30,7 @@ tasks = ["bundled:2"]
 decisions = {right = "text", wrong = "text:wrong=0.3"}
 seeds = [0, 1]
 workers = 2
-in_process = true
+isolation = "none"
 [protocol]
 max_rounds = 2
 """

@@ -100,9 +100,6 @@ def test_the_command_says_what_is_wrong_and_exits_with_1(
     assert found["num_invalid"] == 1
     assert {problem["kind"] for problem in found["problems"]} == {"schema"}
     assert {problem["task_id"] for problem in found["problems"]} == {root.name}
-    old = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "found.json")])
-    assert f"--json > {tmp_path / 'found.json'}" in old.stderr
-    assert json.loads((tmp_path / "found.json").read_text(encoding="utf-8")) == found
 
 
 def test_every_kind_is_explained() -> None:

@@ -110,7 +110,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "tasks show": ("evonav tasks show", "evonav tasks show tasks --task TASK --stage 2 --out stage.svg"),
     "tasks stats": ("evonav tasks stats", "evonav tasks stats tasks --reweight procthor-10k"),
     "tasks subset": ("evonav tasks subset tasks test-90",),
-    "tasks validate": ("evonav tasks validate", "evonav tasks validate tasks --json problems.json"),
+    "tasks validate": ("evonav tasks validate", "evonav tasks validate tasks --json"),
     "tasks write": ("evonav tasks write tasks --model gpt-4o --dry-run",),
     "controlled generate": ("evonav controlled generate --houses bundled --limit 60 --out out/fixed",),
     "controlled evaluate": ("evonav controlled evaluate out/fixed --agent fu,stage-reset,ftu",),

@@ -1,12 +1,10 @@
-"""Parse and show commands as evonav does: `-h`, plain flags, panels in order, and old names that still work."""
+"""Parse and show commands as evonav does: `-h`, plain flags, and panels in order."""
 
 from collections.abc import Callable
 from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
-
-from evonav.cli.old_names import in_new_names
 
 HELP_NAMES = {"help_option_names": ["-h", "--help"]}
 
@@ -90,7 +88,6 @@ class Group(_Shown, TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - click's
         """Return the called command's name, the command with all its options, and its arguments."""
-        args = in_new_names(str(self.name), args, is_quiet=ctx.resilient_parsing)
         name, command, rest = super().resolve_command(ctx, args)
         callback, asks_for_help = getattr(command, "callback", None), ctx.resilient_parsing or _asks_for_help(rest)
         beginning, expand = getattr(callback, "beginning", None), getattr(callback, "expand", None)

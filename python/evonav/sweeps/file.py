@@ -113,8 +113,6 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     raw = read_toml(path)
     for change in changes:
         apply(raw, change, path)
-    if isinstance(raw.get("in_process"), bool) and raw.pop("in_process"):  # its former name
-        raw.setdefault("isolation", "none")
     for axis, spell in SHORT_FORMS.items():
         if axis in raw:
             raw[axis] = spell(raw[axis], f"{path}: {axis}")

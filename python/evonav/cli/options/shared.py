@@ -60,8 +60,6 @@ RunTask = Annotated[
     str | None,
     typer.Option("--task", metavar="ID", help="Task of the run. Default: the one that best shows how agents differ."),
 ]
-OldTask = Annotated[str | None, typer.Argument(metavar="ID", hidden=True)]
-"""A task's id without `--task`, as before."""
 Stages = Annotated[
     list[str] | None,
     typer.Option("--stage", metavar="N", help=f"Stage of the task. {_SEVERAL} Default: all."),
@@ -155,8 +153,6 @@ AnyAsset = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
-OldJsonFile = Annotated[Path | None, typer.Option("--json-file", metavar="FILE", hidden=True)]
-"""The option that the old `--json FILE` stands for (`evonav.cli.old_names`)."""
 Against = Annotated[
     Path | None,
     typer.Option(

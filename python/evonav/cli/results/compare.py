@@ -12,7 +12,6 @@ from evonav.cli.options.shared import (
     CsvFile,
     LatexFile,
     MarkdownFile,
-    OldJsonFile,
     PlotFile,
     listed,
 )
@@ -41,7 +40,6 @@ def compare(
     latex: LatexFile = None,
     csv: CsvFile = None,
     as_json: AsJson = False,
-    json_file: OldJsonFile = None,
     html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
     plot: PlotFile = None,
 ) -> None:
@@ -77,7 +75,6 @@ def compare(
         (md, lambda: wording.comparison_markdown(found)),
         (latex, lambda: wording.comparison_latex(found)),
         (csv, lambda: wording.comparison_csv(found)),
-        (json_file, lambda: content),
         (html, lambda: comparison_page(found, None if html is None else html.parent)),
         is_error=as_json,
     )

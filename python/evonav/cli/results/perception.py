@@ -27,7 +27,6 @@ if TYPE_CHECKING:  # the command must start fast
 def perception(
     workers: "RunSettings",
     models: "PerceptionSettings",
-    old_tasks: Annotated[Path | None, typer.Argument(metavar="FOLDER", hidden=True)] = None,
     tasks: Tasks = None,
     perceptions: Annotated[
         list[str] | None,
@@ -81,7 +80,7 @@ def perception(
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     there = read_header(out)
     simulation = SimulatorSettings(allow_unknown_assets=allow_unknown_assets)
-    with interruptible(out), chosen_tasks(tasks or old_tasks, limit, subset) as task_files:
+    with interruptible(out), chosen_tasks(tasks, limit, subset) as task_files:
         with progress_bar("tours") as on_progress:
             measured = measure(
                 specs,

@@ -9,7 +9,6 @@ from evonav.cli.display import print_table, show_tables, write_texts
 from evonav.cli.options.shared import (
     Exchanges,
     MarkdownFile,
-    OldTask,
     RunAgents,
     RunFolder,
     RunTask,
@@ -118,7 +117,6 @@ def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> No
 
 def strip(
     run: RunFolder,
-    old_task: OldTask = None,
     task: RunTask = None,
     agent: RunAgents = None,
     stage: Stages = None,
@@ -135,7 +133,7 @@ def strip(
 
     numbers = numbers_of("--stage", stage) or None
     agents = listed(agent) or load_run(run).agents
-    typer.echo(f"picture: {write_strip(run, task or old_task, agents, out or run / 'strip.svg', stages=numbers)}")
+    typer.echo(f"picture: {write_strip(run, task, agents, out or run / 'strip.svg', stages=numbers)}")
 
 
 def _count(replays: str) -> int | None:

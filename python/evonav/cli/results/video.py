@@ -8,7 +8,6 @@ import typer
 from evonav.cli.display import status
 from evonav.cli.options.shared import (
     Exchanges,
-    OldTask,
     RunFolder,
     RunTask,
     RunTasks,
@@ -38,7 +37,6 @@ MANY_ROUNDS = 100
 
 def video(
     run: RunFolder,
-    old_task: OldTask = None,
     task: RunTask = None,
     agent: Agent = None,
     stage: Stages = None,
@@ -62,7 +60,7 @@ def video(
 
     out = out or run / "episode.mp4"
     check_video(out, fps or ROUNDS_FPS, width)
-    replay, agent, stages, success_radius_m = _replayed(run, task or old_task, agent, stage, tasks, exchanges, VIEW_PX)
+    replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
     maps = {one.record.stage: one.stage_map for one in stages[0] if one.stage_map is not None}
     frame, budget = episode_frame(stages[0], maps), replay.budget(agent)
     with status("Drawing") as tell:
@@ -81,7 +79,6 @@ def video(
 
 def rerun(
     run: RunFolder,
-    old_task: OldTask = None,
     task: RunTask = None,
     agent: Agent = None,
     stage: Stages = None,
@@ -98,7 +95,7 @@ def rerun(
     out = out or run / "episode.rrd"
     check_recording(out)
     _, agent, (stages, shown), radius_m = _replayed(
-        run, task or old_task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
+        run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
     )
     maps = {one.record.stage: one.stage_map for one in stages if one.stage_map is not None}
     write_recording(shown, maps, out, success_radius_m=radius_m)

@@ -17,7 +17,6 @@ from evonav.cli.options.shared import (
     AssetFile,
     GeneratorFile,
     Limit,
-    OldTask,
     RetryErrored,
     Seed,
     StartOfHouses,
@@ -49,11 +48,10 @@ def generate(
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Folder of the analysis; an unfinished analysis is resumed.")
     ],
-    old_houses: Annotated[Path | None, typer.Argument(metavar="HOUSES", hidden=True)] = None,
     houses: Annotated[
-        Path | None,
+        Path,
         typer.Option(metavar="HOUSES", help=f"Houses: {HOUSES}; or a folder of tasks, whose houses are used."),
-    ] = None,
+    ],
     rates: Annotated[
         str | None,
         typer.Option(
@@ -80,9 +78,6 @@ def generate(
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
 
-    source = houses or old_houses
-    if source is None:
-        raise typer.BadParameter("name houses: --houses FILE, or --houses bundled")
     chosen: dict[str, Any] = {}
     if rates is not None:
         try:
@@ -98,7 +93,7 @@ def generate(
     )
     with interruptible(out), status("Generating tasks") as show:
         made = generate_controlled(
-            source,
+            houses,
             out,
             options=options,
             limit=limit,
@@ -184,7 +179,6 @@ def report(
 @controlled_app.command(cls=Command)
 def picture(
     directory: Directory,
-    old_task: OldTask = None,
     task: Annotated[
         str | None, typer.Option(metavar="ID", help="Task of the analysis. Default: the one with the largest effect.")
     ] = None,
@@ -202,7 +196,6 @@ def picture(
     from evonav.controlled.paired_maps import highlighted_pairs, write_pair
     from evonav.errors import InvalidArgumentError
 
-    task = task or old_task
     analysis = load_analysis(directory)
     if agent not in analysis.agents:
         raise InvalidArgumentError(f"{directory}: no agent {agent!r}; there are {', '.join(analysis.agents)}")

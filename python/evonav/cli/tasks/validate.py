@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import progress_bar, write_texts
+from evonav.cli.display import progress_bar
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AnyAsset, AsJson, Limit, OldJsonFile, TaskFolder, task_folder
+from evonav.cli.options.shared import AnyAsset, AsJson, Limit, TaskFolder, task_folder
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ def validate(
     folder: TaskFolder = None,
     limit: Limit = None,
     as_json: AsJson = False,
-    json_file: OldJsonFile = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also count oddities that the source houses have themselves.")
     ] = False,
@@ -44,7 +43,6 @@ def validate(
             allow_unknown_assets=allow_unknown_assets,
             on_progress=on_progress,
         )
-    write_texts((json_file, lambda: report_json(report)))
     if as_json:
         typer.echo(report_json(report), nl=False)
     else:
