@@ -137,7 +137,8 @@ readme: setup  ## renew the table and the picture of the README
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/update_readme.py out/demo
-	$(BIN)/evonav strip out/demo --task bundled-0085-5f3096-s0 --stage 2,3 --agent fu,ftu --out docs/images/episode.svg
+	$(BIN)/python -c "from pathlib import Path; from evonav.report import write_strip; write_strip(Path('out/demo'), \
+		'bundled-0085-5f3096-s0', ['fu', 'ftu'], Path('docs/images/episode.svg'), stages=[2, 3])"
 
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs

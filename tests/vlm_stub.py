@@ -1,4 +1,4 @@
-"""The server of `evonav mock-vlm`, holding requests to OpenAI's published API."""
+"""The simulated model's server, holding requests to OpenAI's published API."""
 
 import base64
 from collections.abc import Callable, Iterator

@@ -191,7 +191,16 @@ def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) ->
 
 
 def test_the_stand_in_serves_until_it_is_stopped() -> None:
-    command = [sys.executable, "-m", "evonav", "mock-vlm", "--port", "0", "--faults", "refusal=1.0", "--no-schemas"]
+    command = [
+        sys.executable,
+        "-m",
+        "evonav.decision.vlm.mock_server",
+        "--port",
+        "0",
+        "--faults",
+        "refusal=1.0",
+        "--no-schemas",
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout
         url = server.stdout.readline().split()[1].rstrip(";")

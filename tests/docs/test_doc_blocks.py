@@ -48,7 +48,7 @@ PARSED_ONLY = {
     "--decision vlm": "a model: tests/decision, with a stand-in",
     "evonav tasks write": "a model: tests/decision, with a stand-in",
     "--perception predicted": "weights: tests/models",
-    "evonav mock-vlm": "serves until it is stopped: tests/decision",
+    "python -m evonav.decision.vlm.mock_server": "serves until it is stopped: tests/decision",
     "my_package": "a package that is not there",
     "--open": "opens a browser",
     "--assets": "a file of sizes that is not here: tests/house",

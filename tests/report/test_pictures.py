@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from made_up_run import WriteRun
 from PIL import Image
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.drawing.files import ZOOM, write_picture
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.report import write_strip
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20" width="40" height="20">'
@@ -61,8 +60,7 @@ def test_a_strip_for_a_paper(tmp_path: Path, write_run: WriteRun) -> None:
     pytest.importorskip("resvg_py", reason="resvg is not installed")
     pytest.importorskip("typst", reason="typst is not installed")
     for suffix in ("svg", "png", "pdf"):
-        result = CliRunner().invoke(app, ["strip", str(write_run(suffix)), "--out", str(tmp_path / f"x.{suffix}")])
-        assert result.exit_code == 0, result.output
+        write_strip(write_run(suffix), None, ["fu", "ftu"], tmp_path / f"x.{suffix}")
     (size,) = re.findall(r'viewBox="0 0 (\d+) (\d+)" width', (tmp_path / "x.svg").read_text("utf-8"))
     with Image.open(tmp_path / "x.png") as picture:
         assert picture.size == tuple(ZOOM * int(side) for side in size)

@@ -5,9 +5,7 @@ from xml.etree import ElementTree
 
 import pytest
 from made_up_run import NEW_TABLE_M, WriteRun, entry, record_run, stage_map, stage_record
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.drawing.floor_plan import label_point
 from evonav.drawing.style import file_css, map_css
 from evonav.drawing.svg import Point, polyline, simplified, slug
@@ -110,16 +108,6 @@ def test_strip_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path) -> None:
     assert [element.text for element in with_class(root, "ink")] == ["fu", "ftu"]
     assert [element.text for element in with_class(root, "verdict")[0]] == ["fu", "failure"]
     assert len(root.findall(f".//{SVG}svg")) == 2
-
-
-def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
-    run_dir, out = write_run(), tmp_path / "strip.svg"
-    arguments = ["strip", str(run_dir), "--task", "task-0", "--out", str(out), "--agent", "fu,ftu"]
-    assert CliRunner().invoke(app, [*arguments, "--stage", "1,2"]).exit_code == 0
-    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4
-    assert CliRunner().invoke(app, [*arguments, "--stage", "x"]).exit_code == 2
-    assert CliRunner().invoke(app, ["strip", str(run_dir), "--out", str(out)]).exit_code == 0
-    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4  # both agents
 
 
 def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:

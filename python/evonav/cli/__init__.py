@@ -11,14 +11,13 @@ from evonav.cli.bench.app import bench_app
 from evonav.cli.doctor.doctor import doctor
 from evonav.cli.examples import add_examples
 from evonav.cli.group import HELP_NAMES, Command, Group, add_commands
-from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.results.breakdown import breakdown
 from evonav.cli.results.compare import compare
 from evonav.cli.results.export import export
 from evonav.cli.results.leaderboard import leaderboard
 from evonav.cli.results.paper import paper
 from evonav.cli.results.perception import perception
-from evonav.cli.results.report import report, strip
+from evonav.cli.results.report import report
 from evonav.cli.results.submission import pack, verify
 from evonav.cli.results.video import rerun, video
 from evonav.cli.results.view import view
@@ -42,7 +41,7 @@ PANELS = {
     "Data": (houses_app, tasks_app),
     "Study": (paper, controlled_app, perception, bench_app),
     "Submit": (pack, verify, leaderboard),
-    "Tools": (video, strip, rerun, mock_vlm),
+    "Tools": (video, rerun),
 }
 """Commands and groups of commands under their headings in the help."""
 GROUP_NAMES = {houses_app: "houses", tasks_app: "tasks", controlled_app: "controlled", bench_app: "bench"}

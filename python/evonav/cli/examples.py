@@ -62,7 +62,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav bench memory score out/streams",
         "evonav bench memory score out/streams/S1_bundled-0001_0 answers.jsonl --system mine",
     ),
-    "strip": ("evonav strip out/run --agent fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
     "tasks generate": (
         "evonav tasks generate --houses bundled --limit 20 --out tasks",
@@ -86,7 +85,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav pack out/run --agent ftu --url https://example.org --dataset my-lab/evonav-test",
     ),
     "verify": ("evonav verify out/run.evonav.zip", "evonav verify out/run.evonav.zip --tasks tasks --subset test-90"),
-    "mock-vlm": ("evonav mock-vlm --port 8000", "evonav mock-vlm --faults refusal=0.1,rate_limit=0.05 --latency 0.5"),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),
     "agents": ("evonav agents",),
     "version": ("evonav version",),
@@ -143,7 +141,6 @@ PAGES = {
     "pack": "submission.md",
     "leaderboard": "submission.md",
     "verify": "submission.md",
-    "mock-vlm": "decision.md",
     "agents": "agents.md",
     "houses list": "houses.md",
     "houses show": "houses.md",

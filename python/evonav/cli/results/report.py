@@ -1,4 +1,4 @@
-"""`evonav report` and `evonav strip`: write a run's report, or draw one of its tasks."""
+"""`evonav report`: write a run's report."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,11 +11,8 @@ from evonav.cli.options.shared import (
     MarkdownFile,
     RunAgents,
     RunFolder,
-    RunTask,
     RunTasks,
-    Stages,
     listed,
-    numbers_of,
 )
 from evonav.cli.results.view import replay_pages
 from evonav.cli.run.sweep import write_sweep_summary
@@ -113,27 +110,6 @@ def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> No
     tables = [table for table in measures_tables(run, agents) if table.rows]
     show_tables(tables)
     write_texts((md, lambda: markdown_tables(tables)))
-
-
-def strip(
-    run: RunFolder,
-    task: RunTask = None,
-    agent: RunAgents = None,
-    stage: Stages = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`). Default: RUN/strip.svg.",
-        ),
-    ] = None,
-) -> None:
-    """Draw one task of a run: a column per stage, a row per agent."""
-    from evonav.report import load_run, write_strip
-
-    numbers = numbers_of("--stage", stage) or None
-    agents = listed(agent) or load_run(run).agents
-    typer.echo(f"picture: {write_strip(run, task, agents, out or run / 'strip.svg', stages=numbers)}")
 
 
 def _count(replays: str) -> int | None:

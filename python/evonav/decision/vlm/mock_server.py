@@ -1,6 +1,7 @@
 """Serve the part of OpenAI's API that evonav uses, and misbehave on request.
 
-It lets everything between an agent and a model be tried without a key: `evonav mock-vlm`. Tests script it.
+It lets everything between an agent and a model be tried without a key: `python -m
+evonav.decision.vlm.mock_server`. Tests script it.
 """
 
 import json
@@ -11,8 +12,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from typing import Annotated, Any
 
+import typer
+
+from evonav.counted import counted
+from evonav.decision.noisy import read_rates
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import InvalidArgumentError
 
@@ -233,3 +238,48 @@ def _completion(request: JsonObject, reply: MockReply) -> JsonObject:
         "choices": [{"index": 0, "message": message, "finish_reason": reply.get("finish_reason", "stop")}],
         "usage": {"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 1100},
     }
+
+
+def main(
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 takes any free one.")] = 8000,
+    faults: Annotated[
+        str, typer.Option(metavar="NAME=RATE", help="Share of requests that fail, such as refusal=0.1,rate_limit=0.05.")
+    ] = "",
+    schemas: Annotated[
+        bool,
+        typer.Option(help="Accept JSON Schemas and follow them; with --no-schemas reject them, as some servers do."),
+    ] = True,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed that decides which requests fail.")] = 0,
+    latency: Annotated[float, typer.Option(min=0.0, metavar="X", help="Seconds before each answer.")] = 0.0,
+) -> None:
+    """Serve a simulated model, to test runs that ask one.
+
+    It has an OpenAI-compatible API on this machine and answers by rules. Faults: rate_limit (429 with Retry-After),
+    server_error (500), hang, disconnect, malformed (broken JSON around the answer), broken_json (in it), truncated,
+    refusal, filtered, empty, off_topic.
+    """
+
+    def answer(request: JsonObject) -> str:
+        time.sleep(latency)
+        return mock_answer(request)
+
+    try:
+        rates = read_rates(faults, list(FAULTS))
+    except InvalidArgumentError as error:
+        raise typer.BadParameter(f"--faults {error}") from None
+    server = MockServer(faulty(rates, seed, answer))
+    server.requests = None
+    if not schemas:
+        server.check = without_schemas
+    with serving(server, port=port):
+        typer.echo(f"serving {server.url}; in another terminal:")
+        typer.echo(f"  evonav evaluate --decision vlm --model mock --base-url {server.url} --limit 1 --out out/mock")
+        try:
+            while True:
+                time.sleep(3600.0)
+        except KeyboardInterrupt:
+            typer.echo(f"{counted(server.num_requests, 'request')} served")
+
+
+if __name__ == "__main__":
+    typer.run(main)
