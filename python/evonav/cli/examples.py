@@ -71,9 +71,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav tasks card bundled --out out/cards",
         "evonav tasks card tasks --out tasks --repo my-lab/evonav-val --license cc-by-4.0",
     ),
-    "tasks key": ("evonav tasks key --out evaluator.key",),
-    "tasks seal": ("evonav tasks seal tasks --key evaluator.key.pub --out sealed",),
-    "tasks unseal": ("evonav tasks unseal sealed --key evaluator.key --out out/unsealed",),
     "leaderboard": (
         "evonav leaderboard packs --out leaderboard.html",
         "evonav leaderboard packs --tasks tasks --subset test-90 --page-title 'Our lab' --workers 8",
@@ -152,7 +149,6 @@ PAGES = {
     "tasks schema": "tasks.md",
     "tasks stats": "dataset.md",
     "tasks card": "tasks.md",
-    **dict.fromkeys(("tasks key", "tasks seal", "tasks unseal"), "submission.md"),
     "tasks subset": "tasks.md",
     "tasks validate": "tasks.md",
     "tasks write": "goals.md",

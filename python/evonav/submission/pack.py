@@ -19,7 +19,6 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.provenance import KEY as SESSIONS_KEY
 from evonav.evaluation.run.provenance import isolations_of
-from evonav.evaluation.run.run import SEALED_KEY
 from evonav.parallel.folders import replacing
 from evonav.submission.file import EPOCH, HEADER_NAME, About, PackedRecords, PackedTask, Submission, member_name
 
@@ -32,7 +31,6 @@ def pack(
     *,
     agents: Sequence[str] | None = None,
     about: About | None = None,
-    reveals_sealed: bool = False,
 ) -> Submission:
     """Write a submission.
 
@@ -40,19 +38,12 @@ def pack(
         out: The file to write, whole or not at all.
         agents: Names of agents of the run; default: all but baselines.
         about: Title, authors and other statements.
-        reveals_sealed: Pack a run on sealed tasks, too: records tell where targets are.
 
     Raises:
-        InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score; or the tasks are
-            sealed.
+        InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score.
         StoreError: There is no run, it was made by an earlier version, or the file cannot be written.
     """
     with RunStore(run_dir) as store:
-        if store.meta(SEALED_KEY) and not reveals_sealed:
-            raise InvalidArgumentError(
-                f"{run_dir}: its tasks are sealed, and records tell where their targets are: publish summary.json; "
-                "--reveal packs the run for whoever may know"
-            )
         header, texts = _read_run(store, run_dir, agents)
         began = _began(store)
     header = header.model_copy(update={"about": about or About()})

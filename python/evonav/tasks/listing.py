@@ -8,13 +8,6 @@ from evonav.errors import TaskError
 from evonav.tasks.records import sha256_of
 from evonav.tasks.subsets import subset_roots
 
-KEY_VARIABLE = "EVONAV_TASKS_KEY"
-"""Environment variable with the path of the private key that opens sealed tasks."""
-SEALED_NAME = "sealed.json"
-"""Index of a sealed set (`evonav.submission.sealed`)."""
-UNSEALED_NAME = "unsealed.json"
-"""File in a folder of tasks that were sealed: it holds the public key for which they were."""
-
 
 @dataclass(frozen=True, slots=True)
 class TaskFile:
@@ -26,11 +19,6 @@ class TaskFile:
     num_stages: int
     digest: str
     """The SHA-256 of `task.json`, which holds the checksums of all other files."""
-
-    @property
-    def was_sealed(self) -> bool:
-        """True if the task is of a sealed set, which must not be shown (`evonav.submission.sealed`)."""
-        return (self.path.parent / UNSEALED_NAME).exists()
 
 
 def task_files(directory: Path, limit: int | None = None, subset: str | None = None) -> list[TaskFile]:
@@ -77,17 +65,10 @@ def task_roots(directory: Path) -> list[Path]:
     return roots
 
 
-def is_sealed(directory: Path) -> bool:
-    """Return whether a folder is a sealed set."""
-    return (directory / SEALED_NAME).is_file()
-
-
 def _why_no_task(directory: Path) -> str:
     """Say why a folder holds no task, and what to do."""
     if (directory / "task.json").is_file():
         return f"is a task itself: name the folder that holds it, {directory.parent}"
-    if is_sealed(directory):
-        return "is a sealed set, which `evonav evaluate` opens; `evonav tasks unseal` writes its tasks"
     if not directory.exists():
         return "holds no task, there is no such folder; `evonav tasks generate` makes one, bundled tasks need none"
     if not directory.is_dir():

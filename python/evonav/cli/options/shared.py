@@ -9,7 +9,7 @@ import typer
 from evonav.cli.options import completion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
@@ -218,19 +218,9 @@ def numbers_of(option: str, texts: "Sequence[str] | None") -> list[int]:
 
 @contextmanager
 def task_folder(folder: Path | None) -> "Iterator[Path]":
-    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`.
-
-    A sealed set is opened for as long as it is lent.
-    """
+    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`."""
     from evonav.tasks.bundled import bundled_tasks
-    from evonav.tasks.listing import is_sealed
 
-    if folder is not None and is_sealed(folder):
-        from evonav.submission.sealed import opened  # needs a library that few have
-
-        with opened(folder) as tasks:
-            yield tasks
-        return
     if folder is not None and (str(folder) != BUNDLED or folder.exists()):
         yield folder
         return
@@ -247,9 +237,3 @@ def chosen_tasks(tasks: Path | None, limit: int | None, subset: str | None) -> "
         raise typer.BadParameter("give --limit or --subset, not both")
     with task_folder(tasks) as folder:
         yield task_files(folder, limit, subset)
-
-
-def note_sealed(tasks: "Iterable[TaskFile]") -> None:
-    """Say that agents are told shifted places, whatever the options are, if tasks were sealed."""
-    if any(task.was_sealed for task in tasks):
-        typer.echo("the tasks were sealed: agents are told shifted coordinates (--shift-coordinates)", err=True)

@@ -39,10 +39,6 @@ def pack(
             "a folder .eval_results beside the file, to be put into a model's repository.",
         ),
     ] = None,
-    reveal: Annotated[
-        bool,
-        typer.Option("--reveal", help="Pack a run on sealed tasks, too. Its records tell where the targets are."),
-    ] = False,
 ) -> None:
     """Pack a complete run into one file to submit.
 
@@ -57,7 +53,7 @@ def pack(
     target = out or run.with_name(run.name + SUFFIX)
     about = About(title=title, authors=authors, contact=contact, url=url, description=description)
     names = listed(agent) or None
-    header = pack(run, target, agents=names, about=about, reveals_sealed=reveal)
+    header = pack(run, target, agents=names, about=about)
     typer.echo(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
         f" {counted(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)"

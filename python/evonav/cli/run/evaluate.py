@@ -25,7 +25,6 @@ from evonav.cli.options.shared import (
     Tasks,
     chosen_tasks,
     names_of,
-    note_sealed,
     read_houses,
 )
 from evonav.cli.run.failures import print_failures
@@ -127,7 +126,6 @@ def evaluate(
         if dry_run:
             print_estimate(spending, names, task_files, config, run.num_workers)
             return
-        note_sealed(task_files)
         with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
             (summaries,) = evaluate_all(
                 [RunRequest(tuple(names), tuple(task_files), out, config)],

@@ -8,7 +8,7 @@ import typer
 
 from evonav.cli.display import EXIT_INTERRUPTED, show, show_tables
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored, note_sealed
+from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -73,7 +73,6 @@ def sweep(
         if dry_run:
             _print_plan(settings, selected, tasks, folder)
             return
-        note_sealed(task for found in tasks.values() for task in found)
         runs = cell_runs(settings, cells, tasks, folder)
         again = typed_command().replace(" --retry-errored", "")
         _run(settings, folder, runs, selected, retry_errored, again)

@@ -10,7 +10,6 @@ from evonav.cli.options import completion
 from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of, task_folder
 from evonav.cli.tasks.card import card
 from evonav.cli.tasks.generate import generate
-from evonav.cli.tasks.seal import key, seal, unseal
 from evonav.cli.tasks.stats import stats
 from evonav.cli.tasks.validate import validate
 from evonav.cli.tasks.write import write
@@ -168,4 +167,4 @@ def subset(
     typer.echo(f"{len(ids)} task ids in {out}")
 
 
-add_commands(tasks_app, generate, validate, stats, write, card, key, seal, unseal)
+add_commands(tasks_app, generate, validate, stats, write, card)

@@ -1,7 +1,6 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
-import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -34,10 +33,8 @@ from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import open_pool
 from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import former_digests, former_images
-from evonav.tasks.listing import KEY_VARIABLE, TaskFile
+from evonav.tasks.listing import TaskFile
 
-SEALED_KEY = "is_sealed"
-"""Place in a run's header of whether its tasks were sealed, so that its records must not be shown."""
 NAMES_KEY = "key_of_names"
 """Place in a run's header of the secret key of agents' names of tasks and of shifts; nothing shows it."""
 SHIFT_KEY = "shift_coordinates"
@@ -59,7 +56,7 @@ class RunConfig:
     hosting: AgentHosting = field(default_factory=AgentHosting)
     """The process in which agents run; with `num_workers=0`, it is always this one."""
     shift_coordinates: bool = False
-    """Whether agents are told all places shifted, by a length drawn for each episode; always so for sealed tasks."""
+    """Whether agents are told all places shifted, by a length drawn for each episode."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +187,7 @@ def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_er
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
     names = {task.task_id: opaque_task_id(secret, task.task_id) for task in request.tasks}
-    is_shifted = shifts_coordinates(request.tasks, config)
+    is_shifted = config.shift_coordinates
     # An agent's process may count its episodes: in the order of the tasks' ids, the number would tell the task.
     for task in sorted(request.tasks, key=lambda task: names[task.task_id]):
         stages = range(1, task.num_stages + 1)
@@ -253,8 +250,6 @@ def _hosting(request: RunRequest, workforce: Workforce) -> AgentHosting:
 def _hidden_from_agents(request: RunRequest) -> Iterator[Path]:
     yield request.run_dir
     yield from (task.path.parent for task in request.tasks)
-    if key := os.environ.get(KEY_VARIABLE):
-        yield Path(key)
 
 
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
@@ -285,10 +280,6 @@ def _check_requests(requests: Sequence[RunRequest], workforce: Workforce) -> Non
             raise InvalidArgumentError(f"episodes_at_once = {workforce.jobs_at_once}: {message}")
         if hosting.is_sandboxed:
             check_sandbox(hosting, request.config.backend.decision)
-        elif any(task.was_sealed for task in request.tasks):
-            raise InvalidArgumentError(
-                f"isolation = {hosting.isolation}: the tasks were sealed, so agents must not read them: use sandbox"
-            )
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
@@ -310,13 +301,8 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "backend": config.backend.identity(),
         "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
-        **({SHIFT_KEY: True} if shifts_coordinates(tasks, config) else {}),
+        **({SHIFT_KEY: True} if config.shift_coordinates else {}),
     }
-
-
-def shifts_coordinates(tasks: Sequence[TaskFile], config: RunConfig) -> bool:
-    """Return whether agents are told shifted places: if the configuration says so, and always on sealed tasks."""
-    return config.shift_coordinates or any(task.was_sealed for task in tasks)
 
 
 def _digest_of(tasks: Sequence[TaskFile]) -> str:
@@ -386,7 +372,6 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
-            SEALED_KEY: any(task.was_sealed for task in request.tasks),  # likewise
             CHECKED_KEY: True,
             NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }

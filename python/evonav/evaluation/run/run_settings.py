@@ -42,7 +42,7 @@ class RunSettings(Settings):
     """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux).
     Default: sandbox where this machine has one, else process."""
     shift_coordinates: bool = False
-    """Tell agents all places shifted, by whole metres drawn for each episode; always so for sealed tasks."""
+    """Tell agents all places shifted, by whole metres drawn for each episode."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
     """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
