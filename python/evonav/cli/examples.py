@@ -67,10 +67,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav tasks generate --houses bundled --limit 20 --out tasks",
         "evonav tasks generate --houses procthor-10k:test --subset test-90 --workers 8 --out tasks",
     ),
-    "tasks card": (
-        "evonav tasks card bundled --out out/cards",
-        "evonav tasks card tasks --out tasks --repo my-lab/evonav-val --license cc-by-4.0",
-    ),
     "leaderboard": (
         "evonav leaderboard packs --out leaderboard.html",
         "evonav leaderboard packs --tasks tasks --subset test-90 --page-title 'Our lab' --workers 8",
@@ -79,7 +75,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "new-agent": ("evonav new-agent my_agent.py",),
     "pack": (
         "evonav pack out/run --title 'Our agent' --authors 'A. Author'",
-        "evonav pack out/run --agent ftu --url https://example.org --dataset my-lab/evonav-test",
+        "evonav pack out/run --agent ftu --url https://example.org",
     ),
     "verify": ("evonav verify out/run.evonav.zip", "evonav verify out/run.evonav.zip --tasks tasks --subset test-90"),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),
@@ -148,7 +144,6 @@ PAGES = {
     "tasks generate": "tasks.md",
     "tasks schema": "tasks.md",
     "tasks stats": "dataset.md",
-    "tasks card": "tasks.md",
     "tasks subset": "tasks.md",
     "tasks validate": "tasks.md",
     "tasks write": "goals.md",

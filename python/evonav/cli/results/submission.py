@@ -31,21 +31,11 @@ def pack(
     description: Annotated[
         str, typer.Option(metavar="TEXT", help="Model, prompts, training data and what else readers should know.")
     ] = "",
-    dataset: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ORG/NAME",
-            help="Repository of the tasks on the Hugging Face Hub, or ORG/NAME@REVISION. Writes the results for it, in "
-            "a folder .eval_results beside the file, to be put into a model's repository.",
-        ),
-    ] = None,
 ) -> None:
     """Pack a complete run into one file to submit.
 
-    The file holds the records, the configuration and checksums of the tasks. With --dataset, SR and SPL are also
-    written in the form of the Hugging Face Hub.
+    The file holds the records, the configuration and checksums of the tasks.
     """
-    from evonav.submission.eval_results import write_eval_results
     from evonav.submission.file import SUFFIX, About
     from evonav.submission.pack import pack
 
@@ -58,9 +48,6 @@ def pack(
         f"packed: {target} ({', '.join(part.agent for part in header.records)};"
         f" {counted(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)"
     )
-    if dataset is not None:
-        for path in write_eval_results(target, dataset):
-            typer.echo(f"results: {path}")
     typer.echo(f"next: evonav verify {target}")
 
 

@@ -8,7 +8,6 @@ import typer
 from evonav.cli.group import Command, add_commands, new_app
 from evonav.cli.options import completion
 from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of, task_folder
-from evonav.cli.tasks.card import card
 from evonav.cli.tasks.generate import generate
 from evonav.cli.tasks.stats import stats
 from evonav.cli.tasks.validate import validate
@@ -167,4 +166,4 @@ def subset(
     typer.echo(f"{len(ids)} task ids in {out}")
 
 
-add_commands(tasks_app, generate, validate, stats, write, card)
+add_commands(tasks_app, generate, validate, stats, write)

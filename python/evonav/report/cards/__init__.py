@@ -1,1 +1,0 @@
-"""Write what dataset hubs read: a dataset card, Croissant metadata, and a benchmark's description and results."""
