@@ -93,7 +93,7 @@ $(VENV)-llm/.dependencies: pyproject.toml
 	touch $@
 
 llm: $(VENV)-llm/.dependencies  ## serve a real language model on this machine (1.2 GB)
-	$(VENV)-llm/bin/python scripts/serve_llm.py
+	$(VENV)-llm/bin/python scripts/studies/serve_llm.py
 
 test-llm: setup $(VENV)-llm/.dependencies  ## test decisions with a real language model (1.2 GB)
 	EVONAV_LLM_PYTHON=$(CURDIR)/$(VENV)-llm/bin/python $(BIN)/python -m pytest tests/llm
@@ -129,23 +129,23 @@ wheel: $(VENV)/.maturin  ## build the wheel into dist
 
 # The bundled tasks, made again from the bundled houses, and the JSON Schema of their files from the records.
 data: setup  ## make the bundled tasks and the JSON Schema again
-	$(BIN)/python scripts/build_tasks.py
+	$(BIN)/python scripts/data/build_tasks.py
 	$(BIN)/evonav tasks schema --out python/evonav/tasks/schema
 
 # The results and the picture of the README, from a fresh demo.
 readme: setup  ## renew the table and the picture of the README
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
-	$(BIN)/python scripts/update_readme.py out/demo
+	$(BIN)/python scripts/docs/update_readme.py out/demo
 	$(BIN)/python -c "from pathlib import Path; from evonav.report import write_strip; write_strip(Path('out/demo'), \
 		'bundled-0085-5f3096-s0', ['fu', 'ftu'], Path('docs/images/episode.svg'), stages=[2, 3])"
 
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs
-	$(BIN)/python scripts/build_docs.py
+	$(BIN)/python scripts/docs/build_docs.py
 
 notice: setup  ## list the licences of all that a wheel needs in NOTICE
-	$(BIN)/python scripts/notice.py
+	$(BIN)/python scripts/docs/notice.py
 
 # Needs a network. Without cargo-deny: cargo install cargo-deny --locked.
 audit: setup  ## look for known vulnerabilities and other licences in all packages

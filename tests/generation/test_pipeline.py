@@ -178,7 +178,7 @@ def test_bundled_tasks_are_what_the_script_makes() -> None:
         assert made.keys() == there.keys()
         assert len(there) >= 24
         differing = [task_id for task_id, task in there.items() if task.header != made[task_id].header]
-        assert not differing, "run scripts/build_tasks.py"
+        assert not differing, "run scripts/data/build_tasks.py"
         assert {task.header.house.num_rooms for task in there.values()} >= {2, 3, 4, 5, 6, 7, 8, 10}
 
 

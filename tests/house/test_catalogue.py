@@ -30,7 +30,7 @@ def rows(path: Path) -> list[dict[str, Any]]:
 
 @needs_data("procthor-databases", "molmospaces-resources", *HOUSE_SETS)
 def test_the_script_reproduces_the_bundled_data(tmp_path: Path) -> None:
-    script = ROOT / "scripts" / "build_asset_catalogue.py"
+    script = ROOT / "scripts" / "data" / "build_asset_catalogue.py"
     subprocess.run([sys.executable, script, data_folder(), "--out", tmp_path], check=True)
     names = sorted(path.name for path in DATA.glob("*.json") if path.name not in BY_HAND)
     assert names == ["assets.json", "categories.json", "groups.json", "materials.json", "openings.json"]

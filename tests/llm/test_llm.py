@@ -38,11 +38,11 @@ KINDS = {
 @pytest.fixture(scope="session")
 def base_url() -> Iterator[str]:
     assert SERVER_PYTHON is not None
-    command = [SERVER_PYTHON, ROOT / "scripts" / "serve_llm.py", "--port", "0"]
+    command = [SERVER_PYTHON, ROOT / "scripts" / "studies" / "serve_llm.py", "--port", "0"]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
         assert server.stdout is not None
         told = server.stdout.readline()
-        assert told.startswith(NAME), "the model could not be served: run scripts/serve_llm.py by hand"
+        assert told.startswith(NAME), "the model could not be served: run scripts/studies/serve_llm.py by hand"
         yield told.split()[-1]
         server.terminate()
 
@@ -78,7 +78,7 @@ def test_an_agent_is_evaluated_with_the_model_and_replayed(base_url: str, tmp_pa
 
 
 def test_each_kind_of_question_is_answered(base_url: str, tmp_path: Path) -> None:
-    script = ROOT / "scripts" / "measure_llm.py"
+    script = ROOT / "scripts" / "studies" / "measure_llm.py"
     with bundled_tasks() as folder:
         options = ["--tasks", folder, "--num-tasks", "1", "--limit", "2", "--stride", "3", "--base-url", base_url]
         agents = ["--agent", "3d-mem,msgnav,unigoal-paper", "--out", tmp_path]

@@ -283,7 +283,7 @@ def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tm
 
 @pytest.fixture(scope="module")
 def script():
-    path = Path(__file__).parents[2] / "scripts" / "results.py"
+    path = Path(__file__).parents[2] / "scripts" / "studies" / "results.py"
     spec = importlib.util.spec_from_file_location("results_script", path)
     assert spec is not None
     assert spec.loader is not None

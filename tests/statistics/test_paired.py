@@ -173,7 +173,7 @@ def test_power_is_that_of_a_normal_test() -> None:
 
 
 def test_intervals_cover_and_tests_err_as_often_as_they_say() -> None:
-    """The short form of scripts/calibrate_statistics.py: 250 runs of 20 houses without a difference."""
+    """The short form of scripts/studies/calibrate_statistics.py: 250 runs of 20 houses without a difference."""
     covered, flipped, naive = [], [], []
     for i in range(250):
         (a, b), names = run(np.random.default_rng([0, i]), 20, 2.0)

@@ -54,7 +54,9 @@ def test_records_have_the_fields_of_recorded_ones() -> None:
 @needs_recorded
 def test_the_script_reproduces_the_bundled_asset_metadata(tmp_path: Path) -> None:
     out = tmp_path / "assets.json"
-    subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", data_folder(), "--out", out], check=True)
+    subprocess.run(
+        [sys.executable, ROOT / "scripts" / "data" / "build_thor_assets.py", data_folder(), "--out", out], check=True
+    )
     assert out.read_bytes() == (ROOT / "python" / "evonav" / "thor" / "data" / "assets.json").read_bytes()
 
 

@@ -19,7 +19,7 @@ from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
 
 WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
-"""Shipped weights, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
+"""Shipped weights, made by `scripts/mini_detector/train_mini.py` and `scripts/mini_detector/export_mini.py`."""
 
 
 @cache
@@ -30,7 +30,7 @@ def _network(weights: Path) -> _core.MiniNetwork:
     except (OSError, InvalidArgumentError) as error:
         raise InvalidArgumentError(
             f"the mini detector's weights {weights} cannot be used ({error}); reinstall evonav, or name a file that "
-            "scripts/export_mini.py wrote"
+            "scripts/mini_detector/export_mini.py wrote"
         ) from error
 
 
@@ -66,7 +66,7 @@ class MiniDetector:
         """Make a detector.
 
         Args:
-            weights: A file of `scripts/export_mini.py`; default: what ships.
+            weights: A file of `scripts/mini_detector/export_mini.py`; default: what ships.
             min_cells: Fewest cells of an object, each of 4 by 4 pixels in a view of 300 by 300.
             min_confidence: Least mean probability of an object's type over its cells.
 

@@ -11,7 +11,7 @@ from evonav.thor.geometry import Vec3
 
 @dataclass(frozen=True, slots=True)
 class AssetMetadata:
-    """An asset's record in AI2-THOR, besides its shape; `scripts/build_thor_assets.py` makes the table."""
+    """An asset's record in AI2-THOR, besides its shape; `scripts/data/build_thor_assets.py` makes the table."""
 
     object_type: str
     flags: frozenset[str] = frozenset()

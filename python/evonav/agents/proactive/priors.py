@@ -31,7 +31,7 @@ class ChangePrior:
 BLIND = ChangePrior(change=0.5, modes=(0.5, 0.5), moved=(0.25, 0.75), knows_rooms=False)
 """Knows nothing of the benchmark: the mean of Beta(1, 1), few or most objects move, all rooms alike."""
 FITTED = ChangePrior(change=0.55, modes=(0.45, 0.41, 0.14), moved=(0.26, 0.85, 0.87), same_room=0.99)
-"""Counts of 60 training tasks by `scripts/fit_priors.py`: 168 transitions, 93 changes, 1,118 moved objects.
+"""Counts of 60 training tasks by `scripts/data/fit_priors.py`: 168 transitions, 93 changes, 1,118 moved objects.
 
 The tasks are those of the first 60 houses of `procthor-generated/houses-train`, seed 0. All objects that moved stayed
 in their rooms."""
@@ -138,8 +138,8 @@ ROOM_RATIOS: dict[str, tuple[float, float, float, float]] = {
 }
 """Frequency of a type in each type of room, relative to the mean of the floor, with four objects added by area.
 
-Counted in the 88 houses of `procthor-generated/houses-train` by `scripts/fit_priors.py`; types with five objects or
-more.
+Counted in the 88 houses of `procthor-generated/houses-train` by `scripts/data/fit_priors.py`; types with five objects
+or more.
 """
 KNOWN_SHARE = 0.8
 """Share of the trust in these numbers; the rest of it is in 1."""

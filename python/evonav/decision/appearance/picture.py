@@ -13,7 +13,7 @@ from evonav.tasks.public import Goal
 
 @dataclass(frozen=True, slots=True)
 class PictureConfig:
-    """Numbers of the ratio's logarithm, as `scripts/calibrate_goal_pictures.py` fits them on the design houses."""
+    """Numbers of the ratio's logarithm, as `scripts/data/calibrate_goal_pictures.py` fits them on the design houses."""
 
     constant: float = 3.56
     near: float = -5.39

@@ -27,7 +27,7 @@ _EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", 
 _DURING = "Changes during stages"
 
 # `paper`: Sec. 3.2 and its plot. `expected` of evolutions: binomial, K uniform on {3, 4, 5}. Other `expected`: a trial
-# of Algorithm 1 in ProcTHOR-10k's mix, without images and rejected goals (scripts/try_readings.py, docs/dataset.md).
+# of Algorithm 1 in ProcTHOR-10k's mix, without images and rejected goals (docs/studies/task-statistics.md).
 METRICS = (
     MetricInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
     MetricInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),

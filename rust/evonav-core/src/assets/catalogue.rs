@@ -1,4 +1,4 @@
-//! The asset catalogue that ships with evonav; `scripts/build_asset_catalogue.py` builds its data.
+//! The asset catalogue that ships with evonav; `scripts/data/build_asset_catalogue.py` builds its data.
 
 use std::{collections::HashMap, sync::OnceLock};
 

@@ -1,4 +1,4 @@
-//! The detector's network, a small U-Net; `scripts/mini_net.py` defines it for training.
+//! The detector's network, a small U-Net; `scripts/mini_detector/mini_net.py` defines it for training.
 
 use crate::{
     Error,

@@ -1,6 +1,6 @@
-"""Agents under perceptions from perfect to poor: runs them, and writes the tables of docs/results-perception.md.
+"""Agents under perceptions from perfect to poor: runs them, and writes the tables of docs/studies/perception-errors.md.
 
-    python scripts/perception_results.py --out out/perception --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val
+    python scripts/studies/perception_results.py --out out/perception --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val
 
 evaluates the agents on a subset of the tasks under every perception and writes curves, and what the paper says of
 perception beside what is found here. Run it again to resume; `--write-only` runs nothing. A folder of results holds one
@@ -77,7 +77,7 @@ def parts(runs: Mapping[str, RecordedRun]) -> dict[str, str]:
     pictures = []
     for measure in ("sr", "spl"):
         path = write_plots([_plot(runs, measure)], IMAGES / f"perception-{measure}.svg")
-        pictures.append(f"![{measure.upper()} by perception](images/{path.name})")
+        pictures.append(f"![{measure.upper()} by perception](../images/{path.name})")
     tables = [rate_table(runs, "sr"), rate_table(runs, "spl")]
     return {
         "perception-rates": "\n\n".join((*pictures, *(table.markdown() for table in tables))),

@@ -1,9 +1,9 @@
-"""Writes the headline table of a run into the README: `python scripts/update_readme.py out/demo`."""
+"""Writes the headline table of a run into the README: `python scripts/docs/update_readme.py out/demo`."""
 
 import sys
 from pathlib import Path
 
-README = Path(__file__).parents[1] / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 BEGIN = "<!-- results: written by `make readme` from `make demo` -->\n"
 END = "<!-- end of results -->"
 

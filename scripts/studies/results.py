@@ -1,6 +1,6 @@
 """Agents against each other and beside the paper: runs them, and writes the marked parts of the pages of results.
 
-    python scripts/results.py --out out/results --tasks TASKS/hard TASKS/tiny-val:10 --small TASKS/attr
+    python scripts/studies/results.py --out out/results --tasks TASKS/hard TASKS/tiny-val:10 --small TASKS/attr
 
 evaluates all six agents on all tasks of the folders (the first 10 of the last), and on those of small houses, then
 agents that depart from the originals or from the paper, then five agents on a subset with decisions that go wrong at
@@ -37,8 +37,8 @@ from evonav.report.tables.table import Table
 from evonav.statistics import wilson
 from evonav.tasks.listing import TaskFile, task_files
 
-ROOT = Path(__file__).parents[1]
-PAGES = tuple(ROOT / "docs" / f"{name}.md" for name in ("results", "results-perception", "decision"))
+ROOT = Path(__file__).parents[2]
+PAGES = (ROOT / "docs" / "results.md", *sorted((ROOT / "docs" / "studies").glob("*.md")))
 PLOT = ROOT / "docs" / "images" / "decision-errors.svg"
 HEADLINE = "noisy:perfect,features=true"
 """Perception of the main runs: true masks and labels, and image features by which entries are ranked, as the paper's
@@ -50,7 +50,7 @@ RANKING_AGENTS = ("fu", "stage-reset", "ftu")
 WIDE_AGENTS = ("fu", "3d-mem", "msgnav")
 """Agents that are also run with the camera of 3D-Mem's and MSGNav's released code, 120 degrees wide."""
 LOOKING, DECLINING = (
-    f"{ROOT / 'scripts' / 'departing_agents.py'}:{name}"
+    f"{Path(__file__).with_name('departing_agents.py')}:{name}"
     for name in ("msgnav_looking_on_arrival", "unigoal_that_may_decline")
 )
 """Agents that depart from their originals in one point."""
@@ -120,7 +120,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     errors = ""
     if sweep:
         write_plots([_plot(sweep, agents)], PLOT)
-        picture = f"![SR by share of wrong decisions](images/{PLOT.name})"
+        picture = f"![SR by share of wrong decisions](../images/{PLOT.name})"
         errors = f"{picture}\n\n{sensitivity_table(sweep, agents).markdown()}"
     return {
         "setting": setting_table(run).markdown(),

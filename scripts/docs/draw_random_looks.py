@@ -6,26 +6,27 @@ Run it without arguments; house and seeds are fixed.
 import sys
 from pathlib import Path
 
-from picture_sheets import grid
 from PIL import Image
 
 import evonav
 from evonav.world.simulator import SimulatorConfig
 
-PICTURE = Path(__file__).parents[1] / "docs" / "images" / "random-looks.jpg"
-HOUSE, SIDE_PX = 80, 240
+PICTURE = Path(__file__).parents[2] / "docs" / "images" / "random-looks.jpg"
+HOUSE, SIDE_PX, NUM_COLS, GAP_PX = 80, 240, 3, 6
 
 
 def main() -> None:
     """See the module."""
     config = SimulatorConfig(width_px=SIDE_PX, height_px=SIDE_PX)
     simulator = evonav.Simulator(evonav.load_houses()[HOUSE], config=config)
-    pictures = []
-    for seed in range(6):
+    step_px = SIDE_PX + GAP_PX
+    sheet = Image.new("RGB", (NUM_COLS * step_px + GAP_PX, 2 * step_px + GAP_PX), "white")
+    for seed in range(2 * NUM_COLS):
         if seed:
             simulator.randomize(seed=seed)
-        pictures.append(Image.fromarray(simulator.look().rgb))
-    grid(pictures, 3).save(PICTURE, quality=88)
+        row, col = divmod(seed, NUM_COLS)
+        sheet.paste(Image.fromarray(simulator.look().rgb), (GAP_PX + col * step_px, GAP_PX + row * step_px))
+    sheet.save(PICTURE, quality=88)
     sys.stdout.write(f"{PICTURE}\n")
 
 

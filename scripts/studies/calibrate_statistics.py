@@ -1,6 +1,6 @@
-"""Do intervals cover, and are tests of no difference wrong one time in twenty? Simulated runs, for docs/statistics.md.
+"""Do intervals cover, and are tests of no difference wrong one time in twenty? (docs/studies/statistics.md).
 
-    python scripts/calibrate_statistics.py --runs 1000
+    python scripts/studies/calibrate_statistics.py --runs 1000
 
 Runs are made up: houses differ in difficulty, an agent has luck of its own in a house, stages of a house share both,
 and three to five stages come from each. Half of the scenarios have no true difference between the two agents; what is

@@ -1,6 +1,6 @@
-"""Decisions by rules that look against rules that read: runs both, and writes their part of docs/decision.md.
+"""Run rules that look and rules that read, and write docs/studies/rules-that-look.md.
 
-    python scripts/looks_results.py --out out/looks --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/tiny-train
+    python scripts/studies/looks_results.py --out out/looks --tasks TASKS/hard-val TASKS/tiny-val TASKS/tiny-train
 
 evaluates the agents on all tasks of the folders with `--decision text` and with `--decision looks`, one after the
 other. Run it again to resume; `--write-only` runs nothing.

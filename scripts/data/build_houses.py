@@ -1,4 +1,4 @@
-"""Makes the houses that come with evonav from generated ones: `python scripts/build_houses.py FOLDER`.
+"""Makes the houses that come with evonav from generated ones: `python scripts/data/build_houses.py FOLDER`.
 
 `FOLDER` holds `houses-train.jsonl.gz` and `houses-test.jsonl.gz` as its credit in `python/evonav/data/README.md` tells.
 Of each house, small objects that lie beside their support are left out: their places were drawn from the support's
@@ -16,7 +16,7 @@ from evonav.errors import EvonavError
 from evonav.house import House, HouseObject, stream_houses
 from evonav.world.embedded import EmbeddedSimulator
 
-OUT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "houses.jsonl.gz"
+OUT = Path(__file__).resolve().parents[2] / "python" / "evonav" / "data" / "houses.jsonl.gz"
 SOURCES = ("houses-train.jsonl.gz", "houses-test.jsonl.gz")
 MAX_FALL_M = 0.3
 FLOOR_M = 0.05

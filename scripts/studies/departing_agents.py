@@ -1,6 +1,6 @@
-"""Agents that depart from the originals in one point each, to measure what the point is worth (docs/results.md).
+"""Agents that depart from the originals in one point each, for docs/studies/departures.md.
 
-evonav evaluate --agent msgnav,scripts/departing_agents.py:msgnav_looking_on_arrival --tasks TASKS --out out/run
+evonav evaluate --agent msgnav,scripts/studies/departing_agents.py:msgnav_looking_on_arrival --tasks TASKS --out out/run
 """
 
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig

@@ -1,6 +1,6 @@
-"""What a real text model answers to the agents' questions: `python scripts/measure_llm.py --tasks TASKS`.
+"""What a real text model answers to the agents' questions: `python scripts/studies/measure_llm.py --tasks TASKS`.
 
-Needs a server (`python scripts/serve_llm.py`). The text matcher decides, so every model meets the same questions; of
+Needs a server (`serve_llm.py`). The text matcher decides, so every model meets the same questions; of
 each kind of question some, spread over the episodes, also go to the model, without images. Prints for each kind how
 many answers were valid by the question's grammar, how many equal the text matcher's, how many would by chance where
 the valid answers can be listed, and the time that an answer takes.

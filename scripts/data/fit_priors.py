@@ -1,7 +1,7 @@
 """Count what the agent `pro` expects by default: how rooms change, and which objects are in which rooms.
 
     evonav tasks generate --houses houses-train.jsonl.gz --limit 60 --out out/tasks/train
-    python scripts/fit_priors.py out/tasks/train --houses houses-train.jsonl.gz
+    python scripts/data/fit_priors.py out/tasks/train --houses houses-train.jsonl.gz
 
 prints the constants of `evonav.agents.proactive.priors`. Give it training houses only.
 """

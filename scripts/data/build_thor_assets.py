@@ -1,6 +1,6 @@
 """Build the AI2-THOR engine's table of asset metadata, `python/evonav/thor/data/assets.json`.
 
-    python scripts/build_thor_assets.py DATA [--out python/evonav/thor/data/assets.json]
+    python scripts/data/build_thor_assets.py DATA [--out python/evonav/thor/data/assets.json]
 
 DATA is a directory with `procthor-databases/`, the databases of the package `procthor` 0.0.1.dev2 (Allen Institute for
 AI, Apache-2.0): the properties of 1,653 assets, and AI2-THOR's own records of all objects of iTHOR and RoboTHOR, from
@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 Json: TypeAlias = dict[str, Any]
 
 CREDIT = (
-    "Derived by scripts/build_thor_assets.py from the databases of the package procthor 0.0.1.dev2 "
+    "Derived by scripts/data/build_thor_assets.py from the databases of the package procthor 0.0.1.dev2 "
     "(Allen Institute for AI, Apache-2.0)."
 )
 # AI2-THOR's flag of a record, by the property that gives it. `CanBeUsedUp` gives none: `canBeUsedUp` is false in every

@@ -1,4 +1,4 @@
-"""Makes the tasks that come with evonav: `python scripts/build_tasks.py [--check]`, in about half a minute.
+"""Makes the tasks that come with evonav: `python scripts/data/build_tasks.py [--check]`, in about half a minute.
 
 The first houses with test assets of each number of rooms, seed 0, the paper's parameters. The output is a function of
 this list, of `python/evonav/data/houses.jsonl.gz` and of the code; `--check` says whether it is what is there.
@@ -22,7 +22,7 @@ from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_dataset
 from evonav.world.simulator import Style
 
-ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
+ROOT = Path(__file__).resolve().parents[2] / "python" / "evonav" / "data" / "tasks"
 HOUSES = ROOT.parent / "houses.jsonl.gz"
 SEED = 0
 FIRST_TEST_HOUSE = 84

@@ -1,4 +1,6 @@
-"""Measures the AI2-THOR engine against recordings of AI2-THOR: `python scripts/measure_fidelity.py $EVONAV_DATA`.
+"""Measures the AI2-THOR engine against recordings of AI2-THOR, for docs/studies/simulator-fidelity.md.
+
+    python scripts/studies/measure_fidelity.py $EVONAV_DATA
 
 Everything goes through the published client, an `ai2thor.controller.Controller` that drives the engine; nothing is
 fitted here. `docs/simulator-fidelity.md` says what the figures mean, `tests/thor/test_thor_fidelity.py` holds them.

@@ -1,6 +1,6 @@
 """Draws one view as each preset of simulated perception tells of it: `docs/images/perception-presets.png`.
 
-python scripts/draw_perceptions.py [OUT.png] [--task N] [--place N] [--yaw DEG]
+python scripts/docs/draw_perceptions.py [OUT.png] [--task N] [--place N] [--yaw DEG]
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Writes what `train_mini.py` learned as the file that evonav ships, and compares the two on real pictures.
 
-    python scripts/export_mini.py mini.pt --tasks VAL_TASKS --out python/evonav/data/mini.weights
+    python scripts/mini_detector/export_mini.py mini.pt --tasks VAL_TASKS --out python/evonav/data/mini.weights
 
 Batch normalisation goes into the convolutions, numbers become half-precision ones. Prints the largest difference
 between torch's logits and the Rust core's, with the rounded weights and with the unrounded ones. Needs torch.

@@ -1,6 +1,6 @@
 """Builds the asset catalogue that ships with evonav: `rust/evonav-core/data/*.json`.
 
-    python scripts/build_asset_catalogue.py DATA [--out rust/evonav-core/data]
+    python scripts/data/build_asset_catalogue.py DATA [--out rust/evonav-core/data]
 
 DATA is a directory with
 
@@ -33,7 +33,7 @@ from asset_materials import asset_colours, material_colour, materials_named, sal
 Json: TypeAlias = dict[str, Any]
 
 CREDIT = (
-    "Derived by scripts/build_asset_catalogue.py from the databases of the package procthor 0.0.1.dev2 and from "
+    "Derived by scripts/data/build_asset_catalogue.py from the databases of the package procthor 0.0.1.dev2 and from "
     "allenai/molmospaces (both Allen Institute for AI, Apache-2.0)."
 )
 PROPERTIES = {"CanPickup": "pickupable", "Moveable": "moveable", "Receptacle": "receptacle", "CanOpen": "openable"}

@@ -1,6 +1,6 @@
 """Measures the mini detector on houses that it was not trained on.
 
-    python scripts/measure_mini.py --tasks VAL_TASKS [MORE] --per-house 4
+    python scripts/mini_detector/measure_mini.py --tasks VAL_TASKS [MORE] --per-house 4
 
 Prints, with 95% intervals from a bootstrap over houses: recall and precision of instances (of the same type and at
 least half in common, IoU >= 0.5), recall by pixels, AP50 (all types pooled by confidence, and the mean over types that

@@ -1,6 +1,6 @@
 """Builds the documentation's site from the repository's own pages: `make docs`.
 
-    python scripts/build_docs.py [--stage-only]
+    python scripts/docs/build_docs.py [--stage-only]
 
 Pages link each other and files of the repository as they lie there; the site's source is a copy of them in the same
 places, so that links hold in both. Zensical builds it; its configuration is a plain `mkdocs.yml`.
@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "out" / "docs-source"
 SITE = ROOT / "out" / "docs"
 PAGES = (

@@ -1,6 +1,6 @@
 """Evaluates tasks in the embedded simulator and through AI2-THOR's client on our engine; both must answer the same.
 
-    python scripts/compare_simulators.py OUT [--tasks DIR] [--limit N] [--agents fu,stage-reset,ftu] [--workers N]
+    python scripts/studies/compare_simulators.py OUT [--tasks DIR] [--limit N] [--agents fu,ftu] [--workers N]
 
 Compares the records of the two runs as stored, then the images of both simulators, to the byte, at every pose that an
 agent decided at.
