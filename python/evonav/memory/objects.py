@@ -81,7 +81,7 @@ class SightConfig:
 
 @dataclass(frozen=True, slots=True)
 class SeeThroughConfig:
-    """Conditions under which `ObjectMap.remove_seen_through` removes a point; DynaMem's, but for `margin_px`."""
+    """Conditions under which `ObjectMap.remove_seen_through` removes a point; DynaMem's, except for `margin_px`."""
 
     near_m: float = 0.01
     """Smallest depth of a point."""

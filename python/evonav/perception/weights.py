@@ -167,7 +167,7 @@ def check_folder(weights: Sequence[Weights], folder: Path) -> None:
         folder: Folder that was named.
 
     Raises:
-        PerceptionError: Some are missing; each is named with where it is to be had.
+        PerceptionError: Some are missing; each is named with its source.
     """
     lacking = [file for one in weights for file, path in places(one, folder) if not path.is_file()]
     if lacking:

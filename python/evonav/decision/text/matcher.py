@@ -196,7 +196,7 @@ class Matcher:
         return [relation for relation in self._judged(goal, around) if self.holds(relation, entry, around) == 0.0]
 
     def _judged(self, goal: ParsedGoal, around: Sequence[ObjectCandidate]) -> list[Relation]:
-        """Return the relations but for those to a doorway or a window if none is remembered."""
+        """Return the relations, without those to a doorway or a window if none is remembered."""
         return [
             relation
             for relation in goal.relations

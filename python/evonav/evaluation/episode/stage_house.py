@@ -109,7 +109,7 @@ class StageHouse:
 
 
 def _is_same(one: Pose, other: Pose) -> bool:
-    """Return whether two poses are the same but for rounding."""
+    """Return whether two poses are the same except for rounding."""
     return max(abs(one.x_m - other.x_m), abs(one.z_m - other.z_m)) < 1e-6
 
 

@@ -44,7 +44,7 @@ def write_report(
 ) -> Path:
     """Write `report.html`, which needs no other file, and `table.md`, `.tex`, `.csv`.
 
-    Deterministic but for wall-clock times, safe on a run that is not finished or still being written. Pages that
+    Deterministic except for wall-clock times, safe on a run that is not finished or still being written. Pages that
     `evonav view` left in the run's folder become part of the report, as long as they show the records of now.
 
     Args:
