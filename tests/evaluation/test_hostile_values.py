@@ -15,7 +15,6 @@ from evonav.component import Component
 from evonav.errors import StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
-from evonav.evaluation.records.set_aside import CHECKED_KEY, FILE_NAME
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
@@ -99,7 +98,7 @@ def test_all_rounds_of_a_stage_together_are_bounded(tmp_path, num_workers):
 
 @pytest.fixture
 def poisoned(tmp_path):
-    """A run of an earlier version, in which an agent's NaN became a null that no reader takes."""
+    """A run in whose file somebody put a null where a number belongs."""
     evaluate_long("Raising", 3, tmp_path, 0)
     path = tmp_path / "run" / "records.sqlite"
     with closing(sqlite3.connect(path)) as db, db:
@@ -107,7 +106,6 @@ def poisoned(tmp_path):
         record = json.loads(text)
         record["entries"] = [{**json.loads(entry_text()), "centre_m": [0.0, None, 0.0]}]
         db.execute("UPDATE stages SET record = ? WHERE stage = 2", (json.dumps(record),))
-        db.execute("DELETE FROM meta WHERE key = ?", (CHECKED_KEY,))
     return tmp_path
 
 
@@ -127,24 +125,8 @@ def test_a_reader_names_a_record_that_is_not_valid(poisoned):
     assert "\n" not in str(caught.value)
 
 
-def test_a_record_that_is_not_valid_is_set_aside_and_its_stage_run_again(poisoned, tmp_path_factory):
-    with pytest.warns(UserWarning, match=f"{NAMED}.*set aside in {FILE_NAME}"):
-        found = evaluate_long("Raising", 3, poisoned, 0)
-    assert found == evaluate_long("Raising", 3, tmp_path_factory.mktemp("whole"), 0)
-    (line,) = (poisoned / "run" / FILE_NAME).read_text(encoding="utf-8").splitlines()
-    assert json.loads(line)["entries"][0]["centre_m"] == [0.0, None, 0.0]
-    with RunStore(poisoned / "run") as store:
-        reasons = [failure.message for failure in store.failures() if failure.kind is ErrorKind.HARNESS]
-        assert len(reasons) == 1
-        assert NAMED in reasons[0]
-        assert store.meta(CHECKED_KEY)
-    write_report(poisoned / "run")
-
-
-def test_a_run_of_this_version_is_not_validated_again(poisoned, monkeypatch):
-    with RunStore(poisoned / "run") as store:
-        store.set_meta(CHECKED_KEY, value=True)
-        before = texts(poisoned / "run")
+def test_a_run_with_such_a_record_is_left_as_it_is(poisoned):
+    before = texts(poisoned / "run")
     with pytest.raises(StoreError, match=NAMED):
         evaluate_long("Raising", 3, poisoned, 0)
     assert texts(poisoned / "run") == before

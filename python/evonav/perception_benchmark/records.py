@@ -14,7 +14,6 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.parallel.folders import write_atomically
 
 HEADER_NAME = "perception.json"
@@ -228,7 +227,7 @@ def read_header(folder: Path) -> Header | None:
     if not path.exists():
         return None
     try:
-        return Header.model_validate(with_current_paths(json.loads(path.read_bytes())))
+        return Header.model_validate_json(path.read_bytes())
     except (OSError, ValueError) as error:
         raise StoreError(f"{path}: no header of `evonav perception` ({str(error).splitlines()[0]})") from error
 

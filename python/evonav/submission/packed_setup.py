@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.run.components import USUAL_CAMERA, Backend
 from evonav.evaluation.run.run import SHIFT_KEY
 from evonav.evaluation.run.settings import RULES
@@ -53,8 +52,8 @@ def camera_of(backend: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def packed_setup(header: Submission) -> PackedSetup:
-    """Return the setup of a packed run. Names of early versions are read as those of today."""
-    backend = with_current_paths(header.config.get("backend"))
+    """Return the setup of a packed run."""
+    backend = header.config.get("backend")
     parts: dict[str, Any] = backend if isinstance(backend, dict) else {}
     decision, perception = (_mapping(parts.get(f"{name}_options")) for name in ("decision", "perception"))
     made = str(parts.get("decision", "")).rpartition(":")[2]

@@ -19,7 +19,6 @@ from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.convert import pose_record
-from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.json_diff import json_differences
@@ -350,7 +349,7 @@ def _rescore(
     on_progress: Callable[[int, int], None],
 ) -> Iterator[str]:
     header = file.header
-    backend = with_current_paths(header.config.get("backend"))
+    backend = header.config.get("backend")
     simulator = str(backend.get("simulator")) if isinstance(backend, dict) else ""
     module, _, name = simulator.partition(":")
     if module != Backend.__module__ or name not in _OUR_SIMULATORS:

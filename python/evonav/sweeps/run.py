@@ -20,7 +20,6 @@ from typing import Any
 from evonav._core import __version__
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
-from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_decision
 from evonav.evaluation.run.decision_resources import DecisionResources
@@ -231,7 +230,7 @@ def read_claim(out: Path) -> dict[str, Any]:
     """
     path = out / SWEEP_NAME
     try:
-        content = with_current_paths(json.loads(path.read_text(encoding="utf-8")))
+        content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StoreError(f"{out}: no sweep here ({SWEEP_NAME}: {error.strerror or error})") from None
     except ValueError as error:

@@ -23,7 +23,6 @@ from evonav.errors import StoreError
 from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION
 from evonav.evaluation.records.encoded import EncodedStage, invalid_record
 from evonav.evaluation.records.floor_plan_json import FloorPlanReader
-from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
 
@@ -175,9 +174,9 @@ class RunStore:
         self._db.close()
 
     def meta(self, key: str) -> Any:  # noqa: ANN401 - JSON
-        """Return a JSON value of the run's header with current import paths, or `None`."""
+        """Return a JSON value of the run's header, or `None`."""
         rows = self._query("SELECT value FROM meta WHERE key = ?", (key,))
-        return with_current_paths(json.loads(rows[0][0])) if rows else None
+        return json.loads(rows[0][0]) if rows else None
 
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
         """Set a JSON value of the run's header."""
@@ -288,8 +287,7 @@ class RunStore:
         try:
             return StageRecord.model_validate_json(text)
         except ValidationError as error:
-            hint = "`evonav evaluate` with the run's options sets it aside and runs its stage again"
-            raise StoreError(f"{self.path}: {invalid_record(text, error)}; {hint}") from error
+            raise StoreError(f"{self.path}: {invalid_record(text, error)}") from error
 
     def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
         """Yield agent, task and stage, the version of the stored metrics, and the metrics; `None` without metrics."""

@@ -18,7 +18,6 @@ from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.evaluation.records.set_aside import CHECKED_KEY, set_aside_invalid
 from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
 from evonav.evaluation.run.components import Backend, check_agent_names, check_sandbox
 from evonav.evaluation.run.decision_resources import fold_logs
@@ -363,7 +362,6 @@ def _claim(store: RunStore, request: RunRequest) -> None:
                 "resume it on those tasks (docs/tasks.md says how to make them)"
             )
         check_same_run(stored, wanted, request.run_dir)
-        set_aside_invalid(store)
     store.set_header(
         {
             "config": wanted,
@@ -372,7 +370,6 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
             "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
-            CHECKED_KEY: True,
             NAMES_KEY: store.meta(NAMES_KEY) or secrets.token_hex(32),  # for agents' names of tasks; never printed
         }
     )
