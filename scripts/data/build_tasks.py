@@ -2,7 +2,6 @@
 
 The first houses with test assets of each number of rooms, seed 0, the paper's parameters. The output is a function of
 this list, of `python/evonav/data/houses.jsonl.gz` and of the code; `--check` says whether it is what is there.
-`--style outlined --out FOLDER` makes the tasks with their former reference images and digests.
 """
 
 import argparse
@@ -12,7 +11,6 @@ import shutil
 import sys
 from collections import Counter
 from pathlib import Path
-from typing import get_args
 
 from PIL import Image
 
@@ -20,7 +18,6 @@ from evonav.generation import GenerationParameters, TaskRejectedError, generate_
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_dataset
-from evonav.world.simulator import Style
 
 ROOT = Path(__file__).resolve().parents[2] / "python" / "evonav" / "data" / "tasks"
 HOUSES = ROOT.parent / "houses.jsonl.gz"
@@ -44,9 +41,9 @@ def chosen_houses() -> list[House]:
     return chosen
 
 
-def build_tasks(style: Style = "default") -> list[Task]:
-    """The tasks with reference images in a style, in order of task id."""
-    parameters = GenerationParameters(reference_style=style)
+def build_tasks() -> list[Task]:
+    """The tasks, in order of task id."""
+    parameters = GenerationParameters()
     tasks = []
     for house in chosen_houses():
         try:
@@ -88,11 +85,10 @@ def main() -> int:
     """Writes the tasks, or compares them with those there."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="compare only; 1 if they differ")
-    parser.add_argument("--style", choices=get_args(Style), default="default", help="style of the reference images")
     parser.add_argument("--out", type=Path, default=ROOT, help="folder of the tasks; what is there is removed")
     arguments = parser.parse_args()
     root = arguments.out
-    tasks = build_tasks(arguments.style)
+    tasks = build_tasks()
     if arguments.check:
         there = {task.task_id: task.header for task in load_tasks(root)}
         differing = {task.task_id for task in tasks if there.pop(task.task_id, None) != task.header} | there.keys()

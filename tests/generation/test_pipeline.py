@@ -20,10 +20,7 @@ from evonav.generation import (
 )
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks
-from evonav.tasks.bundled import FORMER_DEFAULT_IMAGES, FORMER_IMAGES, bundled_tasks, former_digests, former_images
-from evonav.tasks.dataset import entry_of
 from evonav.tasks.language import COLOURS, MATERIALS, SHAPES, SIZES, noun_of, plural_of, with_article
-from evonav.tasks.listing import task_files
 
 
 @pytest.fixture(scope="module")
@@ -180,20 +177,6 @@ def test_bundled_tasks_are_what_the_script_makes() -> None:
         differing = [task_id for task_id, task in there.items() if task.header != made[task_id].header]
         assert not differing, "run scripts/data/build_tasks.py"
         assert {task.header.house.num_rooms for task in there.values()} >= {2, 3, 4, 5, 6, 7, 8, 10}
-
-
-def test_former_reference_images_give_the_former_digests() -> None:
-    """Runs and packs hold these digests, and the tasks of that time can still be made."""
-    with bundled_tasks() as directory:
-        there = {task.task_id: task for task in task_files(directory)}
-    for former in build_tasks("outlined"):
-        task, digest = there[former.task_id], entry_of(former).sha256
-        outlined, earlier = former_digests(task)
-        assert outlined == digest
-        assert len({outlined, earlier, task.digest}) == 3
-        assert former_images(task.task_id, outlined) == FORMER_IMAGES
-        assert former_images(task.task_id, earlier) == FORMER_DEFAULT_IMAGES
-        assert not former_images(task.task_id, task.digest)
 
 
 def test_bundled_tasks_are_small() -> None:

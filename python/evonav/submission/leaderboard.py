@@ -12,7 +12,6 @@ from evonav.submission.archive import SubmissionError
 from evonav.submission.file import SUFFIX, Submission, SubmissionFile
 from evonav.submission.packed_setup import PackedSetup, packed_setup
 from evonav.submission.verify import Verdict, brief, read_records, verify
-from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
 
 
@@ -47,8 +46,6 @@ class Conditions:
     """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
     simulator: str
     """Simulator, unless it is the usual one."""
-    reference_images: str = ""
-    """Kind of the tasks' reference images, unless they are the usual ones."""
     reference_path: str = ""
     """Kind of the reference paths, unless they end in the target's room."""
 
@@ -140,10 +137,9 @@ def rank(
         except (SubmissionError, InvalidArgumentError) as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
-        images = next(filter(None, (former_images(task.task_id, task.digest) for task in header.tasks)), "")
         is_in_room = ProtocolConfig.from_header(header.config["protocol"]).reference_in_room
         end = "" if is_in_room else "to the nearest free point, also behind a wall"
-        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, images, end)
+        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, end)
         for sha256, entry in entries:
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
                 detail = f"{entry.summary.agent} has the same records as in {first}"
@@ -159,19 +155,13 @@ def rank(
 def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
     """Return the set with the most tasks of a file."""
     packed = {(task.task_id, task.digest) for task in header.tasks}
-    digests = [{(task.task_id, digest) for task in one.tasks for digest in _digests(task)} for one in task_sets]
-    common = [len(packed & there) for there in digests]
+    common = [len(packed & {(task.task_id, task.digest) for task in one.tasks}) for one in task_sets]
     if not any(common):
         raise SubmissionError("its tasks are not among those to verify with: name their folder with --tasks")
     fewest = min(len(one.tasks) for one, number in zip(task_sets, common, strict=True) if number == max(common))
     return next(
         one for one, number in zip(task_sets, common, strict=True) if number == max(common) and len(one.tasks) == fewest
     )
-
-
-def _digests(task: TaskFile) -> set[str]:
-    """Return the digests under which a task is known."""
-    return {task.digest, *former_digests(task)}
 
 
 def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -> Unranked | None:

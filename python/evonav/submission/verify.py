@@ -5,7 +5,6 @@ No file can show that an agent chose its actions by itself: for that, the agent 
 
 import json
 import math
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import groupby
@@ -30,7 +29,6 @@ from evonav.submission.pack import packed_summary
 from evonav.submission.packed_setup import camera_of
 from evonav.submission.recorded_change import change_findings
 from evonav.submission.recorded_path import TOLERANCE, path_findings
-from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
@@ -191,7 +189,7 @@ def _verdict(
     agents = ", ".join(part.agent for part in header.records)
     checks = [
         _check("protocol", _protocol_findings(header), "the benchmark's"),
-        _check("tasks", _task_findings(header, known, required), _known_tasks(header)),
+        _check("tasks", _task_findings(header, known, required), f"{len(header.tasks)}, all known"),
     ]
     if not all(check.is_passed for check in checks):
         unread = Check("file", True, _shown(f"the header; the records of {agents} were not read"))
@@ -280,7 +278,7 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         there = known.get(task.task_id)
         if there is None:
             yield f"{task.task_id} is not among the tasks to verify with"
-        elif there.num_stages != task.num_stages or task.digest not in (there.digest, *former_digests(there)):
+        elif there.num_stages != task.num_stages or task.digest != there.digest:
             yield f"{task.task_id} is another task than the one of this name"
     names = [task.task_id for task in header.tasks]
     if names != sorted(set(names)):
@@ -292,11 +290,6 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         return
     for name in sorted(missing):
         yield f"{name} is missing"
-
-
-def _known_tasks(header: Submission) -> str:
-    former = Counter(filter(None, (former_images(task.task_id, task.digest) for task in header.tasks)))
-    return "; ".join([f"{len(header.tasks)}, all known", *(f"{num} with {images}" for images, num in former.items())])
 
 
 def _target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:

@@ -31,7 +31,7 @@ _SYSTEM = (
     "/usr/local/lib",
     "/usr/share/zoneinfo",
 )
-_BUNDLED = ("tasks", "houses.jsonl.gz", "former_tasks.json")
+_BUNDLED = ("tasks", "houses.jsonl.gz")
 """Members of evonav's data that tell of bundled tasks."""
 _VARIABLES = (
     "CUDA_VISIBLE_DEVICES",

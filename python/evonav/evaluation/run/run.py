@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import drawn_shift_m, opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.model_relay import is_relayed
@@ -31,7 +31,6 @@ from evonav.evaluation.run.worker import EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import open_pool
 from evonav.parallel.worker import Workforce
-from evonav.tasks.bundled import former_digests, former_images
 from evonav.tasks.listing import TaskFile
 
 NAMES_KEY = "key_of_names"
@@ -340,27 +339,11 @@ def _claim_models(store: RunStore, request: RunRequest) -> None:
         store.set_meta(MODELS_KEY, {**stored, **found})
 
 
-def _former_images(tasks: Sequence[TaskFile], digest: str) -> str:
-    """Return which former reference images the tasks of a run had, given the digest of all; empty if they had none."""
-    digests = [former_digests(task) or (task.digest,) for task in tasks]
-    for number in range(max(map(len, digests))):
-        of_that_time = [some[min(number, len(some) - 1)] for some in digests]
-        former = [replace(task, digest=its) for task, its in zip(tasks, of_that_time, strict=True)]
-        if _digest_of(former) == digest:
-            return next(filter(None, (former_images(task.task_id, task.digest) for task in former)), "")
-    return ""
-
-
 def _claim(store: RunStore, request: RunRequest) -> None:
     """Make the folder this run's, or check that it is."""
     wanted = run_identity(request.tasks, request.config)
     stored = store.meta("config")
     if stored is not None:
-        if stored["tasks"] != wanted["tasks"] and (images := _former_images(request.tasks, stored["tasks"])):
-            raise StoreError(
-                f"{request.run_dir} holds a run on the bundled tasks with their {images}; use another folder, or "
-                "resume it on those tasks (docs/tasks.md says how to make them)"
-            )
         check_same_run(stored, wanted, request.run_dir)
     store.set_header(
         {

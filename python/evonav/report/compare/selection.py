@@ -11,8 +11,6 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import FILE_NAME
 from evonav.json_diff import json_differences
 from evonav.report.run import RecordedRun, load_run
-from evonav.report.tables.run_metadata import task_digests
-from evonav.tasks.bundled import former_images
 
 
 @dataclass(frozen=True)
@@ -118,15 +116,4 @@ def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[st
         return "-" if value is None else str(value)
 
     differing = sorted(json_differences(a.run.config, b.run.config), key=lambda one: one.path)
-    found = {one.path: (text(one.left), text(one.right)) for one in differing}
-    if "tasks" in found:
-        left, right = found["tasks"]
-        found["tasks"] = (left + _about_images(a.run), right + _about_images(b.run))
-    return found
-
-
-def _about_images(run: RecordedRun) -> str:
-    """Say whether a run's tasks are the bundled ones as they were before their reference images were drawn anew."""
-    found = (former_images(task_id, digest) for task_id, digest in task_digests(run).items())
-    images = next(filter(None, found), "")
-    return f" (the bundled tasks with their {images})" if images else ""
+    return {one.path: (text(one.left), text(one.right)) for one in differing}
