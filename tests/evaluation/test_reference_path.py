@@ -1,16 +1,11 @@
-"""The reference path ends in the target's room, in runs of earlier versions at the nearest free point of the house."""
+"""The reference path ends in the target's room."""
 
 import math
-from dataclasses import asdict
 
 import numpy as np
-import pytest
 
 from evonav.evaluation.episode.motion import Planner
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import embedded_simulator, load_case
-from evonav.evaluation.run.run import RunConfig, evaluate, run_identity
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from evonav.world.pose import Pose
@@ -82,25 +77,3 @@ def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
                     longer_m.append(math.dist(path[-1], (x_m, z_m)) - math.dist(nearest[-1], (x_m, z_m)))
     assert elsewhere > 3
     assert min(longer_m) > -0.18  # the nearest place may be one of a grid of 0.25 m
-
-
-def test_headers_of_earlier_versions_mean_earlier_paths():
-    earlier = {key: value for key, value in asdict(ProtocolConfig()).items() if key != "reference_in_room"}
-    assert ProtocolConfig.from_header(earlier) == ProtocolConfig(reference_in_room=False)
-    for protocol in (ProtocolConfig(), ProtocolConfig(reference_in_room=False, max_rounds=3)):
-        assert ProtocolConfig.from_header(protocol.header()) == protocol
-    assert ProtocolConfig(reference_in_room=False).header() == earlier
-    with pytest.raises(TypeError, match="max_round"):
-        ProtocolConfig.from_header({"max_round": 3})
-
-
-def test_a_run_of_an_earlier_version_keeps_its_paths(tmp_path):
-    earlier = RunConfig(protocol=ProtocolConfig(max_rounds=1, reference_in_room=False))
-    with bundled_tasks() as directory:
-        tasks = task_files(directory)[:1]
-        evaluate(("stay-still",), tasks, tmp_path, config=earlier, num_workers=0)
-        now = RunConfig(protocol=ProtocolConfig(max_rounds=1))
-        evaluate(("stay-still", "random-walk"), tasks, tmp_path, config=now, num_workers=0)
-    with RunStore(tmp_path) as store:
-        assert store.meta("config") == run_identity(tasks, earlier) != run_identity(tasks, now)
-        assert {agent for agent, _, _ in store.states()} == {"stay-still", "random-walk"}

@@ -88,10 +88,10 @@ HEADERS: dict[str, tuple[Forge, str, str]] = {
         "protocol",
         r"max_rounds is 50\.0",
     ),
-    "truth as a number": (
-        setting("config", "protocol", "reference_in_room", value=1),
+    "truth in place of a number": (
+        setting("config", "protocol", "max_views", value=True),
         "protocol",
-        "reference_in_room is 1",
+        "max_views is True",
     ),
     "no protocol": (setting("config", "protocol", value=None), "protocol", "has no protocol"),
     "more protocol": (setting("config", "protocol", "surprise", value=1), "protocol", "surprise is 1"),

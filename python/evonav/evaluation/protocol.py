@@ -1,8 +1,6 @@
 """Hold the constants of the paper's evaluation protocol (Sec. C.1)."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from evonav.agents.agent import SensorConfig
 from evonav.errors import InvalidArgumentError
@@ -26,25 +24,6 @@ class ProtocolConfig:
     max_occupancy_range_m: float = 3.0
     min_visible_px: int = 25
     """Number of visible pixels from which the target counts as seen in a view (diagnostics and oracle baselines)."""
-    reference_in_room: bool = True
-    """Whether the reference path to a target ends in the target's room where a path leads there (docs/parity.md).
-
-    Runs of earlier versions have paths to the nearest free point, which may lie behind a wall.
-    """
-
-    @classmethod
-    def from_header(cls, values: Mapping[str, Any]) -> "ProtocolConfig":
-        """Return the protocol that a run's header describes; without `reference_in_room`, it means an earlier run's.
-
-        Raises:
-            TypeError: An entry is unknown.
-        """
-        return cls(**{"reference_in_room": False, **values})
-
-    def header(self) -> dict[str, Any]:
-        """Return what a run's header says of the protocol; `from_header` reads it."""
-        values = asdict(self)
-        return values if self.reference_in_room else {key: values[key] for key in values if key != "reference_in_room"}
 
     def budget(self, sensors: SensorConfig) -> int:
         """Return the number of rounds per stage: decisions, or single actions."""

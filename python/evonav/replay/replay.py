@@ -74,7 +74,7 @@ class RunReplay:
             self._secret: str = store.meta(NAMES_KEY) or ""  # runs of earlier versions have none
         try:
             self.seed = int(config["seed"])
-            self.protocol = ProtocolConfig.from_header(config["protocol"])
+            self.protocol = ProtocolConfig(**config["protocol"])
             backend = Backend.from_identity(config["backend"])
             self._is_shifted = bool(config.get(SHIFT_KEY))
         except (KeyError, TypeError, ValueError) as error:

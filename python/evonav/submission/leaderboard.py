@@ -7,7 +7,6 @@ from pathlib import Path
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentSummary, summarise
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.submission.archive import SubmissionError
 from evonav.submission.file import SUFFIX, Submission, SubmissionFile
 from evonav.submission.packed_setup import PackedSetup, packed_setup
@@ -46,8 +45,6 @@ class Conditions:
     """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
     simulator: str
     """Simulator, unless it is the usual one."""
-    reference_path: str = ""
-    """Kind of the reference paths, unless they end in the target's room."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,9 +134,7 @@ def rank(
         except (SubmissionError, InvalidArgumentError) as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
-        is_in_room = ProtocolConfig.from_header(header.config["protocol"]).reference_in_room
-        end = "" if is_in_room else "to the nearest free point, also behind a wall"
-        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator, end)
+        conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator)
         for sha256, entry in entries:
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
                 detail = f"{entry.summary.agent} has the same records as in {first}"

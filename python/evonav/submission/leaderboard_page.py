@@ -62,7 +62,6 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> 
             ("perception", short(conditions.perception)),
             ("decision", short(conditions.decision)),
             *([("simulator", short(conditions.simulator))] if conditions.simulator else []),
-            *([("reference paths", conditions.reference_path)] if conditions.reference_path else []),
         ],
         "rows": [_row(entry) for entry in entries],
     }

@@ -145,7 +145,7 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """
     values = json.loads(settings)
     simulators: Component[Simulator] = Component(values["simulator"], values["camera"])
-    protocol = ProtocolConfig.from_header(values["protocol"])
+    protocol = ProtocolConfig(**values["protocol"])
     simulator = simulators.create()
 
     def answer(text: str) -> str:

@@ -103,7 +103,7 @@ class _Records:
         """Records without rounds and memory, by agent."""
         self.complete, self.targets, self.paths = _Findings(), _Findings(), _Findings()
         self._known = known
-        self._protocol = ProtocolConfig.from_header(file.header.config["protocol"])
+        self._protocol = ProtocolConfig(**file.header.config["protocol"])
         self._expected = [
             (task.task_id, stage) for task in file.header.tasks for stage in range(1, task.num_stages + 1)
         ]
@@ -253,9 +253,7 @@ def _protocol_findings(header: Submission) -> Iterator[str]:
     if not isinstance(claimed, dict):
         yield "the header has no protocol"
         return
-    # Packs of earlier versions have other reference paths, and no entry for them.
-    is_earlier = "reference_in_room" not in claimed
-    expected = ProtocolConfig(reference_in_room=not is_earlier).header()
+    expected = asdict(ProtocolConfig())
     for name in sorted(expected.keys() | claimed.keys()):
         value, right = claimed.get(name), expected.get(name)
         if value != right or type(value) is not type(right):

@@ -55,7 +55,6 @@ class ProtocolSettings(Settings):
     max_views: int | None = Field(default=None, ge=1)
     max_occupancy_range_m: float | None = Field(default=None, gt=0.0)
     min_visible_px: int | None = Field(default=None, ge=0)
-    reference_in_room: bool | None = None
 
     def config(self) -> ProtocolConfig:
         """Return the paper's protocol with the given values in place of its own."""

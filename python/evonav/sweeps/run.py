@@ -133,7 +133,7 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
     """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
 
     Args:
-        out: Folder of the sweep. If the sweep has begun, simulators keep their styles, and the protocol its paths.
+        out: Folder of the sweep. If the sweep has begun, simulators keep their styles.
         resources: Files for answers and costs.
 
     Raises:
@@ -145,17 +145,7 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
         perception=sweep.perceptions[cell.perception].component(),
         decision=decision.component(cell.seed, resources, _recorded_backend(out, "decision", cell.decision)),
     )
-    protocol = sweep.protocol.config()
-    if sweep.protocol.reference_in_room is None and _is_of_earlier_version(out):
-        protocol = replace(protocol, reference_in_room=False)
-    return sweep.config(cell.seed, backend, decision, protocol)
-
-
-def _is_of_earlier_version(out: Path) -> bool:
-    """Return true if a sweep was begun before reference paths had to end in the target's room."""
-    if not (out / SWEEP_NAME).exists():
-        return False
-    return any("reference_in_room" not in cell["run"]["protocol"] for cell in read_claim(out)["cells"].values())
+    return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
 
 
 def _recorded_backend(out: Path, axis: str, name: str) -> Mapping[str, Any] | None:

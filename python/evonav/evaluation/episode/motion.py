@@ -144,15 +144,14 @@ class Planner:
             corners = self._path_near(target_m)
         return [(x_m, z_m) for x_m, _, z_m in corners.tolist()]
 
-    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: Rooms | None, room_id: str) -> list[Point2]:
+    def into_room_m(self, path_m: list[Point2], target_m: Point2, house: Rooms, room_id: str) -> list[Point2]:
         """Return corners to the free point of a target's room that is nearest to the target.
 
         Args:
             path_m: Path to the nearest free point of the house, which may lie behind a wall. It is returned if it ends
                 in the room, or if no path leads there.
-            house: House of the stage; `None` returns `path_m`, as in runs of earlier versions.
         """
-        if house is None or not path_m or house.room_of(*path_m[-1]) == room_id:
+        if not path_m or house.room_of(*path_m[-1]) == room_id:
             return path_m
         pose = self._simulator.pose
         free_m, _ = _by_distance(_free_cells_m(self._simulator.occupancy()), target_m)

@@ -43,8 +43,7 @@ class StageHouse:
     def path_to_target_m(self) -> list[motion.Point2]:
         """Return the planner's path from the agent to the target; empty if there is none."""
         x_m, _, z_m = self.target_m
-        # The rooms stay the same when the house changes.
-        house = self._spec.parsed_house(self._number) if self._protocol.reference_in_room else None
+        house = self._spec.parsed_house(self._number)  # the rooms stay the same when the house changes
         path_m = self.planner.path_m((x_m, z_m))
         return self.planner.into_room_m(path_m, (x_m, z_m), house, self._target_room_id)
 

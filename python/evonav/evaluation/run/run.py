@@ -4,7 +4,7 @@ import hashlib
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +171,6 @@ def evaluate_all(
 def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_errored: bool) -> RunJobs:
     """Claim a run's folder and return the jobs that are left."""
     with RunStore(request.run_dir, create=True) as store:
-        request = _as_begun(request, store)
         _claim(store, request)
         if retry_errored:
             _forget_errored(store, request)
@@ -295,7 +294,7 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
     return {
         "evonav": __version__,
         "seed": config.seed,
-        "protocol": config.protocol.header(),
+        "protocol": asdict(config.protocol),
         "backend": config.backend.identity(),
         "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
@@ -318,15 +317,6 @@ def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
     with RunStore(run_dir) as store:
         config = store.meta("config")
     return config.get("backend") if isinstance(config, dict) else None
-
-
-def _as_begun(request: RunRequest, store: RunStore) -> RunRequest:
-    """Return a request whose run, where an earlier version began it, keeps that version's reference paths."""
-    stored = store.meta("config")
-    if stored is None or "reference_in_room" in stored["protocol"]:
-        return request
-    protocol = replace(request.config.protocol, reference_in_room=False)
-    return replace(request, config=replace(request.config, protocol=protocol))
 
 
 def _claim_models(store: RunStore, request: RunRequest) -> None:
