@@ -12,15 +12,12 @@ from typer.testing import CliRunner
 
 import evonav
 from evonav.cli import app
-from evonav.decision.change_notice import CHANGE_NOTICE
-from evonav.decision.prompts import Prompt, Text, Turn
+from evonav.decision.prompts import CHANGE_NOTICE, Prompt, Text, Turn
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.replay.replay import RunReplay
-from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import KEY, check_request, serving
 
 COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--isolation", "none")
@@ -149,7 +146,7 @@ def _only_task(run_dir: Path) -> str:
     return task_id
 
 
-def test_a_model_is_told_of_changes_in_all_prompts_or_in_none_and_old_runs_keep_theirs(tmp_path: Path) -> None:
+def test_a_model_is_told_of_changes_in_all_prompts_or_in_none(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
         assert stub.requests is not None
@@ -163,20 +160,6 @@ def test_a_model_is_told_of_changes_in_all_prompts_or_in_none_and_old_runs_keep_
         stub.requests.clear()
         evonav.evaluate("3d-mem", "ftu", decision=model, out=out, **common)
         assert not any("moved" in text for text in _texts(stub.requests))
-        with RunStore(out) as store:  # as such a run was recorded before there was the option
-            config = store.meta("config")
-            assert config["backend"]["decision_options"].pop("tells_of_change") is False
-            store.set_meta("config", config)
-        stub.requests.clear()
-        evonav.evaluate("fu", decision=model, out=out, **common)
-        former = "searches a home in which things may have been moved since they were last seen. Choose"
-        assert all(former in text for text in _texts(stub.requests))
-        with bundled_tasks() as tasks:
-            task_id = _only_task(out)
-            (stage,) = RunReplay(out, lambda name: tasks / name).episode("fu", task_id, last_stage=1)
-        questions = [question for shown in stage.rounds for question in shown.questions]
-        assert questions
-        assert all(any(former in part for _, part in one.parts if isinstance(part, str)) for one in questions)
 
 
 def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) -> None:

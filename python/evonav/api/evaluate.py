@@ -18,7 +18,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, check_decision
 from evonav.evaluation.run.decision_resources import DecisionResources, SpendingSettings
-from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
+from evonav.evaluation.run.run import RunRequest, evaluate_all
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
 from evonav.evaluation.run.settings_model import Settings
@@ -92,12 +92,11 @@ def evaluate(
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
     decisions.check()
-    recorded = recorded_backend(folder)
-    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_episodes), recorded)
+    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_episodes))
     if not decisions.asks_rules:
         check_decision(model, seed)
     backend = Backend(
-        simulator=simulation.component(recorded),
+        simulator=simulation.component(),
         perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),
         decision=model,
     )

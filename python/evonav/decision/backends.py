@@ -82,7 +82,7 @@ def vlm(
     price: Sequence[float] | None = None,
     max_cost_usd: float | None = None,
     noise: Mapping[str, float] | None = None,
-    tells_of_change: bool | None = None,
+    tells_of_change: bool = False,
     goal_input: GoalInput = "text",
     relay: int | None = None,
 ) -> DecisionModel:
@@ -170,7 +170,7 @@ def own(
     ledger: str | None = None,
     account: str | None = None,
     noise: Mapping[str, float] | None = None,
-    tells_of_change: bool | None = None,
+    tells_of_change: bool = False,
     goal_input: GoalInput = "text",
 ) -> DecisionModel:
     """Make a model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
@@ -217,13 +217,13 @@ def counting(
     images: bool = True,
     request: Mapping[str, Any] | None = None,
     noise: Mapping[str, float] | None = None,
-    tells_of_change: bool | None = None,
+    tells_of_change: bool = False,
     goal_input: GoalInput = "text",
 ) -> DecisionModel:
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
     client = VlmClient(vlm_config(model, request))
     is_json = structured != "off"
-    name, is_informed = str(seed), tells_of_change
+    name = str(seed)
     counted = Counting(
         TextMatch(),
         client,
@@ -231,7 +231,7 @@ def counting(
         name,
         needs_images=images,
         is_json=is_json,
-        tells_of_change=is_informed,
+        tells_of_change=tells_of_change,
         goal_input=goal_input,
     )
     return _with_noise(counted, noise, seed)

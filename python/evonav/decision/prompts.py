@@ -8,6 +8,9 @@ from evonav.decision.goal_input import PictureGoal
 from evonav.decision.pictures import Picture as Picture
 from evonav.tasks.public import Goal
 
+CHANGE_NOTICE = "Things in this home may have been moved since the robot last saw them."
+"""The sentence with which all prompts of an informed model begin, whatever the agent."""
+
 
 @dataclass(frozen=True, slots=True)
 class Text:
@@ -59,6 +62,17 @@ class Prompt:
         """Return the prompt that follows an answer."""
         turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
         return Prompt(turns, self.schema)
+
+
+def with_notice(prompt: Prompt, *, tells_of_change: bool) -> Prompt:
+    """Return a prompt as a model is shown it: if it is informed of changes, `CHANGE_NOTICE` comes first.
+
+    The paper's agents are not informed of changes (Sec. 4.1), so that by default no prompt says it.
+    """
+    if not tells_of_change:
+        return prompt
+    first, *others = prompt.turns
+    return Prompt((Turn(first.role, (Text(CHANGE_NOTICE), *first.parts)), *others), prompt.schema)
 
 
 def goal_prompt(goal: Goal, *contents: str | tuple[str, Picture | None]) -> Prompt:

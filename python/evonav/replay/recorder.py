@@ -14,8 +14,8 @@ from PIL import Image
 from evonav.agents.agent import Agent, Belief
 from evonav.agents.explanation import inspectable
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.change_notice import with_notice
 from evonav.decision.pictures import Picture
+from evonav.decision.prompts import with_notice
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
 from evonav.evaluation.episode.outcome import StageOutcome
@@ -69,7 +69,7 @@ class Recorder:
         *,
         keeps_depth: bool = False,
         shift: Shift | None = None,
-        tells_of_change: bool | None = False,
+        tells_of_change: bool = False,
     ) -> None:
         """Start without rounds.
 
@@ -178,7 +178,7 @@ class Recorder:
 
     def _question(self, entry: QueryLogEntry) -> ReplayedQuestion:
         parts: list[tuple[str, str | bytes]] = []
-        for turn in with_notice(entry.question.prompt(), self._tells_of_change).turns:
+        for turn in with_notice(entry.question.prompt(), tells_of_change=self._tells_of_change).turns:
             for part in turn.parts:
                 shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
                 parts.append((turn.role, shown))

@@ -15,7 +15,6 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.component import import_callable
-from evonav.decision.change_notice import recorded_notice
 from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
@@ -156,7 +155,7 @@ class RunReplay:
                     self._heading_px,
                     keeps_depth=self._keeps_depth,
                     shift=None if case.shift_m is None else Shift(*case.shift_m),
-                    tells_of_change=recorded_notice(self.backend.decision.path, self.backend.decision.options),
+                    tells_of_change=bool(self.backend.decision.options.get("tells_of_change")),
                 )
                 perception = self.backend.perception.create()
                 episode = Episode(

@@ -129,11 +129,10 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
     return task_files(folder, tasks.limit, tasks.subset)
 
 
-def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResources | None) -> RunConfig:
+def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:
     """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
 
     Args:
-        out: Folder of the sweep. If the sweep has begun, simulators keep their styles.
         resources: Files for answers and costs.
 
     Raises:
@@ -141,19 +140,11 @@ def config_of(sweep: SweepFile, cell: Cell, out: Path, resources: DecisionResour
     """
     decision = sweep.decisions[cell.decision]
     backend = Backend(
-        simulator=sweep.simulators[cell.simulator].component(_recorded_backend(out, "simulator", cell.simulator)),
+        simulator=sweep.simulators[cell.simulator].component(),
         perception=sweep.perceptions[cell.perception].component(),
-        decision=decision.component(cell.seed, resources, _recorded_backend(out, "decision", cell.decision)),
+        decision=decision.component(cell.seed, resources),
     )
     return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
-
-
-def _recorded_backend(out: Path, axis: str, name: str) -> Mapping[str, Any] | None:
-    """Return the parts of the runs with a simulator, or a decision model, in a sweep that has begun."""
-    if not (out / SWEEP_NAME).exists():
-        return None
-    cells = read_claim(out)["cells"].values()
-    return next((cell["run"]["backend"] for cell in cells if cell["axes"].get(axis) == name), None)
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:
@@ -162,7 +153,7 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
         CellRun(
             cell,
             RunRequest(
-                cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, out, None)
+                cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, None)
             ),
         )
         for cell in cells

@@ -1,14 +1,14 @@
 """Build the decision model of a command, and print what its model costs."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from evonav.cli.options.settings import MODEL_PANEL
 
 if TYPE_CHECKING:  # the command must start fast
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from evonav.component import Component
     from evonav.decision.question import DecisionModel
@@ -36,7 +36,6 @@ def decision_component(
     seed: int,
     num_askers: int,
     *,
-    recorded: "Mapping[str, Any] | None" = None,
     dry_run: bool = False,
 ) -> "Component[DecisionModel]":
     """Return the component of the decision model, after a check that it can be asked from here.
@@ -47,7 +46,6 @@ def decision_component(
         out: Folder of the run, which stores answers and costs.
         seed: The run's.
         num_askers: Number of episodes that may ask the model at once.
-        recorded: Header of the parts of a run that is resumed.
         dry_run: Return a model that cannot be asked, for estimates.
 
     Raises:
@@ -64,7 +62,7 @@ def decision_component(
         for flag in (name for name, is_given in flags.items() if is_given):
             raise typer.BadParameter(f"--{flag} is for --decision vlm")
     resources = None if dry_run else DecisionResources.of_run(out, spending, num_askers)
-    decision = decisions.component(seed, resources, recorded)
+    decision = decisions.component(seed, resources)
     if resources is not None and not decisions.asks_rules:
         check_decision(decision, seed)
     return decision

@@ -125,20 +125,18 @@ def evaluate(
     Results go to FOLDER/runs/ARM. Run again with other agents to add them.
     """
     from evonav.controlled.evaluate import evaluate_controlled
-    from evonav.controlled.layout import read_controlled, run_of
+    from evonav.controlled.layout import read_controlled
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import recorded_backend
     from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
     simulation = SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets)
     run = run.with_episodes([decisions], [simulation])
     workforce = run.workforce()
-    recorded = recorded_backend(run_of(directory, record.arms[0].name))
     backend = Backend(
-        simulator=simulation.component(recorded),
+        simulator=simulation.component(),
         perception=perception.component(),
-        decision=decision_component(decisions, spending, directory, seed, run.num_episodes, recorded=recorded),
+        decision=decision_component(decisions, spending, directory, seed, run.num_episodes),
     )
     names = names_of(agent)
 

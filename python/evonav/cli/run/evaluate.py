@@ -94,7 +94,7 @@ def evaluate(
     OUT`.
     """
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunRequest, evaluate_all, recorded_backend
+    from evonav.evaluation.run.run import RunRequest, evaluate_all
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
@@ -109,13 +109,10 @@ def evaluate(
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
     run = run.with_episodes([decisions], [simulation])
     workforce = run.workforce()
-    recorded = recorded_backend(out)
     backend = Backend(
-        simulator=simulation.component(recorded),
+        simulator=simulation.component(),
         perception=perception.component(),
-        decision=decision_component(
-            decisions, spending, out, seed, run.num_episodes, recorded=recorded, dry_run=dry_run
-        ),
+        decision=decision_component(decisions, spending, out, seed, run.num_episodes, dry_run=dry_run),
     )
     config = run.config(seed, backend, decisions)
     config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))

@@ -2,8 +2,8 @@
 
 from typing import TypeVar
 
-from evonav.decision.change_notice import with_notice
 from evonav.decision.goal_input import GoalInput
+from evonav.decision.prompts import with_notice
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.decision import with_schema
@@ -27,7 +27,7 @@ class Counting:
         *,
         needs_images: bool,
         is_json: bool,
-        tells_of_change: bool | None = False,
+        tells_of_change: bool = False,
         goal_input: GoalInput = "text",
     ) -> None:
         """Count the questions to `model`.
@@ -52,7 +52,7 @@ class Counting:
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the model's answer."""
-        prompt = with_notice(question.prompt(), self._tells_of_change)
+        prompt = with_notice(question.prompt(), tells_of_change=self._tells_of_change)
         if self._is_json:
             prompt = with_schema(prompt, question.answer_schema())
         used = Usage(self._client.estimate(prompt).input_tokens, OUTPUT_TOKENS)

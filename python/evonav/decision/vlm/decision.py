@@ -10,9 +10,8 @@ import json
 from collections.abc import Mapping
 from typing import Any, Literal, TypeVar
 
-from evonav.decision.change_notice import with_notice
 from evonav.decision.goal_input import GoalInput, check_goal_input
-from evonav.decision.prompts import Prompt, Text, Turn
+from evonav.decision.prompts import Prompt, Text, Turn, with_notice
 from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.caching_client import CachingClient
@@ -56,7 +55,7 @@ class VlmDecision:
         *,
         structured: Structured = "auto",
         needs_images: bool = True,
-        tells_of_change: bool | None = False,
+        tells_of_change: bool = False,
         goal_input: GoalInput = "text",
     ) -> None:
         """Create a decision model.
@@ -113,7 +112,7 @@ class VlmDecision:
 
     def _ask(self, question: Question[A], attempt: int) -> tuple[Answer, bool]:
         """Return the answer, and whether JSON was requested."""
-        plain = with_notice(question.prompt(), self.tells_of_change)
+        plain = with_notice(question.prompt(), tells_of_change=self.tells_of_change)
         if self.structured == "off":
             return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())

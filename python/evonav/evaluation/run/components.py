@@ -22,20 +22,15 @@ from evonav.evaluation.hosting.process import AgentHosting, check_importable
 from evonav.evaluation.hosting.processes import new_fork_server
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
-from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style, vertical_fov_deg
+from evonav.world.simulator import Simulator, SimulatorConfig, vertical_fov_deg
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
-
-
-def drawn_in(style: Style) -> dict[str, Style]:
-    """Return the options of a simulator that draws in a style; headers of runs without one mean `outlined`."""
-    return {} if style == OUTLINED else {"style": style}
 
 
 USUAL_CAMERA = {"width_px": 300, "height_px": 300, "hfov_deg": 90.0}
 """The camera of runs whose headers do not say another one: options of simulators, with AI2-THOR's defaults."""
 EMBEDDED: Component[Simulator] = Component(
-    "evonav.evaluation.run.components:embedded_simulator", drawn_in(SimulatorConfig().style)
+    "evonav.evaluation.run.components:embedded_simulator", {"style": SimulatorConfig().style}
 )
 TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
 TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
@@ -213,18 +208,18 @@ def check_decision(decision: Component[DecisionModel], seed: int) -> None:
         check()
 
 
-def embedded_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA`
-    """Make evonav's own simulator, with AI2-THOR's defaults; headers of runs without a style mean `outlined`."""
+def embedded_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - `style` and those of `USUAL_CAMERA`
+    """Make evonav's own simulator, with AI2-THOR's defaults."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(_config(style=style, **camera), recent=RECENT_HOUSES)
+    return EmbeddedSimulator(_config(**options), recent=RECENT_HOUSES)
 
 
-def lenient_simulator(style: Style = OUTLINED, **camera: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA`
+def lenient_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - `style` and those of `USUAL_CAMERA`
     """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
-    return EmbeddedSimulator(_config(style=style, **camera), allow_unknown_assets=True, recent=RECENT_HOUSES)
+    return EmbeddedSimulator(_config(**options), allow_unknown_assets=True, recent=RECENT_HOUSES)
 
 
 def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `USUAL_CAMERA` and `Ai2ThorOptions`

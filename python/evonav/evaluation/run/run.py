@@ -2,7 +2,7 @@
 
 import hashlib
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.evaluation.records.store import FILE_NAME, RunStore, holds_run
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_names, check_sandbox
 from evonav.evaluation.run.decision_resources import fold_logs
 from evonav.evaluation.run.program import PROGRAM
@@ -304,19 +304,6 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
 
 def _digest_of(tasks: Sequence[TaskFile]) -> str:
     return hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest()
-
-
-def recorded_backend(run_dir: Path) -> Mapping[str, Any] | None:
-    """Return what the header of the run in a folder says of its parts (`Backend.identity`); `None` without a run.
-
-    Raises:
-        StoreError: The run cannot be read.
-    """
-    if not holds_run(run_dir):
-        return None
-    with RunStore(run_dir) as store:
-        config = store.meta("config")
-    return config.get("backend") if isinstance(config, dict) else None
 
 
 def _claim_models(store: RunStore, request: RunRequest) -> None:

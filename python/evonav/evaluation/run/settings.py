@@ -16,11 +16,11 @@ from evonav.decision.goal_input import GoalInput
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.errors import StoreError
-from evonav.evaluation.run.components import USUAL_CAMERA, drawn_in
+from evonav.evaluation.run.components import USUAL_CAMERA
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
-from evonav.world.simulator import OUTLINED, Simulator, SimulatorConfig, Style
+from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
     from evonav.evaluation.run.decision_resources import DecisionResources
@@ -45,13 +45,13 @@ class SimulatorSettings(Settings):
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     style: Style | None = None
-    """Embedded: style of colours: outlined, plain or default. Default: default; a resumed run keeps its own."""
+    """Embedded: style of colours: outlined, plain or default. Default: default."""
     width_px: int | None = Field(default=None, ge=32, le=4096)
-    """Width of camera images in pixels. Default: 300; a resumed run keeps its own."""
+    """Width of camera images in pixels. Default: 300."""
     height_px: int | None = Field(default=None, ge=32, le=4096)
-    """Height of camera images in pixels. Default: 300; a resumed run keeps its own."""
+    """Height of camera images in pixels. Default: 300."""
     hfov_deg: float | None = Field(default=None, ge=30.0, le=150.0)
-    """Horizontal field of view of the camera in degrees. Default: 90; a resumed run keeps its own."""
+    """Horizontal field of view of the camera in degrees. Default: 90."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
     executable: str | None = None
@@ -68,21 +68,14 @@ class SimulatorSettings(Settings):
     """AI2-THOR: seconds to wait for an answer before it is restarted; starting may take three times as long.
     Default: 100."""
 
-    def component(self, recorded: Mapping[str, Any] | None = None) -> Component[Simulator]:
+    def component(self) -> Component[Simulator]:
         """Return the component of this simulator; options that are not given keep its own defaults.
-
-        Args:
-            recorded: Header of the parts of a run that is resumed (`recorded_backend`). It keeps its style and camera,
-                unless others are asked for.
 
         Raises:
             SettingError: An option does not apply to the simulator.
         """
         name = "ai2thor" if self.kind == "ai2thor" else "lenient" if self.allow_unknown_assets else "embedded"
         path = f"{_COMPONENTS}:{name}_simulator"
-        stored = None
-        if recorded is not None and recorded.get("simulator") == path:
-            stored = recorded.get("simulator_options", {})
         shared = {"kind", "allow_unknown_assets", "style", *USUAL_CAMERA}
         given = self.model_dump(exclude=shared, exclude_none=True)
         if self.kind == "ai2thor":
@@ -90,22 +83,15 @@ class SimulatorSettings(Settings):
             if self.style is not None:
                 raise SettingError(type(self), "style", "is for simulator embedded")
             host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
-            return Component(path, {**given, **self._camera(stored or {})}, host_options)
+            return Component(path, {**given, **self._camera()}, host_options)
         if given:
             raise SettingError(type(self), next(iter(given)), "is for simulator ai2thor")
-        return Component(path, {**self._drawing(stored), **self._camera(stored or {})})
+        return Component(path, {"style": self.style or SimulatorConfig().style, **self._camera()})
 
-    def _drawing(self, stored: Mapping[str, Any] | None) -> Mapping[str, Any]:
-        """Return the options of the drawing: without a style, a header says `outlined`."""
-        if stored is not None and self.style in (None, stored.get("style", OUTLINED)):
-            return {key: value for key, value in stored.items() if key == "style"}
-        return drawn_in(self.style or SimulatorConfig().style)
-
-    def _camera(self, stored: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _camera(self) -> Mapping[str, Any]:
         """Return the options of the camera, where they are not the usual ones."""
         given = self.model_dump(include=set(USUAL_CAMERA), exclude_none=True)
-        camera = {key: given.get(key, stored.get(key, usual)) for key, usual in USUAL_CAMERA.items()}
-        return {key: value for key, value in camera.items() if value != USUAL_CAMERA[key]}
+        return {key: value for key, value in given.items() if value != USUAL_CAMERA[key]}
 
 
 class PerceptionSettings(Settings):
@@ -261,7 +247,7 @@ class DecisionSettings(Settings):
             SettingError: No model is named.
         """
         changed: dict[str, Any] = {"noise": dict(self.noise)} if self.noise else {}
-        if self.goal_input != "text":  # headers of runs before there was the option mean text
+        if self.goal_input != "text":
             changed["goal_input"] = self.goal_input
         if self.kind == "text":
             return changed
@@ -280,17 +266,13 @@ class DecisionSettings(Settings):
         how = {"structured": self.structured, "images": self.images, "tells_of_change": self.tell_of_change}
         return {"model": model, **how, "request": request, **changed}
 
-    def component(
-        self, seed: int, resources: "DecisionResources | None", recorded: Mapping[str, Any] | None = None
-    ) -> Component[DecisionModel]:
+    def component(self, seed: int, resources: "DecisionResources | None") -> Component[DecisionModel]:
         """Return the component of this decision model.
 
         Args:
             seed: The run's.
             resources: The files for answers and costs; without them the model cannot be asked, which is
                 enough for estimates.
-            recorded: Header of the parts of a run that is resumed. If it is older than `tell_of_change`, its prompts
-                stay as they were, unless the setting is given.
 
         Raises:
             InvalidArgumentError: A setting is invalid.
@@ -301,8 +283,6 @@ class DecisionSettings(Settings):
         if self.asks_rules:
             return Component(f"evonav.decision.backends:{RULES[self.kind]}", options)
         path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'own'}"
-        if not self.tell_of_change and _is_silent_on_change(recorded or {}, path):
-            del options["tells_of_change"]
         if resources is None:
             return Component(path, options)
         host_options: dict[str, Any] = {
@@ -356,11 +336,6 @@ class DecisionSettings(Settings):
             "mode": "auto" if mode == "record" else mode,
             "keeps_images": self.exchange_images,
         }
-
-
-def _is_silent_on_change(recorded: Mapping[str, Any], path: str) -> bool:
-    """Return whether a run's header names this decision model, and is older than `DecisionSettings.tell_of_change`."""
-    return recorded.get("decision") == path and "tells_of_change" not in recorded.get("decision_options", {})
 
 
 def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON

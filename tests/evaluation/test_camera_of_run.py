@@ -1,4 +1,4 @@
-"""A run that is resumed keeps the style and the camera with which it was begun."""
+"""The camera of a run is what was asked for, wherever its actions are executed."""
 
 import math
 from pathlib import Path
@@ -16,29 +16,12 @@ from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.world.simulator import SimulatorConfig
 
 
-@pytest.mark.parametrize("options", [{}, {"simulator_options": {"style": "outlined"}}])
-def test_a_resumed_run_keeps_the_style_that_its_header_means(options: dict[str, object]) -> None:
-    path = SimulatorSettings().component().path
-    recorded = {"simulator": path, **options}
-    for said in (SimulatorSettings(), SimulatorSettings(style="outlined")):
-        assert said.component(recorded).identity("simulator") == recorded
-        assert said.component(recorded).create().config.style == "outlined"
-    lit = {"simulator": path, "simulator_options": {"style": "default"}}
-    assert SimulatorSettings().component(lit).identity("simulator") == lit
-    assert SimulatorSettings(style="default").component(recorded).options == {"style": "default"}
-    assert SimulatorSettings().component().create().config.style == SimulatorConfig().style
-
-
-def test_a_resumed_run_keeps_its_camera() -> None:
-    wide = SimulatorSettings(hfov_deg=120.0, width_px=400).component()
-    assert wide.options == {"style": "default", "hfov_deg": 120.0, "width_px": 400}
-    recorded = wide.identity("simulator")
-    assert SimulatorSettings().component(recorded) == wide
-    assert SimulatorSettings(style="plain").component(recorded).options == {**wide.options, "style": "plain"}
-    assert SimulatorSettings(hfov_deg=90.0, width_px=300).component(recorded).options == {"style": "default"}
+def test_a_header_names_the_style_and_what_is_unusual_of_the_camera() -> None:
+    wide = SimulatorSettings(hfov_deg=120.0, width_px=400)
+    assert wide.component().options == {"style": "default", "hfov_deg": 120.0, "width_px": 400}
+    assert wide.model_copy(update={"style": "plain"}).component().options["style"] == "plain"
     assert SimulatorSettings(hfov_deg=90.0, height_px=300).component() == SimulatorSettings().component()
 
 
