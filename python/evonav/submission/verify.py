@@ -340,8 +340,9 @@ def _rescore(
     on_progress: Callable[[int, int], None],
 ) -> Iterator[str]:
     header = file.header
-    backend = header.config.get("backend")
-    simulator = str(backend.get("simulator")) if isinstance(backend, dict) else ""
+    stated = header.config.get("backend")
+    backend: dict[str, Any] = stated if isinstance(stated, dict) else {}
+    simulator = str(backend.get("simulator", ""))
     module, _, name = simulator.partition(":")
     if module != Backend.__module__ or name not in _OUR_SIMULATORS:
         yield f"simulator {simulator!r}: actions can be replayed only in evonav's own simulator (see --scores-only)"

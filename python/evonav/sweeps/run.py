@@ -172,7 +172,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
         run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_askers=sweep.num_episodes
     )
     try:
-        config = config_of(sweep, run.cell, out, resources)
+        config = config_of(sweep, run.cell, resources)
         check_decision(config.backend.decision, run.cell.seed)
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error

@@ -68,7 +68,6 @@ def perception(
     from evonav.evaluation.run.settings import PerceptionSettings, SimulatorSettings
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
-    from evonav.perception_benchmark.records import read_header
     from evonav.perception_benchmark.tables import perception_tables
 
     names = perceptions or ["gt"]
@@ -78,7 +77,6 @@ def perception(
     for word in names:
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
-    there = read_header(out)
     simulation = SimulatorSettings(allow_unknown_assets=allow_unknown_assets)
     with interruptible(out), chosen_tasks(tasks, limit, subset) as task_files:
         with progress_bar("tours") as on_progress:
@@ -87,7 +85,7 @@ def perception(
                 task_files,
                 out,
                 config=TourConfig(views_per_room, houses_per_task, seed),
-                simulator=simulation.component(None if there is None else there.identity),
+                simulator=simulation.component(),
                 num_workers=workers.num_workers,
                 on_progress=on_progress,
             )
