@@ -1,82 +1,39 @@
-"""Tabulate what agents did, by their own counters and by how stages ended: it shows why one is ahead of another."""
+"""Tabulate how stages ended and why they failed: it shows why one agent is ahead of another."""
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
-from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedRun
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
-from evonav.report.tables.numbers import NONE, percent
+from evonav.report.tables.numbers import percent
 from evonav.report.tables.table import Table
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
 """Names of the paper's strata."""
 
 
-@dataclass(slots=True)
-class BehaviourCounts:
-    """Counts of one agent."""
-
-    counters: Counter[str] = field(default_factory=Counter)
-    """Over all tasks."""
-    ends: Counter[str] = field(default_factory=Counter)
-    """Scored stages by why the agent stopped."""
-    num_stages: int = 0
-
-
-def behaviour_of(run: RecordedRun) -> dict[str, BehaviourCounts]:
-    """Return counters and stop reasons of every agent.
+def ends_of(run: RecordedRun) -> dict[str, Counter[str]]:
+    """Count the scored stages of every agent by why it stopped.
 
     Raises:
         StoreError: The run cannot be read.
     """
-    found = {agent: BehaviourCounts() for agent in run.agents}
+    found: dict[str, Counter[str]] = {agent: Counter() for agent in run.agents}
     for task in run.tasks():
-        for agent in run.agents:
-            records = [record for (name, _), record in sorted(task.records.items()) if name == agent]
-            _add(found[agent], records)
+        for (agent, _), record in task.records.items():
+            if record.is_scored:
+                found[agent][record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
     return found
 
 
-def _add(behaviour: BehaviourCounts, records: Sequence[StageRecord]) -> None:
-    # Counters count over a task; an agent that was lost on the way began anew.
-    last: Counter[str] = Counter()
-    lost_at: int | None = None
-    for record in records:
-        if record.is_scored:
-            behaviour.num_stages += 1
-            behaviour.ends[record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
-        if record.memory_lost_at != lost_at:
-            behaviour.counters.update(last)
-            last, lost_at = Counter(), record.memory_lost_at
-        if record.trace:
-            last = Counter(record.trace[-1].counters)
-    behaviour.counters.update(last)
-
-
-def counter_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
-    """Tabulate every counter, summed over tasks."""
-    names = sorted({name for one in behaviour.values() for name in one.counters})
-    rows = tuple(
-        (
-            name.replace("_", " "),
-            *(str(one.counters[name]) if name in one.counters else NONE for one in behaviour.values()),
-        )
-        for name in names
-    )
-    return Table("What agents counted", ("Counter", *behaviour), rows, ("Sums over all tasks.",))
-
-
-def end_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
+def end_table(ends: Mapping[str, Counter[str]]) -> Table:
     """Tabulate scored stages by why they ended."""
-    total: Counter[str] = Counter()
-    for one in behaviour.values():
-        total.update(one.ends)
-    rows = tuple((reason, *(str(one.ends[reason]) for one in behaviour.values())) for reason, _ in total.most_common())
+    total = sum(ends.values(), Counter[str]())
+    rows = tuple((reason, *(str(one[reason]) for one in ends.values())) for reason, _ in total.most_common())
     return Table(
         "How stages ended",
-        ("The agent stopped for", *behaviour),
+        ("The agent stopped for", *ends),
         rows,
         ("Budget: the agent used all its rounds without calling stop.",),
     )

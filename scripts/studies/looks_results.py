@@ -54,7 +54,7 @@ def parts(text: RecordedRun, looks: RecordedRun) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plot."""
     given = {agent: list(last_probabilities(looks, agent)) for agent in looks.agents}
     write_plots([reliability_plot(given)], PLOT)
-    picture = f"![Share of stages that succeeded by stated probability](images/{PLOT.name})"
+    picture = f"![Share of stages that succeeded by stated probability](../images/{PLOT.name})"
     return {
         "looks": comparison_table(text, looks).markdown(),
         "looks-probabilities": f"{picture}\n\n{probability_table(given).markdown()}",

@@ -3,7 +3,7 @@
     python scripts/studies/measure_fidelity.py $EVONAV_DATA
 
 Everything goes through the published client, an `ai2thor.controller.Controller` that drives the engine; nothing is
-fitted here. `docs/simulator-fidelity.md` says what the figures mean, `tests/thor/test_thor_fidelity.py` holds them.
+fitted here. The study says what the figures mean, `tests/thor/test_thor_fidelity.py` holds them.
 """
 
 import argparse

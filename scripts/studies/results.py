@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from behaviour_tables import STRATA, behaviour_of, cause_share_table, counter_table, end_table, success_by_group
+from behaviour_tables import STRATA, cause_share_table, end_table, ends_of, success_by_group
 
 from evonav.component import Component
 from evonav.evaluation.agent_order import PAPER_ORDER
@@ -114,7 +114,6 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plot."""
     run = load_run(out / "main")
     small = [load_run(folder)] if (folder := out / "small").exists() else []
-    behaviour = behaviour_of(run)
     main_table, relocation, far, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
     errors = ""
@@ -137,8 +136,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
             f"**{title.capitalize()}**\n\n{cause_share_table(run, stratum).markdown()}"
             for stratum, title in STRATA.items()
         ),
-        "ends": end_table(behaviour).markdown(),
-        "counters": counter_table(behaviour).markdown(),
+        "ends": end_table(ends_of(run)).markdown(),
         "effort": effort_table(run).markdown(),
         "errors": errors,
     } | (small_parts(small[0]) if small else {})
@@ -146,14 +144,11 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
 
 def small_parts(run: RecordedRun) -> dict[str, str]:
     """The marked parts on small houses."""
-    main_table, relocation, far, first, order, differences = paper_tables(run)
+    main_table, relocation, *_, differences = paper_tables(run)
     return {
         "small-setting": setting_table(run).markdown(),
         "small-1": main_table.markdown(),
         "small-2": relocation.markdown(),
-        "small-2-far": far.markdown(),
-        "small-first": first.markdown(),
-        "small-order": order.markdown(),
         "small-differences": differences.markdown(),
     }
 

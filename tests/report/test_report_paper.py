@@ -9,7 +9,7 @@ import looks_results
 import numpy as np
 import perception_results
 import pytest
-from behaviour_tables import behaviour_of, cause_share_table, counter_table, end_table, success_by_group
+from behaviour_tables import cause_share_table, end_table, ends_of, success_by_group
 from made_up_run import WriteRun, entry, record_run, stage_map, stage_record
 from scipy import stats
 from typer.testing import CliRunner
@@ -257,25 +257,18 @@ def test_latex_compiles_where_there_is_a_tex(write_run: WriteRun, tmp_path: Path
     assert (tmp_path / "page.pdf").stat().st_size > 1000
 
 
-def counted(record, **counters):
-    last = record.trace[-1].model_copy(update={"counters": counters})
-    return record.model_copy(update={"trace": (*record.trace[:-1], last), "stop_reason": "arrived"})
-
-
-def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tmp_path: Path) -> None:
+def test_ends_and_causes_are_counted_over_tasks(tmp_path: Path) -> None:
     success, failure = EndState.SUCCESS, EndState.FAILURE
     stale = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
-    began_anew = stage_record("fu", "b", 2, failure, has_stopped=False).model_copy(update={"memory_lost_at": 2})
-    records = [
-        counted(stage_record("fu", "a", 1, success), decisions=4, edges=6),
-        counted(stage_record("fu", "a", 2, failure, chosen=stale), decisions=9, edges=5),  # one was dropped
-        counted(stage_record("fu", "b", 1, success), decisions=7, edges=0),
-        counted(began_anew, decisions=8, edges=1),
+    arrived = [
+        stage_record("fu", "a", 1, success),
+        stage_record("fu", "a", 2, failure, chosen=stale),
+        stage_record("fu", "b", 1, success),
     ]
+    records = [record.model_copy(update={"stop_reason": "arrived"}) for record in arrived]
+    records.append(stage_record("fu", "b", 2, failure, has_stopped=False))
     run = load_run(record_run(tmp_path / "run", records, {"a": 2, "b": 2}, ["fu"]))
-    behaviour = behaviour_of(run)
-    assert counter_table(behaviour).rows == (("decisions", "24"), ("edges", "6"))
-    assert end_table(behaviour).rows == (("arrived", "3"), ("budget", "1"))
+    assert end_table(ends_of(run)).rows == (("arrived", "3"), ("budget", "1"))
     shares = {row[0]: row[1] for row in cause_share_table(run, "relocated").rows}
     assert shares == {"n": "2", "success": "0.0", "stopped at a stale entry": "50.0", "target never in view": "50.0"}
     assert success_by_group(run, {"a": "x", "b": "x"}) == {"x": {"fu": (2, 4)}}
