@@ -15,7 +15,6 @@ from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.hosting import wire
 from evonav.agents.proactive.agent import Proactive
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting.shifted import Shift
 from evonav.evaluation.metrics.belief import MIN_P, belief_summary, calibration, place_score
 from evonav.evaluation.records.base import PlacesRecord
 from evonav.evaluation.records.schema import StageRecord
@@ -59,12 +58,6 @@ def test_an_impossible_presence_is_refused(p):
     entry = EntryBelief(1, "Mug", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 1, p)
     with pytest.raises(InvalidArgumentError, match=r"p_present|must be 0 to 1"):
         wire.ENTRIES.read(wire.ENTRIES.write([entry]))
-
-
-def test_places_are_recorded_in_the_house_s_coordinates():
-    shifted = Shift(40.0, -50.0).unshifted_diagnostics(RoundDiagnostics(places=PLACES))
-    assert shifted.places.centres_m[0] == (0.25 - 40.0, 0.25 + 50.0)
-    assert Shift(40.0, -50.0).unshifted_diagnostics(RoundDiagnostics()).places is None
 
 
 def test_the_place_of_the_target_is_scored():

@@ -166,11 +166,7 @@ class RoundDiagnostics:
     counters: dict[str, int] = field(default_factory=dict)
     """Cumulative counts, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
     details: dict[str, Any] = field(default_factory=dict)
-    """Further JSON-ready values.
-
-    `[x, z]` or `[x, y, z]` under a name that ends in `position_m`, `centre_m`, `goal_m`, `mid_term_m` or `path_m` is a
-    place, also in lists: where agents are told shifted places, records hold it in the house's own coordinates.
-    """
+    """Further JSON-ready values."""
     places: PlaceBelief | None = None
     """Belief of where the target is. That of a stage's first round is recorded and scored."""
 

@@ -21,7 +21,6 @@ from evonav.decision.question import Question
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.staleness import entry_record, matched_object
 from evonav.evaluation.hosting.process import AgentFailedError
-from evonav.evaluation.hosting.shifted import Shift
 from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord
 from evonav.replay.types import (
@@ -68,7 +67,6 @@ class Recorder:
         heading_px: int | None = None,
         *,
         keeps_depth: bool = False,
-        shift: Shift | None = None,
         tells_of_change: bool = False,
     ) -> None:
         """Start without rounds.
@@ -78,12 +76,10 @@ class Recorder:
             losses: Losses of the agent's process, by stage: there the agent does not act.
             heading_px: Longer edge of the heading views, where pages' own size is too small.
             keeps_depth: Keep depth images, too.
-            shift: The shift of all places that the agent is told, if they are shifted.
             tells_of_change: True if the run's prompts say that things may have been moved, see `with_notice`.
         """
         self._tells_of_change = tells_of_change
         self._keeps_depth = keeps_depth
-        self._shift = shift
         self.agent = agent
         self._on_round = on_round
         self._losses = losses or {}
@@ -161,7 +157,7 @@ class Recorder:
         if agent is None:
             return seen
         try:
-            belief = agent.belief() if self._shift is None else self._shift.unshifted_belief(agent.belief())
+            belief = agent.belief()
             _, bodies = self._places[-1]
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(

@@ -18,14 +18,13 @@ from evonav.component import import_callable
 from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.spec import EpisodeSpec, drawn_shift_m, opaque_task_id
-from evonav.evaluation.hosting.shifted import Shift
+from evonav.evaluation.episode.spec import EpisodeSpec, opaque_task_id
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.record_diff import record_differences
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, make_agent
-from evonav.evaluation.run.run import NAMES_KEY, SHIFT_KEY, agent_seed, perception_seed
+from evonav.evaluation.run.run import NAMES_KEY, agent_seed, perception_seed
 from evonav.evaluation.run.settings import EXCHANGES_NAME
 from evonav.perception.weights import MODELS_VARIABLE
 from evonav.replay.recorder import Loss, Recorder
@@ -75,7 +74,6 @@ class RunReplay:
             self.seed = int(config["seed"])
             self.protocol = ProtocolConfig(**config["protocol"])
             backend = Backend.from_identity(config["backend"])
-            self._is_shifted = bool(config.get(SHIFT_KEY))
         except (KeyError, TypeError, ValueError) as error:
             raise StoreError(f"{run_dir}: header of the run: {type(error).__name__}: {error}") from error
         if models is not None and MODELS_VARIABLE not in os.environ and Path(models).is_dir():
@@ -126,7 +124,6 @@ class RunReplay:
         case = replace(
             self.backend.tasks.create(self._task_path(task_id)),
             opaque_id=opaque_task_id(self._secret, task_id),
-            shift_m=drawn_shift_m(self._secret, agent, task_id) if self._is_shifted else None,
         )
         for stage in self._stages(case, agent, stored, maps, on_round):
             yield replace(stage, differences=_differences(texts.get(stage.record.stage), stage))
@@ -154,7 +151,6 @@ class RunReplay:
                     losses,
                     self._heading_px,
                     keeps_depth=self._keeps_depth,
-                    shift=None if case.shift_m is None else Shift(*case.shift_m),
                     tells_of_change=bool(self.backend.decision.options.get("tells_of_change")),
                 )
                 perception = self.backend.perception.create()

@@ -6,7 +6,6 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.components import USUAL_CAMERA, Backend
-from evonav.evaluation.run.run import SHIFT_KEY
 from evonav.evaluation.run.settings import RULES
 from evonav.perception.shorthand import word_of
 from evonav.submission.file import Submission
@@ -30,10 +29,7 @@ class PackedSetup:
     simulator: str
     """Simulator and camera, unless they are the usual ones."""
     isolation: str
-    """The agents' `--isolation`; several if the run was continued with another.
-
-    Ends in `shifted coordinates` if agents were told shifted places.
-    """
+    """The agents' `--isolation`; several if the run was continued with another."""
 
 
 def camera_of(backend: Mapping[str, Any]) -> dict[str, Any]:
@@ -67,13 +63,8 @@ def packed_setup(header: Submission) -> PackedSetup:
         decision=",".join([kind, *rates]),
         model=str(decision.get("model", decision.get("path", ""))),
         simulator=",".join([simulator, *camera] if camera or simulator != _SIMULATOR else []),
-        isolation=_isolation(header.config),
+        isolation=str(header.config.get("isolation") or ""),
     )
-
-
-def _isolation(config: Mapping[str, Any]) -> str:
-    noted = str(config.get("isolation") or "")
-    return ", ".join(filter(None, [noted, "shifted coordinates" if config.get(SHIFT_KEY) is True else ""]))
 
 
 def _mapping(value: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON

@@ -157,7 +157,6 @@ def _run_options(name: str) -> Options | None:
                 "isolation",
                 "agent_timeout_s",
                 "agent_memory_mb",
-                "shift_coordinates",
             ),
         ),
         "changes": Options(RunSettings, WORKER_PANEL, fields=evaluators, overrides=True),

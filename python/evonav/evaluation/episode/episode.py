@@ -15,7 +15,6 @@ from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, Stage
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent
-from evonav.evaluation.hosting.shifted import Shift, ShiftedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import LEVELS, Stopwatch
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
@@ -46,7 +45,7 @@ class Episode:
         self._agent_name = agent_name
         self._context = EpisodeContext(
             spec,
-            *_hosted(agent, spec),
+            *_hosted(agent),
             simulator,
             perception,
             protocol,
@@ -112,7 +111,7 @@ class Episode:
 
     def replace_agent(self, agent: Agent) -> None:
         """Use another agent from the next stage on, as after the loss of a process; for replays in one process."""
-        hosted, baseline = _hosted(agent, self._spec)
+        hosted, baseline = _hosted(agent)
         self._context = replace(self._context, agent=hosted, baseline=baseline)
         self._is_replaced = True
 
@@ -121,13 +120,11 @@ class Episode:
         return self._own_cpu_s() + self._context.agent.cpu_s
 
 
-def _hosted(agent: Agent | HostedAgent, spec: EpisodeSpec) -> tuple[HostedAgent, OracleBaseline | None]:
-    """Return the agent as a stage asks it, and itself if it is an oracle baseline, which is told true places."""
+def _hosted(agent: Agent | HostedAgent) -> tuple[HostedAgent, OracleBaseline | None]:
+    """Return the agent as a stage asks it, and itself if it is an oracle baseline."""
     hosted = agent if isinstance(agent, HostedAgent) else LocalAgent(agent)
     baseline = agent if isinstance(agent, OracleBaseline) and _is_own(agent) else None
-    if spec.shift_m is None or baseline is not None:
-        return hosted, baseline
-    return ShiftedAgent(hosted, Shift(*spec.shift_m)), None
+    return hosted, baseline
 
 
 def _is_own(baseline: OracleBaseline) -> bool:

@@ -27,10 +27,6 @@ from evonav.world.pose import Pose
 
 THUMBNAIL_PX = 160
 """Edge of the reference image in a floor plan."""
-LEAST_SHIFT_M = 32
-"""Least shift along an axis: wider than the bundled houses (30.5 m), so it leads out of each of them."""
-NUM_SHIFTS = 32
-"""Number of lengths of a shift, in each direction; a shift is less than 64 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +85,6 @@ class EpisodeSpec:
     stages: tuple[StageSpec, ...] = field(repr=False)
     opaque_id: str = "task"
     """The name that agents are given instead of `task_id`: see `opaque_task_id`."""
-    shift_m: Point2 | None = None
-    """`(x, z)` by which all places that the agent is told are shifted: see `drawn_shift_m`; `None` tells true ones."""
 
     def parsed_house(self, stage: int) -> House:
         """Parse the house as it is in a stage (1-based).
@@ -216,23 +210,3 @@ def opaque_task_id(secret: str, task_id: str) -> str:
         task_id: The task's id, which names the house and the generator's seed.
     """
     return hmac.new(secret.encode(), task_id.encode(), hashlib.sha256).hexdigest()[:16]
-
-
-def drawn_shift_m(secret: str, agent: str, task_id: str) -> Point2:
-    """Return the `(x, z)` by which all places that an agent is told in an episode are shifted.
-
-    It is the same in a run that is resumed or replayed. Names of tasks have the same key and other messages, so neither
-    tells the other.
-
-    Shifts are whole metres: exact in binary, and multiples of the cells and voxels that agents use (0.05, 0.1 and
-    0.25 m), so these divide the house as without a shift. The starts of episodes, multiples of 0.25 m, are shifted
-    without rounding. Shifts are short, because object memories hold points in single precision, which rounds by up to
-    4 micrometres between 64 and 128 m.
-
-    Args:
-        secret: The run's own, from its header.
-        agent: The name by which the agent was requested.
-    """
-    digest = hmac.new(secret.encode(), f"shift\0{agent}\0{task_id}".encode(), hashlib.sha256).digest()
-    x_m, z_m = ((LEAST_SHIFT_M + byte % NUM_SHIFTS) * (1.0 if byte & 128 else -1.0) for byte in digest[:2])
-    return x_m, z_m

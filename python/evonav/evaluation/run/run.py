@@ -10,7 +10,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.spec import drawn_shift_m, opaque_task_id
+from evonav.evaluation.episode.spec import opaque_task_id
 from evonav.evaluation.hosting.isolation import isolation_facts
 from evonav.evaluation.hosting.model_relay import is_relayed
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
@@ -34,9 +34,7 @@ from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import TaskFile
 
 NAMES_KEY = "key_of_names"
-"""Place in a run's header of the secret key of agents' names of tasks and of shifts; nothing shows it."""
-SHIFT_KEY = "shift_coordinates"
-"""Place in a run's configuration of whether agents are told shifted places; it is there only if they are."""
+"""Place in a run's header of the secret key of agents' names of tasks; nothing shows it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +51,6 @@ class RunConfig:
     """
     hosting: AgentHosting = field(default_factory=AgentHosting)
     """The process in which agents run; with `num_workers=0`, it is always this one."""
-    shift_coordinates: bool = False
-    """Whether agents are told all places shifted, by a length drawn for each episode."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +180,6 @@ def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_er
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
     names = {task.task_id: opaque_task_id(secret, task.task_id) for task in request.tasks}
-    is_shifted = config.shift_coordinates
     # An agent's process may count its episodes: in the order of the tasks' ids, the number would tell the task.
     for task in sorted(request.tasks, key=lambda task: names[task.task_id]):
         stages = range(1, task.num_stages + 1)
@@ -198,7 +193,6 @@ def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_er
                 str(task.path.absolute()),
                 agent_seed(config.seed, agent, task.task_id),
                 perception_seed(config.seed, task.task_id),
-                drawn_shift_m(secret, agent, task.task_id) if is_shifted else None,
                 sends_floor_plans=are_missing and number == 0,
             )
             for number, agent in enumerate(agents)
@@ -298,7 +292,6 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "backend": config.backend.identity(),
         "tasks": _digest_of(tasks),
         "num_tasks": len(tasks),
-        **({SHIFT_KEY: True} if config.shift_coordinates else {}),
     }
 
 

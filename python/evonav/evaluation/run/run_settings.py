@@ -23,7 +23,7 @@ VLM_EPISODES_AT_ONCE = 16
 
 
 class RunSettings(Settings):
-    """The workers of a run, the limits of its agents, and its retries; only `shift_coordinates` decides records."""
+    """The workers of a run, the limits of its agents, and its retries; none of it decides records."""
 
     workers: int | None = Field(default=None, ge=0)
     """Number of worker processes; 0 runs in this process. Default: one per core."""
@@ -41,8 +41,6 @@ class RunSettings(Settings):
     isolation: Isolation | None = None
     """The process of agents: the evaluator's, their own, or their own without files of tasks and network (Linux).
     Default: sandbox where this machine has one, else process."""
-    shift_coordinates: bool = False
-    """Tell agents all places shifted, by whole metres drawn for each episode."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
     """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
@@ -125,7 +123,6 @@ class RunSettings(Settings):
                 self.agent_memory_mb,
                 is_sandboxed=isolation == "sandbox",
             ),
-            shift_coordinates=self.shift_coordinates,
         )
 
     def _usual_isolation(self, backend: "Backend") -> Isolation:

@@ -17,7 +17,7 @@ import json
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from inspect import GEN_CLOSED, getgeneratorstate
@@ -77,8 +77,6 @@ class EpisodeJob:
     """The agent's."""
     perception_seed: int
     """The perception's."""
-    shift_m: Sequence[float] | None = None
-    """`(x, z)` by which places are shifted for the agent; `None` tells true ones."""
     sends_floor_plans: bool = False
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
@@ -295,9 +293,8 @@ class EpisodeWork:
         with self._used(config_text) as context:
             job, num_left = EpisodeJob(**json.loads(head)), _Retries(context.config.num_retries)
             try:
-                shift_m = None if job.shift_m is None else (job.shift_m[0], job.shift_m[1])
                 task = context.task(job.path)
-                spec = replace(task.spec, opaque_id=job.opaque_id, shift_m=shift_m)
+                spec = replace(task.spec, opaque_id=job.opaque_id)
                 is_whole = False
                 while not is_whole:
                     is_whole = True
