@@ -14,8 +14,8 @@ from evonav.tasks.listing import task_files
 def test_a_limit_requires_and_replays_only_the_first_tasks(tmp_path: Path) -> None:
     with bundled_tasks() as folder:
         evaluate(["ftu"], task_files(folder, 2), tmp_path / "two", num_workers=0)
-    pack(tmp_path / "two", tmp_path / "two.zip")
-    words = ["verify", str(tmp_path / "two.zip"), "--workers", "0", "--limit"]
+    pack(tmp_path / "two", tmp_path / "two.gz")
+    words = ["verify", str(tmp_path / "two.gz"), "--workers", "0", "--limit"]
     for limit, code, told in (
         ("1", 0, "verified 1 of 2 tasks"),
         ("2", 0, "accepted"),

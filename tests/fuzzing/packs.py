@@ -1,13 +1,14 @@
 """Fuzz packed runs: whatever `verify` accepts claims the scores of the honest run, and nothing else happens."""
 
 import copy
+import gzip
 import json
 import random
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from forged_pack import ForgedPack, line_of, rescored, zipped
+from forged_pack import ForgedPack, line_of, rescored
 from mutation import json_bytes, mutated_bytes, mutated_json
 
 from evonav.evaluation.run import components
@@ -31,7 +32,7 @@ class Packs:
     @classmethod
     def made_in(cls, folder: Path) -> "Packs":
         components.load_case = lru_cache(components.load_case)  # the task to verify with is always the same
-        path = folder / "honest.zip"
+        path = folder / "honest.gz"
         with bundled_tasks() as bundled:
             tasks = task_files(bundled, 1)
             evaluate(["ftu"], tasks, folder / "run", num_workers=0)
@@ -41,7 +42,7 @@ class Packs:
         return cls(folder, path.read_bytes(), ForgedPack.of(path), tasks, json.dumps(verdict.summary))
 
     def case(self, draws: random.Random) -> bytes:
-        """Return a mutated file; in most cases its checksums are right, and in some its scores."""
+        """Return a mutated file; in most cases it is whole gzip, and in some its scores are right."""
         kind = draws.randrange(5)
         if kind == 0:
             return mutated_bytes(self.honest, draws)
@@ -49,18 +50,15 @@ class Packs:
         parts = ForgedPack(copy.deepcopy(self.parts.header), [rows])
         lines = [line_of(row) for row in rows]
         if kind == 1:
-            header = json_bytes(mutated_json(parts.header, draws))
-            return self._zipped(header, b"".join(line + b"\n" for line in lines))
+            return self._packed([json_bytes(mutated_json(parts.header, draws)), *lines])
         if kind == 2:
-            member = mutated_bytes(b"".join(line + b"\n" for line in lines), draws)
-            return self._zipped(parts.told([member]), member)
+            return gzip.compress(mutated_bytes(gzip.decompress(self.honest), draws), 1)
         at = draws.randrange(len(rows))
         rows[at] = mutated_json(rows[at], draws)
         if kind == 4:
             _make_consistent(parts, at)
         lines[at] = json_bytes(rows[at])
-        member = b"".join(line + b"\n" for line in lines)
-        return self._zipped(parts.told([member]), member)
+        return self._packed([line_of(parts.header), *lines])
 
     def run(self, data: bytes) -> str:
         """Verify a file; return the first check that it fails, or `accepted`.
@@ -70,7 +68,7 @@ class Packs:
         Raises:
             AssertionError: It is accepted and has other scores than the honest one.
         """
-        path = self.folder / "case.zip"
+        path = self.folder / "case.gz"
         path.write_bytes(data)
         verdict = verify(path, self.tasks, scores_only=True)
         if verdict.is_accepted and json.dumps(verdict.summary) != self.summary:
@@ -80,9 +78,8 @@ class Packs:
             return "accepted"
         return next(check.name for check in verdict.checks if not check.is_passed)
 
-    def _zipped(self, header: bytes, member: bytes) -> bytes:
-        contents = {"submission.json": header, "records/1.jsonl": member}
-        return zipped(self.folder / "made.zip", contents).read_bytes()
+    def _packed(self, lines: list[bytes]) -> bytes:
+        return self.parts.write(self.folder / "made.gz", lines).read_bytes()
 
 
 def _make_consistent(parts: ForgedPack, at: int) -> None:

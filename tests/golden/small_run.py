@@ -15,7 +15,6 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -67,12 +66,11 @@ def differences(part: str, found: Digests) -> list[str]:
 def _six_agents(out: Path) -> Iterator[tuple[str, str]]:
     _evonav("evaluate", "--agent", SIX_AGENTS, "--limit", 2, "--workers", 2, "--out", out)
     yield from _run(out)
-    packed = out.with_suffix(".zip")
+    packed = out.with_suffix(".evonav.jsonl.gz")
     _evonav("pack", out, "--out", packed)
-    with zipfile.ZipFile(packed) as members:
-        for member in members.namelist():
-            content = members.read(member)
-            yield f"pack/{member}", _of_json(json.loads(content)) if member.endswith(".json") else _of_bytes(content)
+    header, records = gzip.decompress(packed.read_bytes()).split(b"\n", 1)
+    yield "pack/header", _of_json(json.loads(header))
+    yield "pack/records", _of_bytes(records)
 
 
 def _imperfect(out: Path) -> Iterator[tuple[str, str]]:

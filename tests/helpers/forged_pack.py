@@ -1,9 +1,8 @@
-"""Take packed runs apart and put them together again as a forger would, who corrects every checksum and score."""
+"""Take packed runs apart and put them together again as a forger would, who corrects every score."""
 
-import hashlib
+import gzip
 import json
 import re
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from evonav.submission.verify import Verdict
 
 
 def line_of(row: dict[str, Any]) -> bytes:
-    """A record as evonav writes it, if its values are."""
+    """A header or record as evonav writes it, if its values are."""
     return json.dumps(row, separators=(",", ":"), ensure_ascii=False).encode()
 
 
@@ -30,40 +29,29 @@ class ForgedPack:
 
     @classmethod
     def of(cls, path: Path) -> "ForgedPack":
-        with zipfile.ZipFile(path) as archive:
-            header = json.loads(archive.read("submission.json"))
-            members = [archive.read(part["member"]) for part in header["records"]]
-        return cls(header, [[json.loads(line) for line in member.splitlines()] for member in members])
+        header, *rows = map(json.loads, gzip.decompress(path.read_bytes()).splitlines())
+        return cls(header, [[row for row in rows if row["agent"] == agent] for agent in header["agents"]])
 
-    def members(self) -> list[bytes]:
-        return [b"".join(line_of(row) + b"\n" for row in mine) for mine in self.rows]
-
-    def told(self, members: list[bytes]) -> bytes:
-        """The header with the checksums of members."""
-        for part, member in zip(self.header["records"], members, strict=True):
-            part |= {"num_bytes": len(member), "sha256": hashlib.sha256(member).hexdigest()}
-        return json.dumps(self.header).encode()
+    def lines(self) -> list[bytes]:
+        """The header, and each record."""
+        return [line_of(self.header), *(line_of(row) for mine in self.rows for row in mine)]
 
     def claim(self) -> None:
         """Claim the scores that follow from the records."""
         records = {
-            part["agent"]: [StageRecord.model_validate(row, strict=False) for row in mine]
-            for part, mine in zip(self.header["records"], self.rows, strict=True)
+            agent: [StageRecord.model_validate(row, strict=False) for row in mine]
+            for agent, mine in zip(self.header["agents"], self.rows, strict=True)
         }
-        self.header["summary"] = packed_summary(records, sum(task["num_stages"] for task in self.header["tasks"]))
+        summary = packed_summary(records, sum(task["num_stages"] for task in self.header["tasks"]))
+        self.header["summary"] = summary
 
-    def write(self, path: Path, *, header: bytes | None = None, members: list[bytes] | None = None) -> Path:
-        """Write the pack; a header or members may be given as bytes, from which checksums are computed."""
-        members = self.members() if members is None else members
-        header = self.told(members) if header is None else header
-        return zipped(path, {"submission.json": header, **{f"records/{n}.jsonl": m for n, m in enumerate(members, 1)}})
+    def write(self, path: Path, lines: list[bytes] | None = None) -> Path:
+        """Write the pack, or these lines in place of its own."""
+        return gzipped(path, b"".join(line + b"\n" for line in (self.lines() if lines is None else lines)))
 
 
-def zipped(path: Path, contents: dict[str, bytes]) -> Path:
-    """Write an archive; a large member is stored as it is, because a few repeated bytes would be suspiciously small."""
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in contents.items():
-            archive.writestr(name, data, zipfile.ZIP_STORED if len(data) > 200_000 else zipfile.ZIP_DEFLATED)
+def gzipped(path: Path, data: bytes) -> Path:
+    path.write_bytes(gzip.compress(data, 1))
     return path
 
 

@@ -22,8 +22,8 @@ def packed(tmp_path_factory: pytest.TempPathFactory, tasks: list[TaskFile]) -> P
     """Two agents on two tasks."""
     folder = tmp_path_factory.mktemp("packed")
     evaluate(["fu", "ftu"], tasks, folder / "run", num_workers=0)
-    pack(folder / "run", folder / "run.zip")
-    return folder / "run.zip"
+    pack(folder / "run", folder / "run.gz")
+    return folder / "run.gz"
 
 
 @pytest.fixture

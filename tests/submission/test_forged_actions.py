@@ -78,7 +78,7 @@ def test_the_actions_tell_what_scores_do_not(
     rescored(row)
     assert line_of(row) != before
     parts.claim()
-    path = parts.write(tmp_path / "f.zip")
+    path = parts.write(tmp_path / "f.gz")
     assert verify(path, tasks, limit=1, scores_only=True).is_accepted, "the forger's scores follow"
     assert_rejected(verify(path, tasks, limit=1), "actions", reason)
 
@@ -88,4 +88,4 @@ def test_no_other_simulator_is_taken_from_a_file(
     parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path, simulator: str
 ) -> None:
     parts.header["config"]["backend"]["simulator"] = simulator
-    assert_rejected(verify(parts.write(tmp_path / "f.zip"), tasks), "actions", "only in evonav's own simulator")
+    assert_rejected(verify(parts.write(tmp_path / "f.gz"), tasks), "actions", "only in evonav's own simulator")

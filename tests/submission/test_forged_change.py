@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from forged_pack import ForgedPack, assert_rejected, rescored
+from forged_pack import ForgedPack, assert_rejected, line_of, rescored
 
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, tasks: list[TaskFile]) -> Path
 
 @pytest.fixture(scope="module")
 def packed(run: Path) -> Path:
-    path = run.with_suffix(".zip")
+    path = run.with_suffix(".gz")
     pack(run, path)
     return path
 
@@ -139,8 +139,8 @@ FORGERIES: dict[str, tuple[Callable[[Row], None], str]] = {
 
 def written(parts: ForgedPack, folder: Path) -> Path:
     """The pack with its lines as evonav writes them; JSON of Python writes small numbers in another way."""
-    lines = [[StageRecord.model_validate(row, strict=False).to_json() for row in mine] for mine in parts.rows]
-    return parts.write(folder / "f.zip", members=["".join(f"{line}\n" for line in mine).encode() for mine in lines])
+    records = [StageRecord.model_validate(row, strict=False) for mine in parts.rows for row in mine]
+    return parts.write(folder / "f.gz", [line_of(parts.header), *(record.to_json().encode() for record in records)])
 
 
 def changed_row(pack: ForgedPack) -> Row:

@@ -1,9 +1,8 @@
 """Packed runs whose headers somebody has tampered with: `verify` rejects each of them, for the right reason.
 
-The forger corrects all checksums, and where it says so all scores that follow from what was altered.
+Where it says so, the forger corrects all scores that follow from what was altered.
 """
 
-import copy
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ from typing import Any
 import pytest
 from forged_pack import ForgedPack, assert_rejected, rescored
 
-from evonav.submission.file import MAX_VALUES
 from evonav.submission.verify import verify
 from evonav.tasks.listing import TaskFile
 
@@ -25,7 +23,7 @@ def test_a_forger_that_alters_nothing_is_accepted(parts: ForgedPack, tasks: list
             rescored(row)
             assert row == before
     parts.claim()
-    assert verify(parts.write(tmp_path / "same.zip"), tasks, scores_only=True).is_accepted
+    assert verify(parts.write(tmp_path / "same.gz"), tasks, scores_only=True).is_accepted
 
 
 def setting(*path: str | int, value: Any) -> Forge:
@@ -62,12 +60,12 @@ def last_task_dropped(parts: ForgedPack) -> None:
 
 
 def no_agents(parts: ForgedPack) -> None:
-    parts.header["records"], parts.rows = [], []
+    parts.header["agents"], parts.rows = [], []
     parts.claim()
 
 
 def agent_twice(parts: ForgedPack) -> None:
-    parts.header["records"][1]["agent"] = "fu"
+    parts.header["agents"][1] = "fu"
     parts.rows[1] = parts.rows[0]
 
 
@@ -108,19 +106,20 @@ HEADERS: dict[str, tuple[Forge, str, str]] = {
     "the last task left out": (last_task_dropped, "tasks", "only the first 1 of 2"),
     "no agents": (no_agents, "complete", "no agent"),
     "an agent twice": (agent_twice, "complete", "fu is there twice"),
-    "an oracle": (setting("records", 0, "agent", value="shortest-path"), "complete", "oracle baseline"),
-    "another name": (setting("records", 0, "agent", value="mine"), "complete", "a record of fu"),
-    "control characters": (setting("records", 0, "agent", value="fu\x1b[2J"), "file", "agent: .*printable"),
-    "a long name": (setting("records", 0, "agent", value="f" * 10**6), "file", "agent: .*1000 characters"),
-    "a member elsewhere": (setting("records", 0, "member", value="../../evil"), "file", "expected records/1.jsonl"),
-    "members exchanged": (setting("records", 0, "member", value="records/2.jsonl"), "file", "expected records/1.jsonl"),
+    "an oracle": (setting("agents", 0, value="shortest-path"), "complete", "oracle baseline"),
+    "another name": (setting("agents", 0, value="mine"), "complete", "fu .* instead of mine"),
+    "control characters": (setting("agents", 0, value="fu\x1b[2J"), "file", "agents.0: .*printable"),
+    "a long name": (setting("agents", 0, value="f" * 10**6), "file", "agents.0: .*1000 characters"),
+    "agents exchanged": (lambda parts: parts.header["agents"].reverse(), "complete", "fu .* instead of ftu"),
+    "an agent more": (lambda parts: parts.header["agents"].append("me"), "complete", "14 records of 21 stages"),
+    "an agent less": (lambda parts: parts.header["agents"].pop(), "complete", "14 records of 7 stages"),
     "another format": (setting("format_version", value=2), "file", "format_version"),
     "an unknown field": (setting("surprise", value=1), "file", "surprise: Extra"),
     "a field less": (lambda parts: parts.header.pop("config"), "file", "config: Field required"),
     "a number as text": (setting("tasks", 0, "num_stages", value="4"), "file", "num_stages: .*valid integer"),
     "no stages": (setting("tasks", 0, "num_stages", value=0), "file", "num_stages"),
     "a checksum that is none": (setting("tasks", 0, "digest", value="../x"), "file", "digest"),
-    "NaN in the configuration": (setting("config", "seed", value=float("nan")), "file", "NaN: numbers must be finite"),
+    "NaN in the configuration": (setting("config", "seed", value=float("nan")), "file", "not as evonav writes"),
     "claimed success": (setting("summary", "agents", "fu", "sr", value=0.999), "scores", "agents.fu.sr is 0.999"),
     "claimed interval": (setting("summary", "agents", "fu", "spl_ci95", value=[0.9, 1.0]), "scores", "spl_ci95"),
     "claimed count": (setting("summary", "agents", "fu", "n", value=10**300), "scores", "agents.fu.n is 1000"),
@@ -134,49 +133,9 @@ HEADERS: dict[str, tuple[Forge, str, str]] = {
 def test_a_forged_header_is_rejected(parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path, name: str) -> None:
     forge, check, reason = HEADERS[name]
     forge(parts)
-    verdict = verify(parts.write(tmp_path / "f.zip"), tasks, scores_only=True)
+    verdict = verify(parts.write(tmp_path / "f.gz"), tasks, scores_only=True)
     assert_rejected(verdict, check, reason)
     assert max(len(one.detail) for one in verdict.checks) < 3000
-
-
-HEADER_TEXTS = {
-    "a key twice": (lambda text: text.replace(b"{", b'{"evonav": "9.9", ', 1), "'evonav' is there twice"),
-    "infinity": (lambda text: text.replace(b'"seed": 0', b'"seed": 1e999'), "1e999: numbers must be finite"),
-    "nesting": (lambda text: text.replace(b'"seed": 0', b'"seed": ' + b"[" * 10**5 + b"]" * 10**5), "recursion limit"),
-    "too many values": (
-        lambda text: text.replace(b'"seed": 0', b'"seed": [' + b"0," * MAX_VALUES + b"0]"),
-        "2000000 val",
-    ),
-    "too large": (lambda text: text + b" " * (9 << 20), "the limit is"),
-    "half of it": (lambda text: text[: len(text) // 2], "Invalid JSON"),
-    "no JSON": (lambda _: b"\xff\xfe", "Invalid JSON"),
-    "a list": (lambda _: b"[]", "object"),
-    "nothing": (lambda _: b"", "Invalid JSON"),
-    "half of a letter": (lambda text: text.replace(b'"title": ""', b'"title": "\\ud800"'), "Invalid JSON"),
-}
-
-
-@pytest.mark.parametrize("name", HEADER_TEXTS)
-def test_a_header_in_other_bytes_is_rejected(
-    parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path, name: str
-) -> None:
-    forge, reason = HEADER_TEXTS[name]
-    members = parts.members()
-    before = parts.told(members)
-    after = forge(before)
-    assert after != before
-    forged = parts.write(tmp_path / "f.zip", header=after, members=members)
-    assert_rejected(verify(forged, tasks, scores_only=True), "file", reason)
-
-
-def test_intervals_of_an_older_summary_are_not_told(parts: ForgedPack, tasks: list[TaskFile], tmp_path: Path) -> None:
-    """Version 1 of the summary had other intervals, which are not compared: those of the records are told instead."""
-    true = copy.deepcopy(parts.header["summary"])
-    parts.header["summary"]["schema_version"] = 1
-    parts.header["summary"]["agents"]["fu"]["sr_ci95"] = [0.99, 1.0]
-    verdict = verify(parts.write(tmp_path / "f.zip"), tasks, scores_only=True)
-    assert verdict.is_accepted
-    assert verdict.summary == true
 
 
 def test_only_required_tasks_are_in_the_verdicts_summary(packed: Path, tasks: list[TaskFile]) -> None:

@@ -12,7 +12,7 @@ from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
-from evonav.submission.file import About, SubmissionFile
+from evonav.submission.file import About, read_header
 from evonav.submission.pack import pack
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
@@ -30,7 +30,7 @@ def tasks() -> list[TaskFile]:
 
 
 def assert_accepted(run: Path, tasks: list[TaskFile], **options: Any) -> None:
-    target = run.with_name(f"{run.name}.zip")
+    target = run.with_name(f"{run.name}.gz")
     pack(run, target)
     for scores_only in (True, False):
         verdict = verify(target, tasks, scores_only=scores_only, **options)
@@ -56,8 +56,7 @@ def test_a_resumed_run_of_several_workers(tasks: list[TaskFile], tmp_path: Path)
         store.forget_episode("fu", tasks[1].task_id, 2)
     evaluate(["fu"], tasks[:2], tmp_path / "run", num_workers=2)
     assert_accepted(tmp_path / "run", tasks, limit=2, num_workers=2)
-    with SubmissionFile(tmp_path / "run.zip") as file:
-        assert packed_setup(file.header).isolation == "none, process"
+    assert packed_setup(read_header(tmp_path / "run.gz")).isolation == "none, process"
 
 
 def test_a_retried_run_of_an_agent_that_takes_single_steps(
@@ -88,7 +87,6 @@ def test_guided_stages(tmp_path: Path) -> None:
 def test_statements_in_any_script(tasks: list[TaskFile], tmp_path: Path) -> None:
     evaluate(["ftu"], tasks[:1], tmp_path / "run", num_workers=0)
     about = About(title="地図 \u202e <b>", authors="Å\nB", url="javascript:1", description="x" * 10**5)
-    pack(tmp_path / "run", tmp_path / "run.zip", about=about)
-    assert verify(tmp_path / "run.zip", tasks, limit=1, scores_only=True).is_accepted
-    with SubmissionFile(tmp_path / "run.zip") as file:
-        assert file.header.about == about
+    pack(tmp_path / "run", tmp_path / "run.gz", about=about)
+    assert verify(tmp_path / "run.gz", tasks, limit=1, scores_only=True).is_accepted
+    assert read_header(tmp_path / "run.gz").about == about

@@ -77,7 +77,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav pack out/run --title 'Our agent' --authors 'A. Author'",
         "evonav pack out/run --agent ftu --url https://example.org",
     ),
-    "verify": ("evonav verify out/run.evonav.zip", "evonav verify out/run.evonav.zip --tasks tasks --subset test-90"),
+    "verify": (
+        "evonav verify out/run.evonav.jsonl.gz",
+        "evonav verify out/run.evonav.jsonl.gz --tasks tasks --subset test-90",
+    ),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),
     "agents": ("evonav agents",),
     "version": ("evonav version",),

@@ -1,29 +1,36 @@
-"""Read a packed run. Nothing in it is trusted, imported or extracted to disk."""
+"""Write and read a packed run: gzip of JSON lines, first the header, then the records of each agent.
 
-import hashlib
-import json
-import math
-from collections.abc import Iterator
-from datetime import date
+Nothing in a file is trusted, imported or extracted to disk. Every line must be as evonav writes it, so that a file
+means the same to everybody.
+"""
+
+import gzip
+import stat
+import zlib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from evonav.errors import InvalidArgumentError
-from evonav.submission.archive import Archive, SubmissionError
+from evonav.errors import StoreError
+from evonav.evaluation.records.schema import StageRecord
+from evonav.parallel.folders import replacing
 from evonav.tasks.manifest import TaskId
 from evonav.tasks.records import Sha256
 
-SUFFIX = ".evonav.zip"
-HEADER_NAME = "submission.json"
+SUFFIX = ".evonav.jsonl.gz"
+MAX_TOTAL_BYTES = 2 << 30
+"""Largest file, compressed and not."""
 MAX_HEADER_BYTES = 8 << 20
 MAX_LINE_BYTES = 50_000_000
 """Longest record: what an agent may say in a stage (`evonav.agents.hosting.wire`), and 2 MB."""
 MAX_VALUES = 2_000_000
 """Largest number of JSON values in the header and in a record; a parsed value takes up to 100 times its text."""
-EPOCH = (1980, 1, 1)
-"""Day of the members' time stamps if it is not known when the run began."""
+
+
+class SubmissionError(StoreError):
+    """A file that is not a submission, or not a whole one."""
 
 
 def _printable(text: str) -> str:
@@ -48,17 +55,6 @@ class PackedTask(_Part):
     """SHA-256 of `task.json`, which holds the checksums of all other files of the task."""
 
 
-class PackedRecords(_Part):
-    """The records of one agent: a member of the archive, a line a stage."""
-
-    agent: _Name
-    member: str
-    num_bytes: int
-    """Size before compression."""
-    sha256: Sha256
-    """Checksum of the uncompressed bytes."""
-
-
 class About(_Part):
     """Statements of the submitters, which cannot be checked."""
 
@@ -70,7 +66,7 @@ class About(_Part):
 
 
 class Submission(_Part):
-    """The header of the archive."""
+    """The header of a packed run."""
 
     format_version: Literal[1] = 1
     evonav: _Name
@@ -82,96 +78,51 @@ class Submission(_Part):
     Only protocol and simulator are checked.
     """
     tasks: tuple[PackedTask, ...]
-    records: tuple[PackedRecords, ...]
+    agents: tuple[_Name, ...]
+    """The agents in the order of their records; each has a record for every stage of every task, in order."""
     summary: dict[str, Any]
     """The claimed scores: `summary.json` of these agents."""
 
-
-class SubmissionFile:
-    """An archive that claims to be a submission."""
-
-    def __init__(self, path: Path) -> None:
-        """Open the archive and read its header.
-
-        Raises:
-            SubmissionError: It is not a zip, its members are not those of a submission, or the header is malformed.
-        """
-        self.path = path
-        self._archive = Archive(path)
-        try:
-            if HEADER_NAME not in self._archive.names:
-                raise SubmissionError(f"{path}: not a submission (no {HEADER_NAME})")
-            self.header = self._read_header(self._archive.read(HEADER_NAME, MAX_HEADER_BYTES))
-            self._check_members()
-        except BaseException:
-            self.close()
-            raise
-
-    @property
-    def date(self) -> str | None:
-        """Day on which the run began, such as `2026-11-23`, by the archive's time stamps; `None` if they tell none."""
-        day = self._archive.date_of(HEADER_NAME)
-        try:
-            return None if day == EPOCH else date(*day).isoformat()
-        except ValueError:
-            return None
-
-    def __enter__(self) -> "SubmissionFile":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._archive.__exit__(None, None, None)
-
-    def texts(self, part: PackedRecords) -> Iterator[str]:
-        """Yield the lines of a member, one record each.
-
-        Raises:
-            SubmissionError: The member is not what the header says.
-        """
-        where = f"{self.path}: {part.member}"
-        digest, size = hashlib.sha256(), 0
-        for number, line in enumerate(self._archive.lines(part.member, MAX_LINE_BYTES), start=1):
-            size += len(line) + 1
-            digest.update(line)
-            digest.update(b"\n")
-            _check_values(f"{where}, line {number}", line)
-            try:
-                yield line.decode()
-            except UnicodeDecodeError as error:
-                raise SubmissionError(f"{where}, line {number}: not UTF-8") from error
-        if size != part.num_bytes or digest.hexdigest() != part.sha256:
-            raise SubmissionError(f"{where}: {size} B of another checksum than the header's")
-
-    def _read_header(self, data: bytes) -> Submission:
-        where = f"{self.path}: {HEADER_NAME}"
-        _check_values(where, data)
-        try:
-            header = Submission.model_validate_json(data)
-            json.loads(data, object_pairs_hook=_without_repetition, parse_constant=_finite, parse_float=_finite)
-        except ValidationError as error:
-            raise SubmissionError(f"{where}: {first_problem(error)}") from error
-        except InvalidArgumentError as error:
-            raise SubmissionError(f"{where}: {error}") from error
-        return header
-
-    def _check_members(self) -> None:
-        for number, part in enumerate(self.header.records, start=1):
-            if part.member != member_name(number):
-                where = f"{self.path}: {HEADER_NAME}: records.{number - 1}.member"
-                raise SubmissionError(f"{where} = {part.member[:100]!r}: expected {member_name(number)}")
-        expected = {HEADER_NAME, *(part.member for part in self.header.records)}
-        odd = sorted(set(self._archive.names) ^ expected)
-        if odd:
-            raise SubmissionError(f"{self.path}: members missing or unknown: {', '.join(map(repr, odd[:5]))}")
+    def to_json(self) -> str:
+        """Return the header as one line of JSON."""
+        return self.model_dump_json()
 
 
-def member_name(number: int) -> str:
-    """Return the name of the member with the records of an agent, from 1."""
-    return f"records/{number}.jsonl"
+_Line = TypeVar("_Line", Submission, StageRecord)
+
+
+def write_submission(path: Path, header: Submission, records: Iterable[str]) -> None:
+    """Write a packed run, whole or not at all. The same contents give the same bytes.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    with replacing(path) as beside, beside.open("wb") as raw, gzip.GzipFile("", "wb", fileobj=raw, mtime=0) as file:
+        for text in (header.to_json(), *records):
+            file.write(f"{text}\n".encode())
+
+
+def read_header(path: Path) -> Submission:
+    """Read the header of a packed run.
+
+    Raises:
+        SubmissionError: The file is no packed run, or its header is malformed.
+    """
+    for where, line in _lines(path):
+        return _parsed(where, line, Submission)
+    raise SubmissionError(f"{path}: not a submission (it is empty)")
+
+
+def read_records(path: Path) -> Iterator[tuple[StageRecord, bytes]]:
+    """Yield the records of a packed run, and their lines.
+
+    Raises:
+        SubmissionError: The file is damaged, or a line is not a record as evonav writes it.
+    """
+    lines = _lines(path)
+    next(lines, None)
+    for where, line in lines:
+        yield _parsed(where, line, StageRecord), line
 
 
 def first_problem(error: ValidationError) -> str:
@@ -182,22 +133,38 @@ def first_problem(error: ValidationError) -> str:
     return f"{place}: {message}" if place else message
 
 
-def _check_values(where: str, data: bytes) -> None:
-    number = data.count(b",") + data.count(b"[") + data.count(b"{")
-    if number > MAX_VALUES:
+def _lines(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield the lines of a file without their ends, each after its file and number, as errors name it."""
+    where, num_bytes, most = str(path), 0, MAX_HEADER_BYTES
+    try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a pipe would be waited for
+            raise SubmissionError(f"{path}: not a submission (no regular file)")
+        if found.st_size > MAX_TOTAL_BYTES:
+            raise SubmissionError(f"{path}: {found.st_size} B, the limit is {MAX_TOTAL_BYTES}")
+        with gzip.open(path) as file:
+            number = 1
+            while line := file.readline(most + 1):
+                where = f"{path}: line {number}"
+                num_bytes += len(line)
+                if not line.endswith(b"\n"):
+                    why = f"longer than {most} B" if len(line) > most else "without an end"
+                    raise SubmissionError(f"{where}: {why}")
+                if num_bytes > MAX_TOTAL_BYTES:
+                    raise SubmissionError(f"{where}: uncompressed, the limit is {MAX_TOTAL_BYTES} B")
+                yield where, line[:-1]
+                number, most = number + 1, MAX_LINE_BYTES
+    except (OSError, EOFError, zlib.error) as error:
+        raise SubmissionError(f"{where}: not a submission, or damaged ({error})") from error
+
+
+def _parsed(where: str, line: bytes, model: type[_Line]) -> _Line:
+    if line.count(b",") + line.count(b"[") + line.count(b"{") > MAX_VALUES:
         raise SubmissionError(f"{where}: more than {MAX_VALUES} values")
-
-
-def _without_repetition(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    values = dict(pairs)
-    if len(values) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidArgumentError(f"{twice[:100]!r} is there twice")
-    return values
-
-
-def _finite(text: str) -> float:
-    if not math.isfinite(float(text)):
-        raise InvalidArgumentError(f"{text[:100]}: numbers must be finite")
-    return float(text)
+    try:
+        value = model.model_validate_json(line)
+    except ValidationError as error:
+        raise SubmissionError(f"{where}: {first_problem(error)}") from error
+    if value.to_json().encode() != line:
+        raise SubmissionError(f"{where}: not as evonav writes it")
+    return value

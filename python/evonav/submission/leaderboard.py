@@ -1,16 +1,15 @@
 """Rank packed runs: each file is verified, and only agents that were evaluated alike share a table."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.metrics.navigation import AgentSummary, summarise
-from evonav.submission.archive import SubmissionError
-from evonav.submission.file import SUFFIX, Submission, SubmissionFile
+from evonav.submission.file import SUFFIX, Submission, SubmissionError, read_header
 from evonav.submission.packed_setup import PackedSetup, packed_setup
-from evonav.submission.verify import Verdict, brief, read_records, verify
+from evonav.submission.verify import Verdict, verify
 from evonav.tasks.listing import TaskFile
 
 
@@ -52,13 +51,13 @@ class Entry:
     """An agent of a file that was verified."""
 
     file: str
-    summary: AgentSummary
+    agent: str
+    rates: Mapping[str, Any]
+    """Its rates as scored again, by the names of `summary.json`."""
+    sha256: str
+    """SHA-256 of its records."""
     header: Submission
-    date: str | None
-    model: str
-    """The decision model's name, if it has one."""
-    isolation: str
-    """The agent's `--isolation`; empty if the file does not say it."""
+    setup: PackedSetup
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +119,7 @@ def rank(
     for number, path in enumerate(files):
         on_progress(number, len(files), path.name)
         try:
-            with SubmissionFile(path) as file:
-                header, date = file.header, file.date
+            header = read_header(path)
             tasks = _task_set(header, task_sets)
             known = {packed.task_id for packed in header.tasks}
             required = [task for task in tasks.tasks if task.task_id in known]
@@ -130,19 +128,19 @@ def rank(
                 board.unranked.append(reason)
                 continue
             setup = packed_setup(header)
-            entries = list(_entries(path, header, date, setup))
         except (SubmissionError, InvalidArgumentError) as error:
             board.unranked.append(Unranked(path.name, "rejected", str(error).removeprefix(f"{path}: ")))
             continue
         conditions = Conditions(tasks.sha256, setup.perception, setup.decision, setup.simulator)
-        for sha256, entry in entries:
+        for agent, sha256 in verdict.digests.items():
             if (first := seen.setdefault((conditions, sha256), path.name)) != path.name:
-                detail = f"{entry.summary.agent} has the same records as in {first}"
-                board.unranked.append(Unranked(path.name, "repeated", detail))
+                board.unranked.append(Unranked(path.name, "repeated", f"{agent} has the same records as in {first}"))
                 continue
+            assert verdict.summary is not None  # every check is passed
+            entry = Entry(path.name, agent, verdict.summary["agents"][agent], sha256, header, setup)
             board.tables.setdefault(conditions, []).append(entry)
-    for entries_of_table in board.tables.values():
-        entries_of_table.sort(key=lambda entry: (-(entry.summary.sr or 0), -(entry.summary.spl or 0), entry.file))
+    for entries in board.tables.values():
+        entries.sort(key=lambda entry: (-(entry.rates["sr"] or 0), -(entry.rates["spl"] or 0), entry.file))
     on_progress(len(files), len(files), "")
     return board
 
@@ -167,12 +165,3 @@ def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -
     if len(header.tasks) < len(tasks.tasks):
         return Unranked(path.name, "incomplete", f"{len(header.tasks)} of {len(tasks.tasks)} tasks of {tasks.name}")
     return None
-
-
-def _entries(path: Path, header: Submission, date: str | None, setup: PackedSetup) -> Iterable[tuple[str, Entry]]:
-    """Yield each agent of a verified file with the SHA-256 of its records."""
-    num_stages = sum(task.num_stages for task in header.tasks)
-    with SubmissionFile(path) as file:
-        for part in header.records:
-            summary = summarise(part.agent, [brief(record) for record in read_records(file, part)], num_stages)
-            yield part.sha256, Entry(path.name, summary, header, date, setup.model, setup.isolation)

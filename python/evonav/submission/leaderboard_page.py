@@ -1,17 +1,21 @@
 """Write a leaderboard as one self-contained page. What submitters wrote is shown as text, never as markup."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from evonav.parallel.folders import write_atomically
 from evonav.report.pages.rate_bar import rate_bar
 from evonav.report.pages.template import page_text, text_of
-from evonav.report.tables.numbers import NONE, rate
-from evonav.report.tables.table import INTERVALS
+from evonav.report.tables.numbers import percent, rate
+from evonav.report.tables.table import INTERVALS, SPLIT_TITLES
 from evonav.submission.leaderboard import Conditions, Entry, Leaderboard
 
 MAX_SHOWN = 200
 """Largest number of characters of a submitter's text that the page shows."""
+NUM_DIGITS = 12
+"""Number of the first digits of a SHA-256 that the page shows; a tooltip shows all."""
 _PERCEPTIONS = {
     "gt": "ground-truth perception",
     "noisy": "ground truth with errors",
@@ -19,11 +23,11 @@ _PERCEPTIONS = {
 }
 _DECISIONS = {
     "text": "decisions by rules",
-    "appearance": "decisions by rules that look",
+    "looks": "decisions by rules that look",
     "vlm": "decisions by a model",
     "own": "decisions by a model of its own",
 }
-_COLUMNS = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "Entry", "Model", "Seed", "Date", "evonav", "Isolation", "File")
+_SPLITS = ("relocated", "not_relocated")
 
 
 def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
@@ -41,7 +45,8 @@ def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
         text_of("report.css") + text_of("leaderboard.css"),
         text_of("sortable.js"),
         title=title,
-        columns=_COLUMNS,
+        splits=[SPLIT_TITLES[name] for name in _SPLITS],
+        num_digits=NUM_DIGITS,
         tables=[_table(board, conditions, entries) for conditions, entries in tables],
         unranked=[(short(one.file), one.status, short(one.detail, 2 * MAX_SHOWN)) for one in board.unranked],
         is_rescored=board.is_rescored,
@@ -56,9 +61,9 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> 
     decision = _DECISIONS.get(conditions.decision.partition(",")[0], conditions.decision)
     return {
         "title": f"{perception.capitalize()}, {decision}",
+        "sha256": tasks.sha256,
         "facts": [
             ("tasks", f"{tasks.name}: {len(tasks.tasks)} with {tasks.num_stages} stages"),
-            ("sha256", tasks.sha256),
             ("perception", short(conditions.perception)),
             ("decision", short(conditions.decision)),
             *([("simulator", short(conditions.simulator))] if conditions.simulator else []),
@@ -68,25 +73,29 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> 
 
 
 def _row(entry: Entry) -> dict[str, object]:
-    about, summary = entry.header.about, entry.summary
+    about, setup, rates = entry.header.about, entry.setup, entry.rates
+    url = about.url if _is_web(about.url) else None
+    facts = (
+        about.authors,
+        f"model {setup.model}" if setup.model else "",
+        f"seed {entry.header.config.get('seed')}",
+        f"isolation {setup.isolation or 'not noted'}",
+        f"evonav {entry.header.evonav}",
+        entry.file,
+    )
     return {
-        "agent": short(summary.agent),
-        "sr": rate(summary.sr, summary.sr_ci95),
-        "sr_bar": rate_bar(summary.sr, summary.sr_ci95),
-        "spl": rate(summary.spl, summary.spl_ci95),
-        "spl_bar": rate_bar(summary.spl, summary.spl_ci95),
-        "title": short(about.title) or NONE,
-        "authors": short(about.authors),
-        "url": about.url if _is_web(about.url) else None,
-        "cells": [
-            short(entry.model) or NONE,
-            short(str(entry.header.config.get("seed", NONE))),
-            entry.date or NONE,
-            short(entry.header.evonav),
-            short(entry.isolation) or NONE,
-            short(entry.file),
-        ],
+        "agent": short(entry.agent),
+        "title": short(about.title or (url or "")),
+        "url": url,
+        "facts": [short(fact) for fact in facts if fact],
+        "rates": [(rate(rates[name], rates[f"{name}_ci95"]), _bar(rates, name)) for name in ("sr", "spl")],
+        "splits": [percent(rates["splits"].get(name, {}).get("sr")) for name in _SPLITS],
+        "sha256": entry.sha256,
     }
+
+
+def _bar(rates: Mapping[str, Any], name: str) -> object:
+    return rate_bar(rates[name], rates[f"{name}_ci95"])
 
 
 def short(text: str, length: int = MAX_SHOWN) -> str:

@@ -3,32 +3,29 @@
 No file can show that an agent chose its actions by itself: for that, the agent has to be run again.
 """
 
+import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
-from evonav.submission.archive import SubmissionError
-from evonav.submission.file import PackedRecords, Submission, SubmissionFile, first_problem
-from evonav.submission.pack import packed_summary
+from evonav.submission.contradictions import TOLERANCE, change_findings, path_findings, target_findings
+from evonav.submission.file import Submission, SubmissionError, read_header, read_records
+from evonav.submission.pack import brief, packed_summary
 from evonav.submission.packed_setup import camera_of
-from evonav.submission.recorded_change import change_findings
-from evonav.submission.recorded_path import TOLERANCE, path_findings
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
@@ -63,6 +60,8 @@ class Verdict:
     """Number of tasks that were required, and whose actions were executed again."""
     summary: Mapping[str, Any] | None = None
     """The scores of the required tasks, computed from the records; `None` if they were not read to their end."""
+    digests: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of the records of each agent that were read."""
 
     @property
     def is_accepted(self) -> bool:
@@ -93,63 +92,79 @@ class _Findings:
 class _Records:
     """The records of a file, read one after the other; what scores need of them is kept."""
 
-    def __init__(self, file: SubmissionFile, known: Mapping[str, TaskFile]) -> None:
+    def __init__(self, path: Path, header: Submission, known: Mapping[str, TaskFile]) -> None:
         """Read the records of a file whose tasks are all known.
 
         Raises:
-            SubmissionError: A member is not what the header says, or a line is not a record as evonav writes it.
+            SubmissionError: The file is damaged, or a line is not a record as evonav writes it.
         """
-        self.brief: dict[str, list[StageRecord]] = {}
+        self.brief: dict[str, list[StageRecord]] = {agent: [] for agent in header.agents}
         """Records without rounds and memory, by agent."""
         self.complete, self.targets, self.paths = _Findings(), _Findings(), _Findings()
         self._known = known
-        self._protocol = ProtocolConfig(**file.header.config["protocol"])
-        self._expected = [
-            (task.task_id, stage) for task in file.header.tasks for stage in range(1, task.num_stages + 1)
-        ]
-        if not file.header.records:
-            self.complete.add(["there is no agent"])
-        for part in file.header.records:
-            if part.agent in self.brief:
-                self.complete.add([f"{part.agent} is there twice"])
-            if part.agent in ORACLE_BASELINE_NAMES:
-                self.complete.add([f"{part.agent} is an oracle baseline: it knows what agents do not"])
-            self.brief[part.agent] = self._of_agent(file, part)
+        self._protocol = ProtocolConfig(**header.config["protocol"])
+        self._spec: EpisodeSpec | None = None
+        self._before: StageRecord | None = None
+        self._sha256s = {agent: hashlib.sha256() for agent in header.agents}
+        self.complete.add(_agent_findings(header.agents))
+        self._read(path, header)
 
-    def _of_agent(self, file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
-        mine: list[StageRecord] = []
-        records, task_id, spec, before = read_records(file, part), "", None, None
-        for expected, record in zip(self._expected, records, strict=False):  # in this order: none is taken and lost
-            found = (record.task_id, record.stage)
-            if found != expected:
-                stage = f"{found[0]} stage {found[1]} instead of {expected[0]} stage {expected[1]}"
-                self.complete.add([f"not every stage of every task, once and in order: {stage}"], part.agent)
-                break
-            where = f"{part.agent} {record.task_id} stage {record.stage}"
-            if record.agent != part.agent:
-                self.complete.add([f"a record of {record.agent}"], where)
-            if not record.is_scored and record.state is not EndState.GUIDED:
-                self.complete.add([f"it is {record.state.value}"], where)
-            if record.task_id != task_id:
-                task_id, before, spec = record.task_id, None, self._spec(record.task_id)
-            if spec is not None:
-                self.targets.add(_target_findings(record, spec), where)
-                self.targets.add(change_findings(record, spec.stages[record.stage - 1], self._protocol), where)
-            self.paths.add(path_findings(record, before, self._protocol), where)
-            before = brief(record)
-            mine.append(before)
-        else:
-            num_found = len(mine) + sum(1 for _ in records)
-            if num_found != len(self._expected):
-                self.complete.add([f"{num_found} records of {len(self._expected)} stages"], part.agent)
-        return mine
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of each agent's records."""
+        return {agent: found.hexdigest() for agent, found in self._sha256s.items()}
 
-    def _spec(self, task_id: str) -> EpisodeSpec | None:
+    def _read(self, path: Path, header: Submission) -> None:
+        stages = [(task.task_id, stage) for task in header.tasks for stage in range(1, task.num_stages + 1)]
+        expected = [(agent, *stage) for agent in header.agents for stage in stages]
+        num_read, records = 0, read_records(path)
+        for wanted, (record, line) in zip(expected, records, strict=False):  # in this order: none is taken and lost
+            found = (record.agent, record.task_id, record.stage)
+            if found != wanted:
+                stage = f"{_stage_name(*found)} instead of {_stage_name(*wanted)}"
+                self.complete.add([f"not every stage of every task, once and in order: {stage}"])
+                return
+            self._sha256s[record.agent].update(line)
+            self._check(record)
+            num_read += 1
+        num_read += sum(1 for _ in records)
+        if num_read != len(expected):
+            self.complete.add([f"{num_read} records of {len(expected)} stages"])
+
+    def _check(self, record: StageRecord) -> None:
+        where = _stage_name(record.agent, record.task_id, record.stage)
+        if not record.is_scored and record.state is not EndState.GUIDED:
+            self.complete.add([f"it is {record.state.value}"], where)
+        if record.stage == 1:
+            self._before, self._spec = None, self._read_spec(record.task_id)
+        if self._spec is not None:
+            stage = self._spec.stages[record.stage - 1]
+            self.targets.add(target_findings(record, self._spec), where)
+            self.targets.add(change_findings(record, stage, self._protocol), where)
+        self.paths.add(path_findings(record, self._before, self._protocol), where)
+        self._before = brief(record)
+        self.brief[record.agent].append(self._before)
+
+    def _read_spec(self, task_id: str) -> EpisodeSpec | None:
         try:
             return Backend().tasks.create(self._known[task_id].path)
         except EvonavError as error:
             self.targets.add([f"the task to verify with cannot be read: {error}"], task_id)
             return None
+
+
+def _agent_findings(agents: Sequence[str]) -> Iterator[str]:
+    if not agents:
+        yield "there is no agent"
+    for agent, number in Counter(agents).items():
+        if number > 1:
+            yield f"{agent} is there twice"
+        if agent in ORACLE_BASELINE_NAMES:
+            yield f"{agent} is an oracle baseline: it knows what agents do not"
+
+
+def _stage_name(agent: str, task_id: str, stage: int) -> str:
+    return f"{agent} {task_id} stage {stage}"
 
 
 def verify(
@@ -173,20 +188,19 @@ def verify(
     known = {task.task_id: task for task in tasks}
     required = list(known)[:limit]
     try:
-        with SubmissionFile(path) as file:
-            return _verdict(file, known, required, None if scores_only else (num_workers, on_progress))
+        return _verdict(path, known, required, None if scores_only else (num_workers, on_progress))
     except SubmissionError as error:
         return Verdict((Check("file", False, _shown(str(error), len(str(path)) + 2 * MAX_FINDING)),), None, False)
 
 
 def _verdict(
-    file: SubmissionFile,
+    path: Path,
     known: Mapping[str, TaskFile],
     required: Sequence[str],
     replay: tuple[int, Callable[[int, int], None]] | None,
 ) -> Verdict:
-    header = file.header
-    agents = ", ".join(part.agent for part in header.records)
+    header = read_header(path)
+    agents = ", ".join(header.agents)
     checks = [
         _check("protocol", _protocol_findings(header), "the benchmark's"),
         _check("tasks", _task_findings(header, known, required), f"{len(header.tasks)}, all known"),
@@ -194,7 +208,7 @@ def _verdict(
     if not all(check.is_passed for check in checks):
         unread = Check("file", True, _shown(f"the header; the records of {agents} were not read"))
         return Verdict((unread, *checks), header, False, len(required))
-    records = _Records(file, known)
+    records = _Records(path, header, known)
     num_records = sum(map(len, records.brief.values()))
     checks.insert(0, Check("file", True, _shown(f"records: {num_records}, agents: {agents}")))
     checks.append(records.complete.check("complete", "every stage once, and scored"))
@@ -205,11 +219,12 @@ def _verdict(
     checks.append(records.paths.check("paths", follows))
     checks.append(_check("scores", _claims(header, records.brief), "the claimed summary is that of the records"))
     if replay is not None:
-        found = _rescore(file, known, required, *replay)
+        found = _rescore(path, header, known, required, *replay)
         checks.append(_check("actions", found, "replayed, they give the same records, byte for byte"))
     chosen = {agent: [r for r in mine if r.task_id in set(required)] for agent, mine in records.brief.items()}
     num_stages = sum(task.num_stages for task in header.tasks if task.task_id in set(required))
-    return Verdict(tuple(checks), header, replay is not None, len(required), packed_summary(chosen, num_stages))
+    summary = packed_summary(chosen, num_stages)
+    return Verdict(tuple(checks), header, replay is not None, len(required), summary, records.digests)
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
@@ -222,30 +237,6 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "about": None if header is None else header.about.model_dump(),
         "summary": verdict.summary,
     }
-
-
-def read_records(file: SubmissionFile, part: PackedRecords) -> Iterator[StageRecord]:
-    """Yield the records of one agent.
-
-    Raises:
-        SubmissionError: The member is not what the header says, or a line is not a record as evonav writes it.
-    """
-    for number, text in enumerate(file.texts(part), start=1):
-        where = f"{file.path}: {part.member}, line {number}"
-        try:
-            record = StageRecord.model_validate_json(text)
-            is_ours = record.to_json() == text
-        except ValidationError as error:
-            raise SubmissionError(f"{where}: {first_problem(error)}") from error
-        if not is_ours:
-            raise SubmissionError(f"{where}: not as evonav writes records")
-        yield record
-
-
-def brief(record: StageRecord) -> StageRecord:
-    """Return what scores need of a record."""
-    large = {"trace": (), "entries": (), "stale_entries": (), "moved_objects": (), "stop_reason": ""}
-    return record.model_copy(update=large)
 
 
 def _protocol_findings(header: Submission) -> Iterator[str]:
@@ -290,23 +281,9 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         yield f"{name} is missing"
 
 
-def _target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:
-    """Yield where a record describes another stage than the task's."""
-    blank, stage = spec.blank_record(record.agent, record.stage), spec.stages[record.stage - 1]
-    transition = record.transition.model_copy(update={"is_agent_in_room": blank.transition.is_agent_in_room})
-    found = record.model_copy(update={"transition": transition})
-    for name in ("house", "num_stages", "goal", "target", "transition"):
-        if getattr(found, name) != getattr(blank, name):
-            yield f"{name} is another than the task's"
-    if (record.state is EndState.GUIDED) != (stage.guided is not None):
-        yield f"it is {record.state.value}, the task's stage is {'not ' if stage.guided is None else ''}guided"
-    if record.stage == 1 and record.requested_start != pose_record(spec.start):
-        yield "requested_start is another than the task's"
-
-
 def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
     num_stages = sum(task.num_stages for task in header.tasks)
-    claimed, computed = header.summary, packed_summary({a: list(r) for a, r in records.items()}, num_stages)
+    claimed, computed = header.summary, packed_summary(records, num_stages)
     if claimed.get("schema_version") == 1:
         claimed, computed = _without_intervals(claimed), _without_intervals(computed)
     for one in json_differences(claimed, computed, is_equal=_is_close):
@@ -333,13 +310,13 @@ def _is_close(claimed: Any, computed: Any) -> bool:  # noqa: ANN401 - JSON
 
 
 def _rescore(
-    file: SubmissionFile,
+    path: Path,
+    header: Submission,
     known: Mapping[str, TaskFile],
     required: Sequence[str],
     num_workers: int,
     on_progress: Callable[[int, int], None],
 ) -> Iterator[str]:
-    header = file.header
     stated = header.config.get("backend")
     backend: dict[str, Any] = stated if isinstance(stated, dict) else {}
     simulator = str(backend.get("simulator", ""))
@@ -349,15 +326,15 @@ def _rescore(
         return
     settings = {"protocol": header.config["protocol"], "simulator": simulator, "camera": camera_of(backend)}
     chosen = set(required)
-    num_episodes = len(header.records) * len(chosen & {task.task_id for task in header.tasks})
+    num_episodes = len(header.agents) * len(chosen & {task.task_id for task in header.tasks})
     names: list[tuple[str, str]] = []
 
     def jobs() -> Iterator[Job]:
-        for part in header.records:
-            for task_id, mine in groupby(read_records(file, part), key=lambda record: record.task_id):
-                if task_id in chosen:
-                    names.append((part.agent, task_id))
-                    yield Job(len(names) - 1, _episode_text(known[task_id].path, mine))
+        for name, mine in groupby(read_records(path), key=lambda read: (read[0].agent, read[0].task_id)):
+            if name[1] in chosen:
+                names.append(name)
+                records = [line.decode() for _, line in mine]
+                yield Job(len(names) - 1, json.dumps({"path": str(known[name[1]].path), "records": records}))
 
     work = "evonav.submission.rescore:work"
     with open_pool(work, json.dumps(settings), Workforce(num_workers), timeout_s=EPISODE_TIMEOUT_S) as pool:
@@ -369,10 +346,6 @@ def _rescore(
                 continue
             for stage, differences in json.loads(answer.text):
                 yield f"{agent} {task_id} stage {stage}: {'; '.join(differences)}"
-
-
-def _episode_text(path: Path, records: Iterable[StageRecord]) -> str:
-    return json.dumps({"path": str(path), "records": [record.to_json() for record in records]})
 
 
 def _check(name: str, findings: Iterator[str], if_none: str) -> Check:

@@ -22,7 +22,7 @@ def pack(
     run: RunFolder,
     agent: RunAgents = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN.evonav.zip beside the folder.")
+        Path | None, typer.Option(metavar="FILE", help="File to write. Default: beside the folder, by its name.")
     ] = None,
     title: Annotated[str, typer.Option(metavar="TEXT", help="Title of the entry.")] = "",
     authors: Annotated[str, typer.Option(metavar="TEXT", help="Authors of the entry.")] = "",
@@ -45,7 +45,7 @@ def pack(
     names = listed(agent) or None
     header = pack(run, target, agents=names, about=about)
     typer.echo(
-        f"packed: {target} ({', '.join(part.agent for part in header.records)};"
+        f"packed: {target} ({', '.join(header.agents)};"
         f" {counted(len(header.tasks), 'task')}; {target.stat().st_size / 1e6:.1f} MB)"
     )
     typer.echo(f"next: evonav verify {target}")

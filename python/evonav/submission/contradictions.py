@@ -1,6 +1,7 @@
-"""Find contradictions within a scored record, and between it and the record of the stage before.
+"""Find contradictions within a record, and between it and its task, and the record of the stage before.
 
-No simulator is asked: what a wall stops, or how long the reference path is, shows when the actions are executed again.
+No simulator is asked: what a wall stops, how long the reference path is, and what a change during the stage left for
+the agent show when the actions are executed again.
 """
 
 import math
@@ -9,10 +10,12 @@ from itertools import pairwise
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import polyline_length_m
+from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
+from evonav.evaluation.episode.stage_house import changed_ids
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.base import Point2, Point3
-from evonav.evaluation.records.convert import sensor_config
+from evonav.evaluation.records.convert import pose_record, sensor_config
 from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
 
 TOLERANCE = 1e-9
@@ -21,6 +24,61 @@ SAME_M = 1e-6
 """Distance up to which two poses are at the same place."""
 SLACK_M = 0.01
 """Allowed excess of a way: AI2-THOR's steps are not exact."""
+
+
+def target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:
+    """Yield where a record describes another stage than the task's."""
+    blank, stage = spec.blank_record(record.agent, record.stage), spec.stages[record.stage - 1]
+    transition = record.transition.model_copy(update={"is_agent_in_room": blank.transition.is_agent_in_room})
+    found = record.model_copy(update={"transition": transition})
+    for name in ("house", "num_stages", "goal", "target", "transition"):
+        if getattr(found, name) != getattr(blank, name):
+            yield f"{name} is another than the task's"
+    if (record.state is EndState.GUIDED) != (stage.guided is not None):
+        yield f"it is {record.state.value}, the task's stage is {'not ' if stage.guided is None else ''}guided"
+    if record.stage == 1 and record.requested_start != pose_record(spec.start):
+        yield "requested_start is another than the task's"
+
+
+def change_findings(record: StageRecord, stage: StageSpec, protocol: ProtocolConfig) -> Iterator[str]:
+    """Yield where a record's change during the stage is not the task's, or cannot have taken place as recorded.
+
+    Args:
+        stage: The task's stage.
+        protocol: The run's protocol.
+    """
+    found, change = record.during, stage.change
+    if found is None or change is None:
+        if found is not None or change is not None:
+            yield "during is another than the task's"
+        return
+    planned = change.record
+    recorded = found.change.model_copy(update={"is_agent_in_room": planned.change.is_agent_in_room})
+    if (found.round, recorded) != (planned.round, planned.change):
+        yield "during is another than the task's"
+        return
+    due = None
+    if record.sensing is not None and stage.guided is None:
+        due = protocol.step_of_round(planned.round, sensor_config(record.sensing))
+    is_due = due is not None and due < len(record.trace)
+    if found.at_round != (due if is_due else None):
+        yield f"during.at_round is {found.at_round}, the task's round gives {due if is_due else None}"
+        return
+    if not is_due:
+        if found != planned:
+            yield "during says more than that the stage ended before the change"
+        return
+    if not set(found.skipped_ids) <= set(changed_ids(change.delta_json)):
+        yield f"during.skipped_ids names what does not change: {found.skipped_ids[:3]}"
+    target = record.target
+    is_skipped = target.object_id in found.skipped_ids
+    if found.target_position_m != (target.position_m if is_skipped else change.target_position_m):
+        yield f"during.target_position_m is {found.target_position_m}, which is not the task's"
+    if found.is_target_relocated != any(one.object_id == target.object_id for one in found.done):
+        yield f"during.is_target_relocated is {found.is_target_relocated}, its moves say otherwise"
+    length_m = sum(polyline_length_m(entry.path_m) for entry in record.trace[:due])
+    if found.path_before_m is None or not math.isclose(found.path_before_m, length_m, abs_tol=TOLERANCE):
+        yield f"during.path_before_m is {found.path_before_m}, its path gives {length_m}"
 
 
 def path_findings(record: StageRecord, before: StageRecord | None, protocol: ProtocolConfig) -> Iterator[str]:
