@@ -92,13 +92,13 @@ def measured(
 
 def command(url: str, out: Path, num_workers: int, at_once: int) -> list[str]:
     """The run: five agents on the bundled tasks."""
-    how_many = ["--workers", str(num_workers), "--episodes-at-once", str(at_once)]
+    how_many = ["--workers", str(num_workers), "--set", f"episodes_at_once={at_once}"]
     return [sys.executable, "-m", "evonav", *asking(url, out), *how_many]
 
 
 def asking(url: str, out: Path, agents: str = AGENTS) -> list[str]:
     """Arguments of a run that asks the model."""
-    asked = ["--decision", "vlm", "--model", "mock", "--base-url", url, "--max-retries", "0"]
+    asked = ["--decision", "vlm", "--model", "mock", "--base-url", url, "--set", "decision.max_retries=0"]
     return ["evaluate", "--agent", agents, *asked, "--out", str(out)]
 
 

@@ -3,7 +3,7 @@
     PYTHONPATH=examples evonav evaluate --decision own_vlm:OwnVlm --agent fu --limit 1 --out out/own
 
 This one looks at brightness alone. Put your model where it does: `prompt.parts` are words and images in order, the last
-words say how to answer. What it answers is kept in OUT/exchanges.sqlite, and `--vlm-mode replay` has it again.
+words say how to answer. What it answers is kept in OUT/exchanges.sqlite, and `--set decision.mode=replay` has it again.
 """
 
 import re

@@ -1,5 +1,6 @@
-"""Read TOML, the one format of files that people write for evonav."""
+"""Read TOML, the one format of files that people write for evonav, and set values in it by `KEY=VALUE`."""
 
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -31,3 +32,38 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InvalidArgumentError(f"{path}: not UTF-8: {error}") from None
     except (ValueError, RecursionError) as error:
         raise InvalidArgumentError(f"{path}: not TOML: {' '.join(str(error).split())}") from None
+
+
+def key_and_value(change: str) -> tuple[str, Any]:
+    """Return the key and the value of `KEY=VALUE`; a value is JSON, or text.
+
+    Raises:
+        InvalidArgumentError: It is no such change.
+    """
+    key, equals, text = change.partition("=")
+    if not equals or not all(key.strip().split(".")):
+        raise InvalidArgumentError(f"--set {change}: expected KEY=VALUE, such as workers=4 or perception.device=cpu")
+    try:
+        return key.strip(), json.loads(text)
+    except ValueError:
+        return key.strip(), text.strip()
+
+
+def set_value(table: dict[str, Any], key: str, value: Any, where: str = "the settings") -> None:  # noqa: ANN401 - any
+    """Set a value in a table; a key with dots reaches into tables in it.
+
+    Args:
+        where: What the table is, in errors.
+
+    Raises:
+        InvalidArgumentError: The key reaches into what is no table.
+    """
+    *tables, last = key.split(".")
+    for depth, name in enumerate(tables):
+        inner = table.setdefault(name, {})
+        if not isinstance(inner, dict):
+            raise InvalidArgumentError(
+                f"--set {key}: {'.'.join(tables[: depth + 1])} is no table in {where}: give the whole of it"
+            )
+        table = inner
+    table[last] = value

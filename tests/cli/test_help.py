@@ -122,20 +122,13 @@ def test_completion_does_not_slow_the_start():
 def test_every_help_is_short_plain_and_complete():
     """Flags have no type, brackets are not taken for styles, and each purpose fits on a line."""
     shown = CliRunner().invoke(app, ["-h"], env={"COLUMNS": "80"}).stdout
-    assert CliRunner().invoke(app, ["--version"]).stdout == CliRunner().invoke(app, ["version"]).stdout
     places = [shown.index(f"│ {name} ") for name in ("demo", "evaluate", "report", "houses", "paper", "pack", "video")]
     assert places == sorted(places)
-    group_context = GROUP.make_context("evonav", ["agents"])
-    for name in COMMANDS:
-        *groups, last = name.split()
-        parent = GROUP
-        for group in groups:
-            parent = parent.commands[group]
-        _, command, _ = parent.resolve_command(group_context, [last, "--help"])
+    for name, command in COMMANDS.items():
         help_ = CliRunner().invoke(app, [*name.split(), "-h"], env={"COLUMNS": "120"}).stdout
         assert not re.search(r"<bool>|<path>|list\[", help_), name
-        purpose = parent.commands[last].get_short_help_str(200)
-        assert groups or len(purpose) <= 63, f"{name}: `{purpose}` takes two lines of a narrow terminal"
+        purpose = command.get_short_help_str(200)
+        assert " " in name or len(purpose) <= 63, f"{name}: `{purpose}` takes two lines of a narrow terminal"
         for param in command.params:
             text = param.help or ""
             assert text or param.hidden, f"{name}: {param.name} has no help"
@@ -143,16 +136,10 @@ def test_every_help_is_short_plain_and_complete():
             assert "docs/" not in text, f"{name}: {param.name}: an installed package has no docs"
 
 
-def test_the_help_of_long_options_has_room_at_80_columns():
+def test_the_help_of_evaluate_fits_on_two_screens():
     shown = CliRunner().invoke(app, ["evaluate", "-h"], env={"COLUMNS": "80"}).stdout
-    panel = shown.partition("─ Decision model ─")[2].partition("╰")[0]
-    assert "│ --vlm-mode MODE " in panel
-    assert "│ --base-url URL " in panel
-    assert "│ --[no-]exchange-images " in panel
-    assert "[default: exchange-images]" in panel
-    column = re.search(r"Store the images of questions too\.", panel)
-    assert column is not None, "a short sentence fits on one line"
-    assert "evonav evaluate --limit 5" in shown
+    assert len(shown.splitlines()) <= 100
+    assert "--set " in shown
 
 
 def test_options_that_mean_the_same_are_declared_once():
@@ -161,12 +148,7 @@ def test_options_that_mean_the_same_are_declared_once():
     own |= {"agent_timeout", "config", "perception"}
     texts = {}
     for name in set(COMMANDS) - {"sweep", "paper"}:  # whose options change a file, and name the paper's tables
-        *groups, last = name.split()
-        parent = GROUP
-        for group in groups:
-            parent = parent.commands[group]
-        _, command, _ = parent.resolve_command(GROUP.make_context("evonav", ["agents"]), [last, "--help"])
-        for param in command.params:
+        for param in COMMANDS[name].params:
             if param.param_type_name == "option" and not param.hidden and param.name not in own:
                 texts.setdefault(param.opts[0], {}).setdefault((param.help, str(param.default)), []).append(name)
     differing = {option: found for option, found in texts.items() if len(found) > 1}

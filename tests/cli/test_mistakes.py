@@ -48,7 +48,12 @@ MISTAKES = {
     f"{EVALUATE} --agnets fu": "--agent",
     f"{EVALUATE} --limit none": "'--limit'",
     f"{EVALUATE} --limit 2 --subset test-90": "give --limit or --subset, not both",
-    f"{EVALUATE} --ray-address auto": "--ray-address is for engine ray",
+    f"{EVALUATE} --set ray_address=auto": "--set ray_address is for engine ray",
+    f"{EVALUATE} --set temperature=0.5": "did you mean decision.temperature?",
+    f"{EVALUATE} --set decision.temprature=0.5": "did you mean decision.temperature?",
+    f"{EVALUATE} --set workers": "--set workers: expected KEY=VALUE",
+    f"{EVALUATE} --set num_retries=-1": "--set num_retries = -1: Input should be greater than or equal to 0",
+    "check-agent fu --set simulator.width_px=64": "is no such key; `--set help` lists the keys",
     # an agent
     f"{EVALUATE} --agent ftuu": "did you mean `ftu`?",
     f"{EVALUATE} --agent fu --agent fu": "an agent is named twice: fu, fu",
@@ -79,14 +84,14 @@ MISTAKES = {
     f"{EVALUATE} --decision vlm": "--model is needed to ask a model (or EVONAV_VLM_MODEL",
     f"{EVALUATE} --decision vlm --model gpt-4o": "set OPENAI_API_KEY",
     f"{EVALUATE} --decision gpt-4o": "expected text, looks, vlm or module:name",
-    f"{EVALUATE} --model gpt-4o --temperature 0": "--temperature is of no use where text decides",
-    "evaluate --out new --decision vlm --model m --vlm-mode replay": "no exchanges here to replay",
-    f"{EVALUATE} --noise wrong=often": "--noise wrong=often: expected a number",
+    f"{EVALUATE} --model gpt-4o --set decision.top_p=1": "--set decision.top_p is of no use where text decides",
+    "evaluate --out new --decision vlm --model m --set decision.mode=replay": "no exchanges here to replay",
+    f"{EVALUATE} --set decision.noise.wrong=often": "decision.noise.wrong = 'often': Input should be a valid number",
     # a sweep
     "sweep": "name a sweep file",
     "sweep nowhere.toml": "nowhere.toml: cannot be read: No such file",
     "sweep sweep.toml --set agents=ftuu --dry-run": "did you mean `ftu`?",
-    "sweep typo.toml": "typo.toml: task: no such key; did you mean tasks?",
+    "sweep typo.toml": "typo.toml: task is no such key; did you mean tasks?",
     "sweep sweep.toml --only nothing": "fits no cell; there are gt__text__bundled-1__s0",
     "sweep sweep.toml --out sweep --set seeds=4": "sweep holds another sweep",
 }
@@ -118,7 +123,7 @@ def test_a_mistake_is_told_with_what_to_do(folder, monkeypatch, capsys, tmp_path
     [
         (f"{EVALUATE} --decision vlm --model m --base-url http://127.0.0.1:9/v1", "openai", "vlm"),
         (f"{EVALUATE} --simulator ai2thor", "ai2thor", "thor"),
-        ("evaluate --workers 1 --limit 1 --agent fu --out out-ray --engine ray", "ray", "ray"),
+        ("evaluate --workers 1 --limit 1 --agent fu --out out-ray --set engine=ray", "ray", "ray"),
     ],
 )
 def test_an_extra_that_is_not_installed_is_named(folder, monkeypatch, capsys, words, module, extra):

@@ -43,10 +43,14 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     out, again = tmp_path / "out", tmp_path / "again"
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
         options = ("--decision", "vlm", "--base-url", stub.url, "--prices", prices, "--max-cost", 5)
-        code, printed = run("evaluate", *COMMON, *options, "--temperature", 0.2, "--seed", 3, "--out", out)
+        code, printed = run(
+            "evaluate", *COMMON, *options, "--set", "decision.temperature=0.2", "--seed", 3, "--out", out
+        )
         num_asked = len(stub.requests or [])
         # Going on asks nothing, and counts on.
-        assert run("evaluate", *COMMON, *options, "--temperature", 0.2, "--seed", 3, "--out", out)[0] == 0
+        assert (
+            run("evaluate", *COMMON, *options, "--set", "decision.temperature=0.2", "--seed", 3, "--out", out)[0] == 0
+        )
         assert len(stub.requests or []) == num_asked > 0
         for request in stub.requests or []:
             check_request(request)
@@ -58,9 +62,16 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     assert f"${num_asked * 0.002:.4f}" in printed  # 1000 tokens in, 100 out
     assert code_other != 0
     assert "temperature" in told
-    replay = ("--decision", "vlm", "--vlm-mode", "replay", "--exchanges", out / "exchanges.sqlite")
+    replay = (
+        "--decision",
+        "vlm",
+        "--set",
+        "decision.mode=replay",
+        "--set",
+        f"decision.exchanges={out / 'exchanges.sqlite'}",
+    )
     monkeypatch.delenv("OPENAI_API_KEY")
-    code, printed = run("evaluate", *COMMON, *replay, "--temperature", 0.2, "--seed", 3, "--out", again)
+    code, printed = run("evaluate", *COMMON, *replay, "--set", "decision.temperature=0.2", "--seed", 3, "--out", again)
     assert code == 0, printed
     assert f"m: 0 questions asked, {num_asked} answered from exchanges" in printed
     with RunStore(out) as first, RunStore(again) as second:
@@ -75,21 +86,24 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     [
         (("--decision", "vlm"), "--model is needed"),
         (("--decision", "gpt"), "expected text, looks, vlm or module:name"),
-        (("--tell-of-change",), "--tell-of-change is of no use"),
-        (("--temperature", 0.5), "--temperature is of no use"),
-        (("--eagerness", 0.5), "--eagerness is of no use where text decides"),
-        (("--decision", "looks", "--eagerness", 2), "expected a number from 0 to 1"),
-        (("--decision", "looks", "--mistakes", -1), "expected a temperature"),
-        (("--decision", "own_vlm:OwnVlm", "--max-tokens", 5), "--max-tokens is of no use"),
+        (("--set", "decision.tell_of_change=true"), "decision.tell_of_change is of no use"),
+        (("--set", "decision.temperature=0.5"), "decision.temperature is of no use"),
+        (("--set", "decision.eagerness=0.5"), "decision.eagerness is of no use where text decides"),
+        (("--decision", "looks", "--set", "decision.eagerness=2"), "expected a number from 0 to 1"),
+        (("--decision", "looks", "--set", "decision.mistakes=-1"), "expected a temperature"),
+        (("--decision", "own_vlm:OwnVlm", "--set", "decision.max_tokens=5"), "decision.max_tokens is of no use"),
         (("--decision", "nothing:Here"), "nothing"),
         (("--decision", "vlm", "--model", "m"), "OPENAI_API_KEY"),
-        (("--decision", "vlm", "--model", "m", "--vlm-mode", "replay"), "no exchanges here"),
+        (("--decision", "vlm", "--model", "m", "--set", "decision.mode=replay"), "no exchanges here"),
         (("--decision", "vlm", "--model", "x", "--prices", "PRICES", "--base-url", "http://x/v1"), "no prices of"),
         (("--decision", "vlm", "--model", "m", "--max-cost", 1, "--base-url", "http://x"), "the model's prices"),
-        (("--decision", "vlm", "--model", "m", "--temperature", 9, "--base-url", "http://x/v1"), "temperature"),
-        (("--noise", "wrong=2"), "noise wrong"),
-        (("--noise", "wrnog=0.1"), "wrnog"),
-        (("--noise", "wrong=many"), "expected a number"),
+        (
+            ("--decision", "vlm", "--model", "m", "--set", "decision.temperature=9", "--base-url", "http://x/v1"),
+            "temperature",
+        ),
+        (("--set", "decision.noise.wrong=2"), "noise wrong"),
+        (("--set", "decision.noise.wrnog=0.1"), "wrnog"),
+        (("--set", "decision.noise.wrong=many"), "Input should be a valid number"),
         (("--dry-run",), "--dry-run is for --decision vlm"),
         (("--dry-run", "--decision", "own_vlm:OwnVlm"), "--dry-run is for --decision vlm"),
     ],
@@ -122,9 +136,9 @@ def test_a_spent_budget_is_told_with_what_to_do(tmp_path: Path) -> None:
 
 
 def test_recording_wants_a_new_file(tmp_path: Path) -> None:
-    common = ("evaluate", *COMMON, "--decision", "vlm", "--model", "m", "--vlm-mode", "record")
+    common = ("evaluate", *COMMON, "--decision", "vlm", "--model", "m", "--set", "decision.mode=record")
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
-        options = (*common, "--base-url", stub.url, "--exchanges", tmp_path / "e.sqlite")
+        options = (*common, "--base-url", stub.url, "--set", f"decision.exchanges={tmp_path / 'e.sqlite'}")
         assert run(*options, "--out", tmp_path / "a")[0] == 0
         assert run(*options, "--out", tmp_path / "a")[0] == 0  # goes on with its own
         code, told = run(*options, "--out", tmp_path / "b")
@@ -163,7 +177,18 @@ def test_a_model_is_told_of_changes_in_all_prompts_or_in_none(tmp_path: Path) ->
 
 
 def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) -> None:
-    options = ("--decision", "vlm", "--model", "o9", "--reasoning", "--vlm-mode", "live", "--out", tmp_path / "out")
+    options = (
+        "--decision",
+        "vlm",
+        "--model",
+        "o9",
+        "--set",
+        "decision.reasoning=true",
+        "--set",
+        "decision.mode=live",
+        "--out",
+        tmp_path / "out",
+    )
     with serving(lambda request: {"status": 401, "raw": b"{}"}) as stub:
         run("evaluate", *COMMON, *options, "--base-url", stub.url)
     request = (stub.requests or [])[0]
@@ -199,7 +224,7 @@ def test_the_stand_in_serves_until_it_is_stopped() -> None:
 
 def test_noise_is_part_of_what_a_run_is(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert run("evaluate", *COMMON, "--noise", "wrong=0.5", "--out", out)[0] == 0
+    assert run("evaluate", *COMMON, "--set", "decision.noise.wrong=0.5", "--out", out)[0] == 0
     with RunStore(out) as store:
         assert store.meta("config")["backend"]["decision_options"] == {"noise": {"wrong": 0.5}}
     code, told = run("evaluate", *COMMON, "--out", out)

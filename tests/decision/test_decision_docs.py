@@ -7,7 +7,7 @@ from pathlib import Path
 from pkgutil import walk_packages
 
 from evonav import agents
-from evonav.cli.options.settings import settings_options
+from evonav.cli.options.settings import FLAGS, setting_keys
 from evonav.decision.noisy import NoiseRates
 from evonav.decision.question import Question
 from evonav.decision.vlm.decision import FAULTS
@@ -35,10 +35,8 @@ def test_every_question_has_a_kind_of_its_own_and_a_row() -> None:
 
 
 def test_options_and_noise_are_told_of() -> None:
-    for options in (settings_options("decisions"), settings_options("spending")):
-        for field in options.chosen:
-            name = options.option(field).replace("_", "-")
-            assert f"--{'no-exchange-images' if field == 'exchange_images' else name}" in TEXT, name
+    for key in setting_keys(("decision.", "prices", "max_cost")):
+        assert FLAGS.get(key, key) in TEXT, key
     for rate in fields(NoiseRates):
         assert f"{rate.name}=" in TEXT, rate.name
 

@@ -129,8 +129,8 @@ def test_models_are_loaded_once_and_only_to_be_asked(tmp_path: Path) -> None:
 def test_the_example_runs_and_replays_without_its_model(tmp_path: Path) -> None:
     """As docs/decision.md tells a user to; the replay finds no picture to look at."""
     command = [sys.executable, "-m", "evonav", "evaluate", "--decision", "own_vlm:OwnVlm", "--agent", "fu"]
-    common = [*command, "--limit", "1", "--workers", "0", "--exchanges", str(tmp_path / "e.sqlite")]
-    for extra in (["--out", str(tmp_path / "a")], ["--out", str(tmp_path / "b"), "--vlm-mode", "replay"]):
+    common = [*command, "--limit", "1", "--workers", "0", "--set", f"decision.exchanges={tmp_path / 'e.sqlite'}"]
+    for extra in (["--out", str(tmp_path / "a")], ["--out", str(tmp_path / "b"), "--set", "decision.mode=replay"]):
         done = subprocess.run([*common, *extra], cwd=EXAMPLES, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     texts = []

@@ -117,9 +117,9 @@ def campaign(options, decision, url):
     """Makes both runs, and tells how they differ."""
     evonav = str(Path(sys.executable).with_name("evonav"))
     command = [evonav, "evaluate", "--agent", options.agents, "--tasks", options.tasks, "--limit", str(options.limit)]
-    command += ["--workers", options.workers, "--episodes-at-once", str(options.episodes_at_once)]
+    command += ["--workers", options.workers, "--set", f"episodes_at_once={options.episodes_at_once}"]
     command += [*decision, "--base-url", url] if decision else []
-    command += ["--retries", options.retries, "--out"]
+    command += ["--set", f"num_retries={options.retries}", "--out"]
     whole, disturbed = options.out / "whole", options.out / "disturbed"
     began_s = time.monotonic()
     subprocess.run([*command, str(whole)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

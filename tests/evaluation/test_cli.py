@@ -100,13 +100,22 @@ def test_importing_is_quick():
 def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
     pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
     monkeypatch.setenv("HOME", str(tmp_path))
-    options = ("--simulator", "ai2thor", "--thor-executable", "evonav", "--agent", "shortest-path", "--limit", 2)
+    options = (
+        "--simulator",
+        "ai2thor",
+        "--set",
+        "simulator.executable=evonav",
+        "--agent",
+        "shortest-path",
+        "--limit",
+        2,
+    )
     out = tmp_path / "run"
     done = run("evaluate", *options, "--workers", 2, "--out", out)
     assert done.exit_code == 0, done.output
     assert json.loads((out / "summary.json").read_text())["agents"]["shortest-path"]["sr"] == 1.0
     # Timeouts may change, the simulator may not.
-    assert run("evaluate", *options, "--thor-timeout", 50, "--out", out).exit_code == 0
+    assert run("evaluate", *options, "--set", "simulator.timeout_s=50", "--out", out).exit_code == 0
     other = run("evaluate", "--agent", "shortest-path", "--limit", 2, "--out", out)
     assert "another configuration" in str(other.exception)
 
@@ -114,9 +123,13 @@ def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        (("--simulator", "ai2thor", "--thor-executable", "OUT/none"), 1, "no such executable"),
-        (("--simulator", "ai2thor", "--thor-executable", "evonav", "--thor-gpu", "0"), 1, "gpu_device = 0"),
-        (("--thor-executable", "evonav"), 2, "--thor-executable is for simulator ai2thor"),
+        (("--simulator", "ai2thor", "--set", "simulator.executable=OUT/none"), 1, "no such executable"),
+        (
+            ("--simulator", "ai2thor", "--set", "simulator.executable=evonav", "--set", "simulator.gpu_device=0"),
+            1,
+            "gpu_device = 0",
+        ),
+        (("--set", "simulator.executable=evonav"), 2, "--set simulator.executable is for simulator ai2thor"),
     ],
 )
 def test_a_simulator_that_does_not_start_is_told_before_the_run(

@@ -1,6 +1,5 @@
 """Commands beside `evonav evaluate` that run many episodes at once where a model is waited for."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -26,7 +25,7 @@ SMALL = GenerationParameters(reference_image_px=64, reference_min_visible_px=10)
 def run(*words: object) -> int:
     """Runs a command with a model that answers late; returns how many questions the model had at once."""
     with serving(lambda request: {"text": mock_answer(request), "hang_s": 0.1}) as stub:
-        model = ["--decision", "vlm", "--model", "m", "--base-url", stub.url, "--no-images"]
+        model = ["--decision", "vlm", "--model", "m", "--base-url", stub.url, "--set", "decision.images=false"]
         done = CliRunner().invoke(app, [*map(str, words), "--workers", "1", *model])
         assert done.exit_code == 0, done.output
         return stub.most_at_once
@@ -38,7 +37,7 @@ def test_both_arms_of_a_controlled_analysis_run_at_once(tmp_path: Path) -> None:
     for folder in folders.values():
         generate_controlled("bundled", folder, options=ControlledOptions(parameters=SMALL), limit=1)
     command = ("controlled", "evaluate")
-    assert run(*command, folders["one"], "--agent", "fu", "--episodes-at-once", 1) == 1
+    assert run(*command, folders["one"], "--agent", "fu", "--set", "episodes_at_once=1") == 1
     assert run(*command, folders["many"], "--agent", "fu") == 2  # 16 is the default
     for arm in ("fixed", "evolved"):
         one, many = (run_of(folder, arm) for folder in folders.values())
@@ -47,14 +46,9 @@ def test_both_arms_of_a_controlled_analysis_run_at_once(tmp_path: Path) -> None:
         assert (one / "summary.json").read_bytes() == (many / "summary.json").read_bytes()
 
 
-def test_the_demo_waits_for_two_answers_at_once(tmp_path: Path) -> None:
-    assert run("demo", "--agent", "fu", "--limit", 2, "--out", tmp_path) == 2
-    assert len(json.loads((tmp_path / "summary.json").read_text())["agents"]) == 1
-
-
 @pytest.mark.parametrize("options", [("--workers", "0"), ("--isolation", "none")])
 def test_agents_without_processes_cannot_run_at_once(tmp_path: Path, options: tuple[str, str]) -> None:
     generate_controlled("bundled", tmp_path, options=ControlledOptions(parameters=SMALL), limit=1)
-    done = CliRunner().invoke(app, ["controlled", "evaluate", str(tmp_path), "--episodes-at-once", "2", *options])
+    done = CliRunner().invoke(app, ["controlled", "evaluate", str(tmp_path), "--set", "episodes_at_once=2", *options])
     assert done.exit_code == 2
     assert "needs workers, and agents in processes of their own" in " ".join(done.output.replace("│", " ").split())

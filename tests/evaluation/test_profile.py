@@ -114,7 +114,7 @@ def test_a_run_has_a_flame_graph_and_the_same_records(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (("--isolation", "sandbox"), "--isolation process"),
-        (("--engine", "ray"), "--engine local"),
+        (("--set", "engine=ray"), "engine=ray"),
     ],
 )
 def test_a_run_that_cannot_be_sampled_says_why(tmp_path: Path, options: tuple[str, ...], message: str) -> None:

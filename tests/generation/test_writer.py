@@ -310,8 +310,8 @@ def test_the_command(stub: Stub, folder: Path, tmp_path: Path) -> None:
         stub.url,
         "--prices",
         str(prices),
-        "--exchanges",
-        str(tmp_path / "kept.sqlite"),
+        "--set",
+        f"decision.exchanges={tmp_path / 'kept.sqlite'}",
     ]
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:

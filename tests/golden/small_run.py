@@ -74,7 +74,7 @@ def _six_agents(out: Path) -> Iterator[tuple[str, str]]:
 
 
 def _imperfect(out: Path) -> Iterator[tuple[str, str]]:
-    options = ("--perception", "noisy:poor", "--noise", "wrong=0.1", "--seed", 3, "--isolation", "none")
+    options = ("--perception", "noisy:poor", "--set", "decision.noise.wrong=0.1", "--seed", 3, "--isolation", "none")
     agents = "random-walk,nearest-frontier,stay-still,oracle-memory,shortest-path,oracle-flags,fu,msgnav"
     _evonav("evaluate", "--agent", agents, "--limit", 1, "--workers", 1, *options, "--out", out)
     yield from _run(out)

@@ -95,8 +95,8 @@ def test_goal_texts_are_written(base_url: str, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "evonav", "tasks"]
     generate = ["generate", "--houses", houses, "--limit", "1", "--num-stages", "3", "--out", tmp_path / "tasks"]
     subprocess.run([*command, *generate], check=True)
-    write = ["write", tmp_path / "tasks", "--no-images", "--model", NAME, "--base-url", base_url]
-    subprocess.run([*command, *write, "--exchanges", tmp_path / "goals.sqlite"], check=True)
+    write = ["write", tmp_path / "tasks", "--set", "decision.images=false", "--model", NAME, "--base-url", base_url]
+    subprocess.run([*command, *write, "--set", f"decision.exchanges={tmp_path / 'goals.sqlite'}"], check=True)
     (task,) = load_tasks(tmp_path / "tasks")
     assert task.num_stages == 3
     for stage in task.public_stages:

@@ -272,8 +272,8 @@ def test_files_tell_the_same_as_the_scores(folder, found, tmp_path):
 def test_the_command(tasks, tmp_path):
     for task in tasks[:1]:
         shutil.copytree(task.path, tmp_path / "tasks" / task.task_id)
-    words = ["perception", str(tmp_path / "tasks"), "--out", str(tmp_path / "out"), "--workers", "0"]
-    words += ["--views-per-room", "6", "--houses", "1"]
+    words = ["perception", "--tasks", str(tmp_path / "tasks"), "--out", str(tmp_path / "out"), "--workers", "0"]
+    words += ["--views-per-room", "6", "--houses-per-task", "1"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert "What perceptions find" in result.output
@@ -281,7 +281,7 @@ def test_the_command(tasks, tmp_path):
     broken = CliRunner().invoke(app, [*words, "--perception", "erring_perceptions:breaking"])
     assert broken.exit_code == 3
     assert "out of memory" in broken.output
-    useless = CliRunner().invoke(app, [*words, "--device", "cpu"])
+    useless = CliRunner().invoke(app, [*words, "--set", "perception.device=cpu"])
     assert useless.exit_code == 2
     assert "--perception predicted" in useless.output
     unknown = CliRunner().invoke(app, [*words, "--perception", "nosy"])

@@ -96,7 +96,9 @@ def test_without_a_network_the_error_comes_at_once(tmp_path: Path, monkeypatch) 
     monkeypatch.setattr(socket, "create_connection", refuse)
     began_s = time.monotonic()
     for name, host in (("sam_l.pt", "github.com"), ("facebook/sam-vit-huge", "huggingface.co")):
-        with pytest.raises(PerceptionError, match=rf"{host} cannot be reached \(no route\): .* --models DIR"):
+        with pytest.raises(
+            PerceptionError, match=rf"{host} cannot be reached \(no route\): .* --set perception.models=DIR"
+        ):
             located(known(name), None)
     assert time.monotonic() - began_s < 5.0
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")

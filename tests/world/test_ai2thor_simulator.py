@@ -232,7 +232,17 @@ def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Pat
 def test_nothing_outlives_an_evaluation_that_is_killed(tmp_path: Path, number: int) -> None:
     temporary = tmp_path / "temporary"
     temporary.mkdir()
-    command = ["-m", "evonav", "evaluate", "--simulator", "ai2thor", "--thor-executable", "evonav", "--limit", "1"]
+    command = [
+        "-m",
+        "evonav",
+        "evaluate",
+        "--simulator",
+        "ai2thor",
+        "--set",
+        "simulator.executable=evonav",
+        "--limit",
+        "1",
+    ]
     evonav = subprocess.Popen(
         [sys.executable, *command, "--agent", "ftu", "--workers", "1", "--out", str(tmp_path / "run")],
         env=os.environ | {"TMPDIR": str(temporary)},

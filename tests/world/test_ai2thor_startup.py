@@ -84,7 +84,7 @@ def test_the_error_for_a_process_that_ends_at_once_has_its_log(script: Script) -
 
 @pytest.mark.parametrize(
     ("printed", "advice"),
-    [("Failed to create Vulkan instance", "vulkaninfo"), ("Unable to open DISPLAY", "--thor-display")],
+    [("Failed to create Vulkan instance", "vulkaninfo"), ("Unable to open DISPLAY", "simulator.x_display")],
 )
 def test_errors_in_the_log_become_advice(script: Script, printed: str, advice: str) -> None:
     assert advice in failure(Ai2ThorOptions(script(f"echo {printed}; exit 1")))
@@ -94,7 +94,7 @@ def test_a_process_that_does_not_answer_is_ended(script: Script, tmp_path: Path)
     pid_file = tmp_path / "pid"
     message = failure(Ai2ThorOptions(script(f"echo $$ > '{pid_file}'; echo loading; sleep 600"), timeout_s=0.3))
     assert "did not come up" in message
-    assert "--thor-timeout" in message
+    assert "simulator.timeout_s" in message
     assert "loading" in message
     assert not _is_alive(int(pid_file.read_text()))
 
@@ -139,7 +139,7 @@ def test_a_missing_display_is_reported(tmp_path: Path) -> None:
 def test_without_a_network_nothing_can_be_downloaded(platform: "str | None") -> None:
     message = failure(Ai2ThorOptions(platform=platform, x_display=":97", commit_id="abc"))  # type: ignore[arg-type]
     assert "cannot be downloaded" in message
-    assert "--thor-executable evonav" in message
+    assert "simulator.executable=evonav" in message
 
 
 def test_no_vulkan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,19 +152,6 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     )
 
 
-def with_rule(name: str, rule: str) -> str:
-    """Return the name of an agent that forgets by a rule, such as `fu@bayes`.
-
-    Raises:
-        InvalidArgumentError: There is no such rule, or the agent has no object entries of ours, or another rule.
-    """
-    if name.partition(RULE_MARK)[0] not in BUILT_IN or RULE_MARK in name:
-        raise InvalidArgumentError(f"agent `{name}`: a forgetting rule is for a built-in agent without one")
-    found = f"{name}{RULE_MARK}{rule}"
-    agent_factory(found)
-    return found
-
-
 def _forgetful(name: str, rule: str) -> Callable[..., Agent]:
     """Return a function that makes a built-in agent with a forgetting rule."""
     from evonav.memory.forgetting import check_name

@@ -10,7 +10,7 @@ import typer
 from evonav.cli.bench.app import bench_app
 from evonav.cli.doctor.doctor import doctor
 from evonav.cli.examples import add_examples
-from evonav.cli.group import HELP_NAMES, Command, Group, add_commands
+from evonav.cli.group import HELP_NAMES, Group, add_commands
 from evonav.cli.results.breakdown import breakdown
 from evonav.cli.results.compare import compare
 from evonav.cli.results.export import export
@@ -69,7 +69,9 @@ app = typer.Typer(
 
 def _print_version(is_asked: bool) -> None:
     if is_asked:
-        version()
+        from evonav import __version__
+
+        typer.echo(__version__)
         raise typer.Exit
 
 
@@ -87,14 +89,6 @@ def options(
     del print_version  # its callback has printed it
     if debug:
         os.environ[DEBUG_VARIABLE] = "1"
-
-
-@app.command(cls=Command, hidden=True)
-def version() -> None:
-    """Print the version."""
-    from evonav import __version__
-
-    typer.echo(__version__)
 
 
 for heading, members in PANELS.items():

@@ -10,13 +10,10 @@ DOCS = "https://github.com/evonav/evonav/blob/main/docs"
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "evaluate": (
-        "evonav evaluate --limit 5 --out out/first",
-        "evonav evaluate --agent fu,ftu,msgnav --tasks tasks --subset test-90 --out out/run",
-        "evonav evaluate --agent ./my_agent.py:MyAgent --agent fu --out out/mine",
-        "evonav evaluate --houses bundled --limit 10 --out out/houses",
-        "evonav evaluate --perception noisy:poor,miss_rate=0.3 --out out/poor",
+        "evonav evaluate --agent fu,ftu --tasks tasks --subset test-90 --out out/run",
+        "evonav evaluate --agent ./my_agent.py:MyAgent --limit 6 --out out/mine",
+        "evonav evaluate --decision looks --set decision.eagerness=0.5 --out out/looks",
         "evonav evaluate --decision vlm --model gpt-4o --dry-run --out out/gpt",
-        "evonav evaluate --agent fu --limit 4 --profile --out out/profiled",
     ),
     "sweep": (
         "evonav sweep sweep.toml --dry-run",
@@ -83,7 +80,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "doctor": ("evonav doctor", "evonav doctor --no-network --json"),
     "agents": ("evonav agents",),
-    "version": ("evonav version",),
     "houses list": ("evonav houses list", "evonav houses list houses.jsonl.gz --limit 10"),
     "houses show": (
         "evonav houses show bundled:3 --out house.html",

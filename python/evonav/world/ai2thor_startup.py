@@ -209,8 +209,8 @@ def _x_display(options: Ai2ThorOptions) -> str | None:
     display = options.x_display or os.environ.get("DISPLAY")
     if display is None and options.platform == "x11":
         raise SimulationError(
-            "no X display: set DISPLAY or --thor-display (`sudo ai2thor-xorg start` makes one on an NVIDIA GPU), "
-            "or take --thor-platform cloud, which needs none"
+            "no X display: set DISPLAY or simulator.x_display (`sudo ai2thor-xorg start` makes one on an NVIDIA GPU), "
+            "or take simulator.platform=cloud, which needs none"
         )
     if display is None and options.executable is not None:
         return "0"  # without meaning for evonav's engine and for builds of CloudRendering
@@ -229,27 +229,27 @@ def _helpful_error(error: Exception, options: Ai2ThorOptions, log_tail: str) -> 
         return SimulatorLostError(f"AI2-THOR's process {cause} while starting{_logged(log_tail)}{advice}")
     if isinstance(cause, TimeoutError):
         return SimulatorLostError(
-            f"AI2-THOR did not come up ({cause}): raise --thor-timeout if the machine is slow{_logged(log_tail)}"
+            f"AI2-THOR did not come up ({cause}): raise simulator.timeout_s if the machine is slow{_logged(log_tail)}"
         )
     if "vulkaninfo" in text:
         return SimulationError(
             "AI2-THOR finds GPUs with `vulkaninfo`, which failed: install vulkan-tools and the GPU's driver, "
-            "and see that `vulkaninfo` lists the GPU; or leave out --thor-gpu"
+            "and see that `vulkaninfo` lists the GPU; or leave out simulator.gpu_device"
         )
     if "nvidia-smi" in text or "Could not find a Vulkan device" in text:
         return SimulationError(
             f"no such GPU ({text}): see what `nvidia-smi -L` and `vulkaninfo` list; "
-            f"without a GPU take --thor-executable {OWN_ENGINE}"
+            f"without a GPU take simulator.executable={OWN_ENGINE}"
         )
     if "Vulkan API driver missing" in text:
         return SimulationError(
             "no Vulkan: CloudRendering needs libvulkan1 and a GPU driver with Vulkan (`vulkaninfo` must list the GPU); "
-            f"without a GPU take --thor-executable {OWN_ENGINE}"
+            f"without a GPU take simulator.executable={OWN_ENGINE}"
         )
     if "No valid X display" in text or "Invalid display" in text:
         return SimulationError(
-            f"no usable X display ({text.splitlines()[-1].strip()}): set DISPLAY or --thor-display, "
-            "or take --thor-platform cloud"
+            f"no usable X display ({text.splitlines()[-1].strip()}): set DISPLAY or simulator.x_display, "
+            "or take simulator.platform=cloud"
         )
     if "no build exists" in text or "No build exists" in text:
         return SimulationError(_no_build(options))
@@ -261,8 +261,8 @@ def _helpful_error(error: Exception, options: Ai2ThorOptions, log_tail: str) -> 
 
 
 _WITHOUT_NETWORK = (
-    "Without a network, copy ~/.ai2thor/releases from a machine with one, name a build with --thor-executable PATH, "
-    f"or take --thor-executable {OWN_ENGINE}"
+    "Without a network, copy ~/.ai2thor/releases from a machine with one, name a build with simulator.executable=PATH, "
+    f"or take simulator.executable={OWN_ENGINE}"
 )
 
 
@@ -279,7 +279,7 @@ def _no_build(options: Ai2ThorOptions) -> str:
         requests.head(build.url, timeout=10.0)
     except requests.RequestException as error:
         return f"AI2-THOR's build cannot be downloaded: {_short(error)}. {_WITHOUT_NETWORK}"
-    return f"there is no AI2-THOR build {build.name}: another commit_id, another platform, or --thor-executable PATH"
+    return f"there is no AI2-THOR build {build.name}: another commit_id, another platform, or simulator.executable=PATH"
 
 
 def _short(error: BaseException) -> str:
@@ -292,5 +292,5 @@ def _advice(log_tail: str) -> str:
     if "vulkan" in text or "vk_" in text:
         return "\nVulkan failed: `vulkaninfo` must list the GPU (libvulkan1, a driver with Vulkan)"
     if "display" in text or "x11" in text:
-        return "\nThe display failed: check --thor-display, or take --thor-platform cloud"
+        return "\nThe display failed: check simulator.x_display, or take simulator.platform=cloud"
     return ""

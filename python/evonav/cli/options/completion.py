@@ -20,14 +20,6 @@ def agents(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in names]
 
 
-def forgetting_rules(incomplete: str) -> list[str]:
-    """Names of forgetting rules; after a comma, further ones."""
-    from evonav.memory.forgetting import RULES
-
-    before, comma, last = incomplete.rpartition(",")
-    return [f"{before}{comma}{name}" for name in RULES if name.startswith(last) and name not in before.split(",")]
-
-
 def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
     """Names of the agents of the run that the command line names before; after a comma, further ones."""
     import json
@@ -40,6 +32,14 @@ def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click'
     before, comma, last = incomplete.rpartition(",")
     names = [name for name in known if name.startswith(last) and name not in before.split(",")]
     return [f"{before}{comma}{name}" for name in names]
+
+
+def sweep_keys(incomplete: str) -> list[str]:
+    """Keys of sweep files."""
+    from evonav.evaluation.run.settings_model import keys_of
+    from evonav.sweeps.file import SweepFile
+
+    return [f"{key}=" for key in keys_of(SweepFile) if key.startswith(incomplete)]
 
 
 def runs(incomplete: str) -> list[str]:

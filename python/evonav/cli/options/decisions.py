@@ -22,11 +22,9 @@ DryRun = Annotated[
     typer.Option(
         "--dry-run",
         rich_help_panel=MODEL_PANEL,
-        help="VLM: ask nothing. Estimate requests, tokens and cost by running a few tasks with the text matcher.",
+        help="VLM: ask nothing; estimate requests, tokens and cost from a few tasks.",
     ),
 ]
-
-HiddenDryRun = Annotated[bool, typer.Option("--dry-run", hidden=True)]
 
 
 def decision_component(

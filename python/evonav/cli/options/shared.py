@@ -18,26 +18,16 @@ if TYPE_CHECKING:
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
 BUNDLED = "bundled"
-_SEVERAL = "Repeat the option for more, or separate them by commas."
+_SEVERAL = "Repeat it, or separate by commas."
 
 Agents = Annotated[
     list[str] | None,
     typer.Option(
         "--agent",
         metavar="NAME",
-        help=f"Agent to run: a name (`evonav agents` lists them), ./file.py:Class or module:Class. {_SEVERAL} "
-        f"Default: {HEURISTICS}.",
+        help="Agent to run: a name (`evonav agents` lists them), with a rule of forgetting fu@bayes, "
+        f"./file.py:Class or module:Class. {_SEVERAL} Default: {HEURISTICS}.",
         autocompletion=completion.agents,
-    ),
-]
-Forgetting = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--forgetting",
-        metavar="RULE",
-        help="Rule by which the agents forget object entries, such as bayes; an agent is then called "
-        f"fu@bayes, as it may be given to --agent, too. {_SEVERAL} Default: none, as in the paper.",
-        autocompletion=completion.forgetting_rules,
     ),
 ]
 RunAgents = Annotated[
@@ -87,21 +77,15 @@ PlotFile = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE", help="Write a plot: .svg, .png or .pdf. It needs the extra `viz`."),
 ]
-HOUSES = (
-    "a file or folder of ProcTHOR houses (JSON, JSONL, also .gz), procthor-10k:SPLIT, evonav-10k:SPLIT, endless:SEED, "
-    "or bundled"
-)
-Houses = Annotated[
-    Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}. Default: use --tasks.")
-]
+HOUSES = "a file or folder of ProcTHOR houses, procthor-10k:SPLIT, evonav-10k:SPLIT, endless:SEED, or bundled"
+Houses = Annotated[Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}.")]
 SomeHouses = Annotated[Path, typer.Option("--houses", metavar="HOUSES", help=f"Houses: {HOUSES}.")]
 AssetFile = Annotated[
     Path | None,
     typer.Option(
         "--assets",
         metavar="FILE",
-        help="JSON file of sizes for assets that are missing from the catalogue, such as Objaverse's in Holodeck's "
-        "houses.",
+        help="JSON file of sizes of assets that are missing from the catalogue, such as Objaverse's.",
     ),
 ]
 StartOfHouses = Annotated[
@@ -109,7 +93,7 @@ StartOfHouses = Annotated[
     typer.Option(
         "--start",
         metavar="file|auto",
-        help="Where the agent starts in a house without a start: nowhere (file), or at a free place (auto).",
+        help="Start where a house has none: none (file), a free place (auto).",
     ),
 ]
 TASKS_HELP = "Folder of tasks, or bundled. Default: the bundled tasks."
@@ -129,14 +113,12 @@ TaskFolder = Annotated[
         autocompletion=completion.task_folders,
     ),
 ]
-Limit = Annotated[
-    int | None, typer.Option(min=1, metavar="N", help="Take only the first N tasks or houses. Default: all.")
-]
+Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Take only the first N tasks or houses.")]
 Subset = Annotated[
     str | None,
     typer.Option(
         metavar="SPLIT-N",
-        help="Take only a named subset of the tasks, such as test-90, which is the same for everyone. Default: all.",
+        help="Take only a named subset, such as test-90.",
         autocompletion=completion.subsets,
     ),
 ]
@@ -149,8 +131,12 @@ AnyAsset = Annotated[
     bool,
     typer.Option(
         "--allow-unknown-assets",
-        help="Give assets that are missing from the catalogue the usual size of their category.",
+        help="Give missing assets the usual size of their category.",
     ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=0, metavar="N", help="Number of worker processes; 0 runs in this process. Default: one per core."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table, for other programs.")]
 Against = Annotated[
@@ -161,9 +147,7 @@ Against = Annotated[
         "exit code is 1.",
     ),
 ]
-RetryErrored = Annotated[
-    bool, typer.Option("--retry-errored", help="Run stages again that errored, or were skipped because of one.")
-]
+RetryErrored = Annotated[bool, typer.Option("--retry-errored", help="Run errored and skipped stages again.")]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run; an unfinished run is resumed.")]
 
 
@@ -188,19 +172,16 @@ def house_options(assets: Path | None, start: str) -> "HouseOptions | None":
     return HouseOptions.of(assets, "auto" if start == "auto" else "file")
 
 
-def names_of(agents: "Sequence[str] | None", rules: "Sequence[str] | None" = None) -> list[str]:
-    """Return the agents that the option `--agent` names; the paper's heuristics if it is not given.
+def names_of(agents: "Sequence[str] | None") -> list[str]:
+    """Return the agents that the option `--agent` names; the paper's heuristics if it is not given."""
+    return listed(agents) or listed([HEURISTICS])
 
-    Args:
-        agents: Texts of the option `--agent`.
-        rules: Texts of the option `--forgetting`: each agent is returned once for each rule.
-    """
-    names = listed(agents) or listed([HEURISTICS])
-    if not rules:
-        return names
-    from evonav.agents.registry import with_rule
 
-    return [with_rule(name, rule) for name in names for rule in listed(rules)]
+def num_workers_of(workers: int | None) -> int:
+    """Return the number of workers: the given one, or one per core."""
+    from evonav.parallel.local import num_cores
+
+    return num_cores() if workers is None else workers
 
 
 def listed(texts: "Sequence[str] | None") -> list[str]:

@@ -7,19 +7,15 @@ import typer
 
 from evonav.cli.display import progress_bar
 from evonav.cli.options import completion
-from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import BUNDLED, Limit, Subset, chosen_tasks
+from evonav.cli.options.shared import BUNDLED, Limit, Subset, Workers, chosen_tasks, num_workers_of
 from evonav.cli.results.submission import SCORES_ONLY_HELP
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.tasks.listing import TaskFile
 
 
-@with_settings("workers")
 def leaderboard(
-    workers: "RunSettings",
     packs: Annotated[
         list[Path], typer.Argument(metavar="PACK", help="Packed runs, from `evonav pack`, or folders of them.")
     ],
@@ -38,6 +34,7 @@ def leaderboard(
     scores_only: Annotated[bool, typer.Option("--scores-only", help=SCORES_ONLY_HELP)] = False,
     page_title: Annotated[str, typer.Option(metavar="TEXT", help="Title of the page.")] = "leaderboard",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Page to write.")] = Path("out/leaderboard.html"),
+    workers: Workers = None,
 ) -> None:
     """Verify packed runs and rank their agents on a page.
 
@@ -54,7 +51,7 @@ def leaderboard(
             task_sets.append(TaskSet(_name(folder, found, limit, subset), tuple(found)))
     with progress_bar("verifying") as on_progress:
         board = rank(
-            files, task_sets, scores_only=scores_only, num_workers=workers.num_workers, on_progress=on_progress
+            files, task_sets, scores_only=scores_only, num_workers=num_workers_of(workers), on_progress=on_progress
         )
     for one in board.unranked:
         typer.echo(f"{one.status}: {one.file}: {one.detail}")

@@ -1,12 +1,12 @@
 """`evonav perception`: measure perceptions against the truth."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from evonav.cli.display import interruptible, progress_bar, show_tables
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import set_option, settings_from
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     AnyAsset,
@@ -14,19 +14,17 @@ from evonav.cli.options.shared import (
     Seed,
     Subset,
     Tasks,
+    Workers,
     chosen_tasks,
+    num_workers_of,
 )
 from evonav.counted import counted
 
-if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import PerceptionSettings
+KEYS = ("perception.models", "perception.device")
+"""The keys that `--set` takes."""
 
 
-@with_settings("workers", "models")
 def perception(
-    workers: "RunSettings",
-    models: "PerceptionSettings",
     tasks: Tasks = None,
     perceptions: Annotated[
         list[str] | None,
@@ -60,6 +58,8 @@ def perception(
     ] = 2,
     seed: Seed = 0,
     allow_unknown_assets: AnyAsset = False,
+    workers: Workers = None,
+    set_: Annotated[list[str] | None, set_option(*KEYS)] = None,
 ) -> None:
     """Measure what perceptions find and remember, against the truth.
 
@@ -71,8 +71,11 @@ def perception(
     from evonav.perception_benchmark.tables import perception_tables
 
     names = perceptions or ["gt"]
+    models = settings_from({}, set_, KEYS).perception
     if models.model_fields_set and not any(word.startswith("predicted") for word in names):
-        raise typer.BadParameter("--models and --device are for --perception predicted")
+        raise typer.BadParameter(
+            f"--set perception.{next(iter(models.model_fields_set))} is for --perception predicted"
+        )
     specs = []
     for word in names:
         settings = models if word.startswith("predicted") else PerceptionSettings()
@@ -86,7 +89,7 @@ def perception(
                 out,
                 config=TourConfig(views_per_room, houses_per_task, seed),
                 simulator=simulation.component(),
-                num_workers=workers.num_workers,
+                num_workers=num_workers_of(workers),
                 on_progress=on_progress,
             )
         for word, task_id, why in measured.failures:

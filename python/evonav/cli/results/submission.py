@@ -6,12 +6,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import percent, print_checks, progress_bar, show
-from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AsJson, Limit, RunAgents, RunFolder, Subset, Tasks, chosen_tasks, listed
+from evonav.cli.options.shared import (
+    AsJson,
+    Limit,
+    RunAgents,
+    RunFolder,
+    Subset,
+    Tasks,
+    Workers,
+    chosen_tasks,
+    listed,
+    num_workers_of,
+)
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.submission.verify import Verdict
 
 EXIT_REJECTED = 1
@@ -51,9 +60,7 @@ def pack(
     typer.echo(f"next: evonav verify {target}")
 
 
-@with_settings("workers")
 def verify(
-    workers: "RunSettings",
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A packed run, from `evonav pack`.")],
     tasks: Tasks = None,
     limit: Limit = None,
@@ -63,6 +70,7 @@ def verify(
         typer.Option("--scores-only", help=SCORES_ONLY_HELP),
     ] = False,
     as_json: AsJson = False,
+    workers: Workers = None,
 ) -> None:
     """Check a packed run by replaying its actions.
 
@@ -79,7 +87,7 @@ def verify(
             task_files,
             limit=limit,
             scores_only=scores_only,
-            num_workers=workers.num_workers,
+            num_workers=num_workers_of(workers),
             on_progress=on_progress,
         )
     if as_json:

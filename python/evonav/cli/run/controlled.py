@@ -8,7 +8,17 @@ import typer
 from evonav.cli.display import interruptible, print_table, show_tables, status
 from evonav.cli.group import Command, new_app
 from evonav.cli.options.decisions import decision_component
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import (
+    BaseUrl,
+    Decision,
+    Isolation,
+    MaxCost,
+    Model,
+    Perception,
+    Prices,
+    Set,
+    settings_from,
+)
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     HOUSES,
@@ -20,16 +30,15 @@ from evonav.cli.options.shared import (
     RetryErrored,
     Seed,
     StartOfHouses,
+    Workers,
     house_options,
     names_of,
+    num_workers_of,
 )
 from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import Progress
-    from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings
 
 controlled_app = new_app(
     "controlled",
@@ -42,9 +51,7 @@ Directory = Annotated[
 
 
 @controlled_app.command(cls=Command)
-@with_settings("workers")
 def generate(
-    workers: "RunSettings",
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Folder of the analysis; an unfinished analysis is resumed.")
     ],
@@ -69,6 +76,7 @@ def generate(
     allow_unknown_assets: AnyAsset = False,
     assets: AssetFile = None,
     start: StartOfHouses = "file",
+    workers: Workers = None,
 ) -> None:
     """Generate the same tasks in arms that differ in one thing.
 
@@ -77,6 +85,7 @@ def generate(
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
+    from evonav.parallel.worker import Workforce
 
     chosen: dict[str, Any] = {}
     if rates is not None:
@@ -98,7 +107,7 @@ def generate(
             options=options,
             limit=limit,
             completion=house_options(assets, start),
-            workforce=workers.workforce(),
+            workforce=Workforce(num_workers_of(workers)),
             on_progress=lambda done, total: show(f"{done} of {total}"),
         )
     record = made.record
@@ -109,16 +118,20 @@ def generate(
 
 
 @controlled_app.command(cls=Command)
-@with_settings("run", "perception", "decisions", "spending")
 def evaluate(
     directory: Directory,
-    run: "RunSettings",
-    perception: "PerceptionSettings",
-    decisions: "DecisionSettings",
-    spending: "SpendingSettings",
     agent: Agents = None,
     seed: Seed = 0,
     retry_errored: RetryErrored = False,
+    set_: Set = None,
+    perception: Perception = "gt",
+    workers: Workers = None,
+    isolation: Isolation = None,
+    decision: Decision = "text",
+    model: Model = None,
+    base_url: BaseUrl = None,
+    prices: Prices = None,
+    max_cost: MaxCost = None,
 ) -> None:
     """Evaluate agents in every arm; run again to resume.
 
@@ -127,16 +140,18 @@ def evaluate(
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
-    simulation = SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets)
-    run = run.with_episodes([decisions], [simulation])
+    given = {"simulator.allow_unknown_assets": record.allow_unknown_assets, "perception.make": perception}
+    given |= {"workers": workers, "isolation": isolation, "decision.kind": decision, "decision.model": model}
+    given |= {"decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
+    run = settings_from(given, set_)
+    run = run.with_episodes([run.decision], [run.simulator])
     workforce = run.workforce()
     backend = Backend(
-        simulator=simulation.component(),
-        perception=perception.component(),
-        decision=decision_component(decisions, spending, directory, seed, run.num_episodes),
+        simulator=run.simulator.component(),
+        perception=run.perception.component(),
+        decision=decision_component(run.decision, run, directory, seed, run.num_episodes),
     )
     names = names_of(agent)
 
@@ -148,7 +163,7 @@ def evaluate(
         summaries = evaluate_controlled(
             directory,
             names,
-            config=run.config(seed, backend, decisions),
+            config=run.config(seed, backend, run.decision),
             workforce=workforce,
             num_retries=run.num_retries,
             retry_errored=retry_errored,

@@ -9,12 +9,23 @@ import typer
 
 from evonav.cli.display import generation_progress, interruptible, print_table, progress, show_tables, status
 from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import (
+    BaseUrl,
+    Decision,
+    Isolation,
+    MaxCost,
+    Model,
+    Perception,
+    Prices,
+    Set,
+    Simulator,
+    settings_from,
+)
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     Agents,
+    AnyAsset,
     AssetFile,
-    Forgetting,
     Houses,
     Limit,
     Out,
@@ -23,6 +34,7 @@ from evonav.cli.options.shared import (
     StartOfHouses,
     Subset,
     Tasks,
+    Workers,
     chosen_tasks,
     names_of,
     read_houses,
@@ -34,40 +46,44 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from contextlib import AbstractContextManager
 
     from evonav.evaluation.metrics.navigation import AgentSummary
-    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import Progress, RunConfig
-    from evonav.evaluation.run.run_settings import RunSettings
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
+    from evonav.evaluation.run.settings import CommandSettings
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
 
 DEVELOP_PANEL = "For agents under development"
 
 
-@with_settings("run", "simulation", "perception", "decisions", "spending")
 def evaluate(
+    context: typer.Context,
     out: Out,
-    run: "RunSettings",
-    simulation: "SimulatorSettings",
-    perception: "PerceptionSettings",
-    decisions: "DecisionSettings",
-    spending: "SpendingSettings",
     agent: Agents = None,
-    forgetting: Forgetting = None,
     houses: Houses = None,
     assets: AssetFile = None,
     start: StartOfHouses = "file",
+    allow_unknown_assets: AnyAsset = False,
     tasks: Tasks = None,
     limit: Limit = None,
     subset: Subset = None,
     seed: Seed = 0,
     retry_errored: RetryErrored = False,
+    set_: Set = None,
+    simulator: Simulator = "embedded",
+    perception: Perception = "gt",
+    workers: Workers = None,
+    isolation: Isolation = None,
+    decision: Decision = "text",
+    model: Model = None,
+    base_url: BaseUrl = None,
+    prices: Prices = None,
+    max_cost: MaxCost = None,
+    dry_run: DryRun = False,
     fail_fast: Annotated[
         bool,
         typer.Option(
             "--fail-fast",
             rich_help_panel=DEVELOP_PANEL,
-            help="Stop at the first stage that errors and print its traceback; the next call runs it again.",
+            help="Stop at the first errored stage with its traceback.",
         ),
     ] = False,
     pdb: Annotated[
@@ -75,7 +91,7 @@ def evaluate(
         typer.Option(
             "--pdb",
             rich_help_panel=DEVELOP_PANEL,
-            help="Open the debugger where an agent raises, then stop. Agents run in this process; it needs a terminal.",
+            help="Open the debugger where an agent raises, then stop.",
         ),
     ] = False,
     profile: Annotated[
@@ -83,23 +99,26 @@ def evaluate(
         typer.Option(
             "--profile",
             rich_help_panel=DEVELOP_PANEL,
-            help="Print where CPU time goes, and write a flame graph for speedscope.app, in OUT/profile.",
+            help="Print where CPU time goes; write a flame graph to OUT/profile.",
         ),
     ] = False,
-    dry_run: DryRun = False,
 ) -> None:
     """Evaluate agents on tasks; run again to resume.
 
-    By default, three agents run on the bundled tasks. Look at the results with `evonav report OUT` and `evonav view
-    OUT`.
+    Three agents run on the bundled tasks by default. Look at the results with `evonav report OUT`.
     """
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunRequest, evaluate_all
 
+    context.with_resource(early_worker())
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     if houses is None and (assets is not None or start != "file"):
         raise typer.BadParameter("--assets and --start belong to --houses: tasks hold houses as they were generated")
+    given = {"simulator.kind": simulator, "simulator.allow_unknown_assets": allow_unknown_assets}
+    given |= {"perception.make": perception, "workers": workers, "isolation": isolation, "decision.kind": decision}
+    given |= {"decision.model": model, "decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
+    run = settings_from(given, set_)
     if profile:
         run = profiled(run)
     if pdb:
@@ -107,21 +126,21 @@ def evaluate(
 
         check_terminal()
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
-    run = run.with_episodes([decisions], [simulation])
+    run = run.with_episodes([run.decision], [run.simulator])
     workforce = run.workforce()
     backend = Backend(
-        simulator=simulation.component(),
-        perception=perception.component(),
-        decision=decision_component(decisions, spending, out, seed, run.num_episodes, dry_run=dry_run),
+        simulator=run.simulator.component(),
+        perception=run.perception.component(),
+        decision=decision_component(run.decision, run, out, seed, run.num_episodes, dry_run=dry_run),
     )
-    config = run.config(seed, backend, decisions)
+    config = run.config(seed, backend, run.decision)
     config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))
-    names = names_of(agent, forgetting)
-    allows_any = simulation.allow_unknown_assets
+    names = names_of(agent)
+    allows_any = run.simulator.allow_unknown_assets
     texts = None if houses is None else read_houses(houses, assets, start)
     with run_tasks(out, texts, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
         if dry_run:
-            print_estimate(spending, names, task_files, config, run.num_workers)
+            print_estimate(run, names, task_files, config, run.num_workers)
             return
         with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
             (summaries,) = evaluate_all(
@@ -143,9 +162,6 @@ def early_worker() -> "AbstractContextManager[None]":
     from evonav.parallel.local import started_early
 
     return started_early(PROGRAM)
-
-
-evaluate.beginning = early_worker  # type: ignore[attr-defined]
 
 
 @contextmanager
@@ -237,7 +253,7 @@ def print_results(out: Path, summaries: "list[AgentSummary]") -> None:
     print_spending(out)
 
 
-def profiled(run: "RunSettings") -> "RunSettings":
+def profiled(run: "CommandSettings") -> "CommandSettings":
     """Return settings with which all processes of a run can be sampled.
 
     Raises:
@@ -248,11 +264,11 @@ def profiled(run: "RunSettings") -> "RunSettings":
     if not IS_SUPPORTED:
         raise typer.BadParameter("--profile needs a system with interval timers, such as Linux or macOS")
     if run.engine == "ray":
-        raise typer.BadParameter("--profile samples workers on this machine only: use --engine local")
+        raise typer.BadParameter("--profile samples workers on this machine only: not with engine=ray")
     if run.isolation == "sandbox":
         raise typer.BadParameter("--profile needs agents that can write their samples: use --isolation process")
     if (run.episodes_at_once or 1) > 1:
-        raise typer.BadParameter("--profile samples one thread of each worker: use --episodes-at-once 1")
+        raise typer.BadParameter("--profile samples one thread of each worker: use --set episodes_at_once=1")
     return run.model_copy(update={"isolation": run.isolation or "process", "episodes_at_once": 1})
 
 

@@ -7,23 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import EXIT_INTERRUPTED, show, show_tables
-from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
+from evonav.cli.options import completion
+from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored, Workers
 from evonav.counted import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.sweeps.file import SweepFile
     from evonav.sweeps.run import Cell, CellRun
     from evonav.sweeps.summary import SweepRow
     from evonav.tasks.listing import TaskFile
 
 
-@with_settings("changes")
 def sweep(
-    changes: "RunSettings",
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="Sweep file in TOML.", show_default=False)] = None,
     out: Annotated[
         Path | None,
@@ -35,6 +32,7 @@ def sweep(
             "--set",
             metavar="KEY=VALUE",
             help="Change a value of the file, such as seeds=[0,1] or protocol.max_rounds=20. Repeat for more.",
+            autocompletion=completion.sweep_keys,
         ),
     ] = None,
     only: Annotated[
@@ -45,6 +43,7 @@ def sweep(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Run nothing: list cells, stages and the estimated cost of models.")
     ] = False,
+    workers: Workers = None,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of sweep files, which editors use.")
     ] = False,
@@ -63,9 +62,7 @@ def sweep(
     from evonav.sweeps.file import read_sweep
     from evonav.sweeps.run import cell_runs, cells_of, chosen, task_sets
 
-    flags = changes.model_dump(exclude_unset=True)
-    every_change = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items())]
-    settings = read_sweep(file, every_change)
+    settings = read_sweep(file, [*(set_ or ()), *([] if workers is None else [f"workers={workers}"])])
     folder = out or Path(settings.out or f"out/{file.stem}")
     cells = cells_of(settings)
     selected = chosen(cells, only or ())

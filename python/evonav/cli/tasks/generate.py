@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import POOL_KEYS, PoolSet, settings_from
 from evonav.cli.options.shared import (
     AnyAsset,
     AssetFile,
@@ -16,18 +16,16 @@ from evonav.cli.options.shared import (
     SomeHouses,
     StartOfHouses,
     Subset,
+    Workers,
     read_houses,
 )
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.generation.dataset import GenerationSummary
 
 
-@with_settings("pool")
 def generate(
-    pool: "RunSettings",
     houses: SomeHouses,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the tasks; an unfinished one is resumed.")],
     limit: Limit = None,
@@ -61,6 +59,8 @@ def generate(
     allow_unknown_assets: AnyAsset = False,
     assets: AssetFile = None,
     start: StartOfHouses = "file",
+    workers: Workers = None,
+    set_: PoolSet = None,
 ) -> None:
     """Generate tasks from houses; run again to resume.
 
@@ -70,7 +70,7 @@ def generate(
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
 
-    workforce = pool.workforce()
+    workforce = settings_from({"workers": workers}, set_, POOL_KEYS).workforce()
     texts = read_houses(houses, assets, start)
     dataset, inherited_split = inherited_names(texts)
     options = GenerationOptions(

@@ -8,7 +8,7 @@ import typer
 
 from evonav.cli.display import house_progress, interruptible, show_tables, status
 from evonav.cli.group import HELP_NAMES, Command, Group, new_app
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import POOL_KEYS, PoolSet, settings_from
 from evonav.cli.options.shared import (
     BUNDLED,
     HOUSES,
@@ -17,13 +17,13 @@ from evonav.cli.options.shared import (
     Limit,
     Seed,
     StartOfHouses,
+    Workers,
     listed,
     read_houses,
 )
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.generation.house_classifier import ClassifierTest
     from evonav.generation.house_statistics import HouseComparison
     from evonav.report.tables.table import Table
@@ -146,9 +146,7 @@ def check_houses(
 
 
 @houses_app.command(name="make", cls=Command)
-@with_settings("pool")
 def make(
-    pool: "RunSettings",
     out: Annotated[
         Path,
         typer.Option(metavar="FILE", help="File of the houses, .jsonl or .jsonl.gz; a part is resumed."),
@@ -160,6 +158,8 @@ def make(
         Path | None,
         typer.Option(metavar="FILE", help="TOML file of parameters: rooms, sizes, furniture. Default: ProcTHOR's."),
     ] = None,
+    workers: Workers = None,
+    set_: PoolSet = None,
 ) -> None:
     """Make houses from a seed, as ProcTHOR does; run again to resume."""
     from evonav.house.generated import read_house_parameters
@@ -173,7 +173,7 @@ def make(
             seed=seed,
             first=first,
             parameters=parameters,
-            workforce=pool.workforce(),
+            workforce=settings_from({"workers": workers}, set_, POOL_KEYS).workforce(),
             on_progress=show,
         )
     rate = f", {made.num_new / made.seconds:.1f} houses/s" if made.num_new else ""
@@ -260,9 +260,7 @@ def comparison_table(found: "HouseComparison", names: tuple[str, str], *, every:
 
 
 @houses_app.command(name="fetch", cls=Command)
-@with_settings("pool")
 def fetch_houses(
-    pool: "RunSettings",
     dataset: Annotated[
         str,
         typer.Argument(metavar="DATASET", help="Dataset: procthor-10k, which is downloaded, or evonav-10k, made here."),
@@ -281,6 +279,8 @@ def fetch_houses(
         Path | None,
         typer.Option(metavar="FOLDER", help="Folder of the download. Default: EVONAV_CACHE, else ~/.cache/evonav."),
     ] = None,
+    workers: Workers = None,
+    set_: PoolSet = None,
 ) -> None:
     """Download a published dataset of houses, or make that of evonav; run again to resume.
 
@@ -304,7 +304,12 @@ def fetch_houses(
             num_houses, path = evonav10k.SPLITS[name].num_houses, evonav10k.split_path(name, cache)
             state = "verified" if path.exists() else "made"
             with interruptible(path), house_progress(num_houses) as show:
-                evonav10k.made_split(name, cache=cache, workforce=pool.workforce(), on_progress=show)
+                evonav10k.made_split(
+                    name,
+                    cache=cache,
+                    workforce=settings_from({"workers": workers}, set_, POOL_KEYS).workforce(),
+                    on_progress=show,
+                )
             typer.echo(f"{dataset}:{name}\t{counted(num_houses, 'house')}\t{state}\t{path}")
         return
     with status(f"Fetching {NAME}") as tell:

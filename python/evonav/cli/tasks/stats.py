@@ -5,22 +5,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import BUNDLED, PlotFile, task_folder
+from evonav.cli.options.shared import BUNDLED, PlotFile, Workers, num_workers_of, task_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.tasks.statistics import Estimate, Metric, TaskStatistics, Test
 
 NUM_NAMES = 6
 """Largest number of values of a distribution in one line."""
 
 
-@with_settings("workers")
 def stats(
-    workers: "RunSettings",
     folders: Annotated[
         list[Path] | None,
         typer.Argument(metavar="FOLDER", help="Folders of tasks, or bundled. Default: the bundled tasks."),
@@ -37,6 +33,7 @@ def stats(
         ),
     ] = None,
     plot: PlotFile = None,
+    workers: Workers = None,
 ) -> None:
     """Print and plot statistics of tasks beside the paper's."""
     from contextlib import ExitStack
@@ -52,7 +49,7 @@ def stats(
         found = statistics_of_folders(
             [stack.enter_context(task_folder(folder)) for folder in folders or [Path(BUNDLED)]],
             mix=reweight,
-            num_workers=workers.num_workers,
+            num_workers=num_workers_of(workers),
             on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,
         )
     print_statistics(found)

@@ -6,21 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import progress_bar
-from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AnyAsset, AsJson, Limit, TaskFolder, task_folder
+from evonav.cli.options.shared import AnyAsset, AsJson, Limit, TaskFolder, Workers, num_workers_of, task_folder
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.run_settings import RunSettings
     from evonav.generation.validation import FolderReport
 
 NUM_EXAMPLES = 3
 """Largest number of examples of each kind of problem in the table."""
 
 
-@with_settings("workers")
 def validate(
-    workers: "RunSettings",
     folder: TaskFolder = None,
     limit: Limit = None,
     as_json: AsJson = False,
@@ -28,6 +24,7 @@ def validate(
         bool, typer.Option("--verbose", help="Also count oddities that the source houses have themselves.")
     ] = False,
     allow_unknown_assets: AnyAsset = False,
+    workers: Workers = None,
 ) -> None:
     """Check that tasks are complete, correct and hide the answers.
 
@@ -39,7 +36,7 @@ def validate(
         report = validate_folder(
             found,
             limit=limit,
-            num_workers=workers.num_workers,
+            num_workers=num_workers_of(workers),
             allow_unknown_assets=allow_unknown_assets,
             on_progress=on_progress,
         )

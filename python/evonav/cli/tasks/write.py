@@ -7,42 +7,45 @@ import typer
 
 from evonav.cli.display import progress_bar
 from evonav.cli.options.decisions import DryRun
-from evonav.cli.options.settings import with_settings
+from evonav.cli.options.settings import BaseUrl, MaxCost, Model, Prices, set_option, settings_from
 from evonav.cli.options.shared import EXIT_INCOMPLETE, Limit
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.decision_resources import SpendingSettings
-    from evonav.evaluation.run.settings import DecisionSettings
     from evonav.generation.instructions.writer import Writing
 
-
+KEYS = ("decision.mode", "decision.exchanges", "decision.images")
+"""The keys that `--set` takes."""
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of tasks, which are rewritten in place.")]
 Concurrency = Annotated[int, typer.Option(min=1, metavar="N", help="Number of questions asked at the same time.")]
 
 
-@with_settings("endpoint", "spending")
 def write(
     folder: Folder,
-    endpoint: "DecisionSettings",
-    spending: "SpendingSettings",
-    concurrency: Concurrency = 4,
-    dry_run: DryRun = False,
     limit: Limit = None,
+    concurrency: Concurrency = 4,
+    set_: Annotated[list[str] | None, set_option(*KEYS)] = None,
+    model: Model = None,
+    base_url: BaseUrl = None,
+    prices: Prices = None,
+    max_cost: MaxCost = None,
+    dry_run: DryRun = False,
 ) -> None:
     """Let a model rewrite instructions; run again to resume.
 
-    With the paper's prompts, it describes how goals look and merges the parts of each instruction. With --no-images it
-    only merges them. The key is read from OPENAI_API_KEY.
+    With the paper's prompts, it describes how goals look and merges the parts of each instruction. With
+    `--set decision.images=false` it only merges them. The key is read from OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.client import VlmClient, VlmConfig
     from evonav.decision.vlm.response_cache import ResponseCache
     from evonav.generation.instructions.writer import estimate_texts, write_texts
 
-    model = endpoint.named_model()
-    account = Account(spending.price(model), spending.max_cost)
-    config = VlmConfig(model, base_url=endpoint.base_url, max_concurrency=concurrency)
+    given = {"decision.model": model, "decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
+    settings = settings_from(given, set_, KEYS)
+    endpoint, name = settings.decision, settings.decision.named_model()
+    account = Account(settings.price(name), settings.max_cost)
+    config = VlmConfig(name, base_url=endpoint.base_url, max_concurrency=concurrency)
     store = None if endpoint.exchanges is None else ResponseCache(Path(endpoint.exchanges))
     client = VlmClient(config, store=store, mode=endpoint.mode, account=account)
     if dry_run:

@@ -1,7 +1,6 @@
 """Declare the options of a run's parts, once for Python, sweep files and commands (`run_settings`: of its workers).
 
-Sweep files are validated by these models, and the command derives its options from them
-(`evonav.cli.options.settings`). Each model builds a `Component`.
+Sweep files and the options of commands are validated by these models. Each model builds a `Component`.
 """
 
 import os
@@ -17,6 +16,8 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.errors import StoreError
 from evonav.evaluation.run.components import USUAL_CAMERA
+from evonav.evaluation.run.decision_resources import SpendingSettings
+from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings_model import SettingError, Settings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
@@ -336,6 +337,14 @@ class DecisionSettings(Settings):
             "mode": "auto" if mode == "record" else mode,
             "keeps_images": self.exchange_images,
         }
+
+
+class CommandSettings(RunSettings, SpendingSettings):
+    """The settings of one run, as a command's options give them; the keys are those of sweep files."""
+
+    simulator: SimulatorSettings = SimulatorSettings()
+    perception: PerceptionSettings = PerceptionSettings()
+    decision: DecisionSettings = DecisionSettings()
 
 
 def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
