@@ -127,10 +127,9 @@ bench: setup  ## time the kernels against their peers, and write benches/README.
 wheel: $(VENV)/.maturin  ## build the wheel into dist
 	$(BIN)/maturin build --release --out dist
 
-# The bundled tasks, made again from the bundled houses, and the JSON Schema of their files from the records.
-data: setup  ## make the bundled tasks and the JSON Schema again
+# The bundled tasks, made again from the bundled houses.
+data: setup  ## make the bundled tasks again
 	$(BIN)/python scripts/data/build_tasks.py
-	$(BIN)/evonav tasks schema --out python/evonav/tasks/schema
 
 # The results and the picture of the README, from a fresh demo.
 readme: setup  ## renew the table and the picture of the README

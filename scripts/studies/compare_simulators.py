@@ -59,7 +59,7 @@ def differing_records(one: Path, other: Path) -> Iterator[str]:
             for name in StageRecord.model_fields:
                 if getattr(left, name) != getattr(right, name):
                     yield f"{place}: {name}: {_brief(getattr(left, name))} and {_brief(getattr(right, name))}"
-        if list(a.record_texts()) != list(b.record_texts()) or list(a.maps()) != list(b.maps()):
+        if list(a.record_texts()) != list(b.record_texts()) or list(a.floor_plans()) != list(b.floor_plans()):
             yield "the stored texts or the maps differ"
 
 

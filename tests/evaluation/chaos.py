@@ -91,7 +91,7 @@ def disturb(command, run_dir, num_stages, num_kills, seed, environment=None):
 
 def texts(run_dir):
     with RunStore(run_dir) as store:
-        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.maps())]
+        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.floor_plans())]
 
 
 def main():

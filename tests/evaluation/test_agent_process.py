@@ -172,7 +172,7 @@ def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
         found = list(own.record_texts(agent))
         assert len(found) == 2
         assert found == list(shared.record_texts(agent))
-        assert list(own.maps()) == list(shared.maps())
+        assert list(own.floor_plans()) == list(shared.floor_plans())
     if agent != "stay-still":  # which stops at once
         assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in found)
 

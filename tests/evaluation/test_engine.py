@@ -38,7 +38,7 @@ def tasks(tmp_path):
 
 def texts(run_dir):
     with RunStore(run_dir) as store:
-        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.maps())]
+        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.floor_plans())]
 
 
 def records(run_dir, agent):

@@ -1,5 +1,3 @@
-import json
-import sqlite3
 from dataclasses import fields
 
 import pytest
@@ -9,7 +7,7 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics, metrics_of, re
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
-from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.records.store import RunStore
 
 
 def memory(num_entries=4, num_right=3, num_held=2, num_seen=4, num_seen_held=1):
@@ -130,21 +128,6 @@ def test_costs_come_from_the_side_table_and_never_from_records(tmp_path):
     assert row.num_retries == 0
 
 
-def test_measures_of_another_version_or_none_are_derived_again(tmp_path):
-    with store_of(tmp_path, made_up_record(), made_up_record(stage=2), made_up_record(EndState.SUCCESS, stage=3)) as it:
-        kept = read_stage_metrics(it)
-    with sqlite3.connect(tmp_path / FILE_NAME) as db:
-        db.execute("DELETE FROM measures WHERE stage = 1")
-        db.execute("UPDATE measures SET version = 0, measures = '{}' WHERE stage = 2")
-        text = db.execute("SELECT record FROM stages WHERE stage = 3").fetchone()[0]
-        # As the first runs had it: less fields.
-        old = {key: value for key, value in json.loads(text).items() if key not in ("memory_at_end", "stale_entries")}
-        db.execute("UPDATE stages SET record = ? WHERE stage = 3", (json.dumps(old),))
-        db.execute("DELETE FROM measures WHERE stage = 3")
-    with RunStore(tmp_path) as store:
-        assert read_stage_metrics(store) == kept
-
-
 def test_rows_are_flat_and_of_the_agents_asked_for(tmp_path):
     with store_of(tmp_path, made_up_record(agent="a"), made_up_record(agent="b")) as store:
         assert [row.agent for row in read_stage_metrics(store, ["b"])] == ["b"]
@@ -154,10 +137,10 @@ def test_rows_are_flat_and_of_the_agents_asked_for(tmp_path):
     assert next(field.name for field in fields(StageMetrics)) == "agent"
 
 
-def test_forgetting_an_episode_forgets_its_measures(tmp_path):
+def test_forgetting_an_episode_forgets_its_metrics(tmp_path):
     with store_of(tmp_path, made_up_record(), made_up_record(stage=2), costs=StageCosts(cost_usd=1.0)) as store:
         store.forget_episode("fu", "t", 2)
         assert [row.stage for row in read_stage_metrics(store)] == [1]
-        assert [key for key, _, _ in store.encoded_metrics()] == list(store.costs()) == [("fu", "t", 1)]
+        assert [key for key, _ in store.encoded_metrics()] == list(store.costs()) == [("fu", "t", 1)]
         store.add_stage(encode_stage(made_up_record(stage=2), wall_s=1.0, cpu_s=1.0, costs=StageCosts(cost_usd=2.0)))
         assert read_stage_metrics(store)[1].cost_usd == 2.0

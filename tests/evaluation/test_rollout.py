@@ -58,7 +58,7 @@ def test_trace_adds_up_to_the_record():
             assert entry.path_m[-1] == (after.pose.x_m, after.pose.z_m)
             assert sum(math.dist(a, b) for a, b in pairwise(entry.path_m)) <= 1.0 + 1e-6
             assert all(math.dist(a, b) <= 0.25 + 1e-9 for a, b in pairwise(entry.path_m))
-        assert StageRecord.model_validate_json(record.to_json()) == record
+        assert StageRecord.model_validate_json(record.model_dump_json()) == record
 
 
 class Listening(StayStill):

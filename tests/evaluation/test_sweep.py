@@ -62,7 +62,7 @@ def texts(out, cells=CELLS):
     found = {}
     for cell in cells:
         with RunStore(out / "runs" / cell) as store:
-            found[cell] = [*store.record_texts(), *(plan.model_dump_json() for plan in store.maps())]
+            found[cell] = [*store.record_texts(), *(plan.model_dump_json() for plan in store.floor_plans())]
     return found
 
 

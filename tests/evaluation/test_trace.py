@@ -133,7 +133,7 @@ def test_a_replay_equals_the_records_and_has_every_round(tmp_path, agent):
     stages = replay_of(run_dir, agent, on_round=lambda stage, number: told.append((stage, number)))
     with RunStore(run_dir) as store:
         stored = list(store.record_texts(agent, "toy-moved"))
-    assert [stage.record.to_json() for stage in stages] == stored
+    assert [stage.record.model_dump_json() for stage in stages] == stored
     assert all(stage.differences == () and stage.is_replayed for stage in stages)
     for stage in stages:
         assert [step.record for step in stage.rounds] == list(stage.record.trace)
@@ -289,7 +289,7 @@ def test_what_cannot_be_run_again_is_shown_as_recorded(own_fu_run):
     assert "simulator_lost" in stages[1].why_not
     assert [len(stage.rounds) for stage in stages] == [stage.record.num_rounds for stage in stages]
     assert all(step.views == () and step.map is None for step in stages[1].rounds)
-    assert stages[1].stage_map is not None
+    assert stages[1].floor_plan is not None
 
 
 def test_an_agent_that_cannot_tell_its_belief_costs_nothing_but_that(tmp_path):

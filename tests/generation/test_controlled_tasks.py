@@ -60,7 +60,7 @@ def test_arms_of_a_pair_are_equal_up_to_the_change(pairs):
 def test_the_second_stages_goal_is_seen_first_and_lies_outside_of_the_room_where_the_walk_ends(pairs):
     for arms in pairs:
         task = arms["evolved"]
-        assert task.header.control.forced_stages == (1, 2)
+        assert task.header.control.guided_stages == (1, 2)
         assert task.public(3).unified_instruction == task.public(1).unified_instruction
         assert task.oracle(1).reference_visible_px >= SMALL.reference_min_visible_px
         assert task.oracle(3).state.transition_room_id == task.oracle(2).target.room_id
@@ -107,19 +107,17 @@ def test_a_sweep_has_the_same_goals_and_nested_changes():
     assert num_changed
 
 
-def test_tasks_of_other_kinds_are_written_as_before(tmp_path):
-    house = next(bundled_houses(1))
-    task = generate_task(house, seed=0, config=SMALL)
-    header = json.loads((write_task(task, tmp_path) / "task.json").read_bytes())
-    assert "control" not in header
+def test_tasks_of_other_kinds_have_no_guided_stages():
+    task = generate_task(next(bundled_houses(1)), seed=0, config=SMALL)
+    assert task.header.control is None
     assert task.guided_stages == ()
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"forced_stages": (1, 2, 3)}, "not all of them"),
-        ({"forced_stages": (1, 9)}, "expected forced_stages of 1 to 3"),
+        ({"guided_stages": (1, 2, 3)}, "not all of them"),
+        ({"guided_stages": (1, 9)}, "expected guided_stages of 1 to 3"),
         ({"shown_goals": (1, 2)}, "expected shown_goals of 3 stages"),
         ({"shown_goals": (1, 2, 4)}, "expected shown_goals of 3 stages"),
         ({"shown_goals": (1, 1, 1)}, "expected stage 2 to have the instructions and image of stage 1"),

@@ -45,7 +45,7 @@ def test_damaged_files_are_named(root: Path, name: str, damage: str) -> None:
 @pytest.mark.parametrize("name", ["oracle/stage_1.json", "public/stage_2.json"])
 def test_another_schema_version_and_unknown_keys_are_refused(root: Path, name: str) -> None:
     path = root / name
-    for change in ({"schema_version": 1}, {"unknown": None}):
+    for change in ({"schema_version": 2}, {"unknown": None}):
         path.write_text(json.dumps({**json.loads(path.read_text(encoding="utf-8")), **change}), encoding="utf-8")
         assert kinds(validate_files(root)) == {"schema"}
 

@@ -132,9 +132,9 @@ def _run(out: Path) -> Iterator[tuple[str, str]]:
         for agent, task, stage, record in db.execute("SELECT agent, task_id, stage, record FROM stages"):
             yield f"record/{agent}/{task}/{stage}", _of_bytes(record.encode())
             yield f"decisions/{agent}/{task}/{stage}", _of_json(_decisions(json.loads(record)))
-        for task, stage, text in db.execute("SELECT task_id, stage, map FROM stage_maps"):
+        for task, stage, text in db.execute("SELECT task_id, stage, floor_plan FROM floor_plans"):
             yield f"map/{task}/{stage}", _of_json(json.loads(text))
-        for agent, task, stage, text in db.execute("SELECT agent, task_id, stage, measures FROM measures"):
+        for agent, task, stage, text in db.execute("SELECT agent, task_id, stage, metrics FROM metrics"):
             yield f"metrics/{agent}/{task}/{stage}", _of_json(json.loads(text))
     yield "summary.json", _of_json(json.loads((out / "summary.json").read_bytes()))
 

@@ -18,7 +18,7 @@ def records(out: Path, word: str, num_workers: int) -> list[str]:
     with bundled_tasks() as folder:
         evaluate(["fu"], task_files(folder, 2, None), out, config=config, num_workers=num_workers)
     with RunStore(out) as store:
-        return [record.to_json() for record in store.records("fu")]
+        return [record.model_dump_json() for record in store.records("fu")]
 
 
 def test_records_do_not_depend_on_workers_and_perfect_ones_are_the_truths(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def box(object_id: str, category: str, centre_m: tuple[float, float, float], x_m
     )
 
 
-def stage_map(task_id: str, stage: int) -> FloorPlan:
+def floor_plan(task_id: str, stage: int) -> FloorPlan:
     x, y, z = OLD_TABLE_M if stage == 1 else NEW_TABLE_M
     return FloorPlan(
         task_id=task_id,
@@ -173,7 +173,7 @@ def record_run(
         store.set_meta("config", {"evonav": "0.1.0", "seed": 3, "protocol": {"success_radius_m": 1.5}})
         for record in records:
             store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
-            plan = stage_map(record.task_id, record.stage)
+            plan = floor_plan(record.task_id, record.stage)
             store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
     return run_dir
 

@@ -48,15 +48,15 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
 @pytest.mark.parametrize(
     ("damage", "told"),
     [
-        ("json_remove(map, '$.rooms')", "rooms = None: expected an array"),
-        ("json_set(map, '$.rooms', 5)", "rooms = integer: expected an array"),
-        ("substr(map, 2)", "malformed JSON"),
+        ("json_remove(floor_plan, '$.rooms')", "rooms = None: expected an array"),
+        ("json_set(floor_plan, '$.rooms', 5)", "rooms = integer: expected an array"),
+        ("substr(floor_plan, 2)", "malformed JSON"),
     ],
 )
 def test_rooms_are_not_counted_in_a_damaged_floor_plan(run: Path, damage: str, told: str) -> None:
     sides = read_compared_agents([str(run)])
     with closing(sqlite3.connect(run / "records.sqlite")) as database:
-        database.execute(f"UPDATE stage_maps SET map = {damage}")
+        database.execute(f"UPDATE floor_plans SET floor_plan = {damage}")
         database.commit()
     with pytest.raises(StoreError, match=told):
         breakdown(sides, "room-count")

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from made_up_run import OLD_TABLE_M, entry, stage_map, stage_record
+from made_up_run import OLD_TABLE_M, entry, floor_plan, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -47,7 +47,7 @@ def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
                 for i, state in enumerate(states[number][:num_tasks]):
                     for record in made_up(agent, i, state, is_evolved=number > 0, stages=stages):
                         store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
-                        plan = stage_map(record.task_id, 1 if number == 0 else record.stage)
+                        plan = floor_plan(record.task_id, 1 if number == 0 else record.stage)
                         store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
     record = ControlledRecord(
         kind=kind,

@@ -43,7 +43,7 @@ def rows(recording: Path) -> dict[str, list[dict]]:
 def test_entities_and_counts_are_the_records(recording: Path, viewed_run: Path) -> None:
     with RunStore(viewed_run) as store:
         records = list(store.records("fu"))
-        maps = list(store.maps(records[0].task_id))
+        maps = list(store.floor_plans(records[0].task_id))
     num_rounds = sum(len(record.trace) for record in records)
     found = rows(recording)
     for path in ("/world/agent/heading/rgb", "/world/memory/entries", "/world/memory/frontiers", "/map"):
@@ -73,7 +73,7 @@ def test_entities_and_counts_are_the_records(recording: Path, viewed_run: Path) 
     red = Counter(colour for row in entries for colour in column(row, "colors"))
     assert red[(209 << 24) + (26 << 16) + (42 << 8) + 255] == sum(stale)
     houses = sorted(found["/world/house/objects"], key=lambda row: row["step"])
-    assert [len(column(row, "half_sizes")) for row in houses] == [len(stage_map.objects) for stage_map in maps]
+    assert [len(column(row, "half_sizes")) for row in houses] == [len(floor_plan.objects) for floor_plan in maps]
     targets = sorted(found["/world/target"], key=lambda row: row["step"])
     for row, record in zip(targets, records, strict=True):
         x_m, y_m, z_m = record.target.position_m

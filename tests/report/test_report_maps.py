@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from made_up_run import NEW_TABLE_M, WriteRun, entry, record_run, stage_map, stage_record
+from made_up_run import NEW_TABLE_M, WriteRun, entry, floor_plan, record_run, stage_record
 
 from evonav.drawing.floor_plan import label_point
 from evonav.drawing.style import file_css, map_css
@@ -26,7 +26,7 @@ def with_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element
 def drawn(stage: int = 2, state: EndState = EndState.FAILURE) -> ElementTree.Element:
     stale = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
     record = stage_record("fu", "t", stage, state, chosen=stale, entries=[stale])
-    maps = {k: stage_map("t", k) for k in (1, 2)}
+    maps = {k: floor_plan("t", k) for k in (1, 2)}
     return ElementTree.fromstring(stage_svg(record, maps, success_radius_m=1.5))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import perception_results
 import pytest
 from behaviour_tables import cause_share_table, end_table, ends_of, success_by_group
-from made_up_run import WriteRun, entry, record_run, stage_map, stage_record
+from made_up_run import WriteRun, entry, floor_plan, record_run, stage_record
 from scipy import stats
 from typer.testing import CliRunner
 
@@ -151,7 +151,7 @@ def test_reweighted_rates_are_means_of_groups_by_their_share_of_the_mix(tmp_path
     ]
     with RunStore(tmp_path / "run", create=True) as store:
         for task, count in num_rooms.items():
-            plan = stage_map(task, 1)
+            plan = floor_plan(task, 1)
             plan = plan.model_copy(update={"rooms": tuple(plan.rooms[:1]) * count})
             store.add_floor_plan(task, 1, plan.model_dump_json())
     run_dir = record_run(tmp_path / "run", records, dict.fromkeys("abcdef", 2), ["fu"])

@@ -85,12 +85,12 @@ def test_the_close_up_holds_the_room_that_changed_and_all_that_moved(task: Task,
 
 
 def test_no_two_names_of_furniture_overlap(drawing: TaskDrawing) -> None:
-    stage_map = drawing.maps[1]
+    floor_plan = drawing.maps[1]
     stacked = [
-        *stage_map.objects,
-        *(item.model_copy(update={"object_id": f"{item.object_id}'"}) for item in stage_map.objects),
+        *floor_plan.objects,
+        *(item.model_copy(update={"object_id": f"{item.object_id}'"}) for item in floor_plan.objects),
     ]
-    once, twice = (item_labels(items, drawing.frame).count("<text") for items in (stage_map.objects, stacked))
+    once, twice = (item_labels(items, drawing.frame).count("<text") for items in (floor_plan.objects, stacked))
     assert 0 < once == twice
 
 
@@ -228,7 +228,7 @@ def test_wrong_input_is_a_line_that_names_it(task: Task, tmp_path: Path, argumen
     root = write_task(task, tmp_path / "set")
     broken = tmp_path / "broken"
     broken.mkdir()
-    (broken / "task.json").write_text('{"schema_version": 2}', encoding="utf-8")
+    (broken / "task.json").write_text('{"schema_version": 1}', encoding="utf-8")
     places = {"set": str(root.parent), "root": str(root), "broken": str(broken)}
     result = CliRunner().invoke(app, ["tasks", "show", *(argument.format(**places) for argument in arguments)])
     assert result.exit_code == 1

@@ -28,7 +28,7 @@ def stages(viewed_run: Path) -> list[ReplayedStage]:
 
 
 def pictures(stages: list[ReplayedStage], number: int) -> list[Image.Image]:
-    maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
+    maps = {stage.record.stage: stage.floor_plan for stage in stages if stage.floor_plan is not None}
     frame = episode_frame(stages, maps)
     return list(stage_frames(stages[number - 1], maps, frame, budget=9, success_radius_m=2.0))
 

@@ -140,7 +140,9 @@ FORGERIES: dict[str, tuple[Callable[[Row], None], str]] = {
 def written(parts: ForgedPack, folder: Path) -> Path:
     """The pack with its lines as evonav writes them; JSON of Python writes small numbers in another way."""
     records = [StageRecord.model_validate(row, strict=False) for mine in parts.rows for row in mine]
-    return parts.write(folder / "f.gz", [line_of(parts.header), *(record.to_json().encode() for record in records)])
+    return parts.write(
+        folder / "f.gz", [line_of(parts.header), *(record.model_dump_json().encode() for record in records)]
+    )
 
 
 def changed_row(pack: ForgedPack) -> Row:

@@ -34,7 +34,7 @@ def nearer_target(rows: Rows) -> None:
 
 def guided_failure(rows: Rows) -> None:
     """A stage that counts nowhere."""
-    failed_row(rows)["state"] = "forced"
+    failed_row(rows)["state"] = "guided"
 
 
 def end_at_target(rows: Rows) -> None:
@@ -179,7 +179,7 @@ RECORDS: dict[str, tuple[Callable[[Rows], None], str, str]] = {
     "more stages": (in_row(0, num_stages=9), "targets", "num_stages is another"),
     "another change": (in_part("transition", num_added=3), "targets", "transition is another"),
     "a target that moved": (in_part("target", is_relocated_now=True), "targets", "target is another"),
-    "a failure made guided": (guided_failure, "targets", "it is forced, the task's stage is not guided"),
+    "a failure made guided": (guided_failure, "targets", "it is guided, the task's stage is not guided"),
     "stages exchanged": (stages_exchanged, "targets", "is another than the task's"),
     "tasks exchanged": (tasks_exchanged, "targets", "is another than the task's"),
     "a stage dropped": (lambda rows: rows.pop(), "complete", "ftu .* stage 1 instead of fu .* stage 3"),

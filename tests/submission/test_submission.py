@@ -115,7 +115,7 @@ def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run:
     case, simulator = backend.tasks.create(tasks[0].path), backend.simulator.create()
     with RunStore(run) as store:
         records = {record.stage: record for record in store.records("ftu")}
-    document = json.loads(records[1].to_json())
+    document = json.loads(records[1].model_dump_json())
     assert document["entries"], "an agent without memory would leave the list of entries untried"
     seen: dict[str, str] = {}
     for path in leaves(document):

@@ -94,7 +94,7 @@ def test_missing_changed_and_new_tasks_are_named(folder: Path, task: Task) -> No
         ({"num_houses": 2}, "num_houses"),
         ({"stranger": 1}, "stranger"),
         ({"seed": -1}, "seed"),
-        ({"schema_version": 1}, "schema_version"),
+        ({"schema_version": 2}, "schema_version"),
     ],
 )
 def test_a_record_that_contradicts_itself_is_refused_by_field(folder: Path, change: dict[str, Any], field: str) -> None:

@@ -20,7 +20,7 @@ from evonav.generation.result import GivenStage
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Control, Task
-from evonav.tasks.parameters import GenerationParameters, RecordedParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import Record
 
 NUM_ATTEMPTS = 8
@@ -39,7 +39,7 @@ class ControlledOptions(Record):
     """Tasks a house: the seeds that follow `seed`."""
     rates: tuple[float, ...] = RATES
     """Probabilities of the arms of `rates`."""
-    parameters: RecordedParameters = GenerationParameters()
+    parameters: GenerationParameters = GenerationParameters()
     allow_unknown_assets: bool = False
 
     def model_post_init(self, _context: object) -> None:
@@ -119,7 +119,7 @@ def _arm(house: House, options: ControlledOptions, seed: int, attempt: int, arm:
     if is_pair and arm.evolve_probability == 1.0 and task.oracle(3).evolution.outcome != "evolved":
         detail = f"{task.oracle(3).evolution.outcome} ({task.oracle(3).evolution.failure})"
         raise TaskRejectedError(house.name, "not_evolved", 3, detail)
-    control = Control(arm=arm.name, attempt=attempt, forced_stages=guided, shown_goals=shown)
+    control = Control(arm=arm.name, attempt=attempt, guided_stages=guided, shown_goals=shown)
     task = dataclasses.replace(
         task,
         header=task.header.model_copy(update={"control": control}),

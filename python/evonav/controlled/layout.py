@@ -13,7 +13,7 @@ from evonav.errors import TaskError
 from evonav.parallel.folders import write_atomically
 from evonav.tasks.dataset import HouseRejection, SourceFile
 from evonav.tasks.manifest import TaskId
-from evonav.tasks.parameters import RecordedParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import Id, Probability, Record, parse_record, read_file, record_bytes
 
 FILE_NAME = "controlled.json"
@@ -44,7 +44,7 @@ class ControlledRecord(Record):
     per_house: PositiveInt
     """Tasks of each house in each arm."""
     allow_unknown_assets: bool
-    parameters: RecordedParameters
+    parameters: GenerationParameters
     """Θ before what the arms set."""
     task_ids: tuple[TaskId, ...]
     num_attempts: NonNegativeInt

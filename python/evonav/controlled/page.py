@@ -163,10 +163,10 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
     shared = ground(here[0], frame, moving) if here else ""
     defs = [f'<g class="map" id="house">{shared}</g>']
     for i, one in enumerate(pair):
-        stage_map = one.maps.get(key[1])
-        items = [] if stage_map is None else [item for item in stage_map.objects if item.object_id in moving]
+        floor_plan = one.maps.get(key[1])
+        items = [] if floor_plan is None else [item for item in floor_plan.objects if item.object_id in moving]
         changed = change(one.record, one.maps, frame)
-        names = "" if stage_map is None else labels(stage_map, frame)
+        names = "" if floor_plan is None else labels(floor_plan, frame)
         defs.append(f'<g class="map" id="arm{i}">{furniture(items, frame)}{changed}</g>')
         defs.append(f'<g class="map" id="names{i}">{names}</g>')
 

@@ -53,7 +53,7 @@ def load_pair(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
     for arm in analysis.arms:
         with RunStore(run_of(analysis.directory, arm)) as store:
             records = {one.stage: one for one in store.records(agent, task_id)}
-            maps = {one.stage: one for one in store.maps(task_id)}
+            maps = {one.stage: one for one in store.floor_plans(task_id)}
             radius_m = success_radius_of(store.meta("config") or {})
         if stage not in records:
             raise InvalidArgumentError(f"{analysis.directory}: no task {task_id!r} by agent {agent!r} in arm {arm}")
@@ -113,7 +113,7 @@ def pair_svg(pair: Sequence[Rollout]) -> str:
 
 def pair_frame(pair: Sequence[Rollout]) -> Frame:
     """Return the frame that all arms of a pair share."""
-    maps = {i: stage_map for i, one in enumerate(pair) for stage_map in one.maps.values()}
+    maps = {i: floor_plan for i, one in enumerate(pair) for floor_plan in one.maps.values()}
     return replace(task_frame(maps, [one.record for one in pair]), marker_scale=MARKER_SCALE)
 
 

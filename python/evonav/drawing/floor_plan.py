@@ -107,28 +107,28 @@ def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
     return frozenset(name for name, num in seen.items() if name in moved or num != len(maps))
 
 
-def ground(stage_map: Plan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
+def ground(floor_plan: Plan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
     """Draw floors, furniture, walls and openings; `without` names objects to leave out."""
-    items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
-    return floors(stage_map) + items + structure(stage_map, frame)
+    items = furniture([item for item in floor_plan.objects if item.object_id not in without], frame)
+    return floors(floor_plan) + items + structure(floor_plan, frame)
 
 
-def floors(stage_map: Plan) -> str:
+def floors(floor_plan: Plan) -> str:
     """Draw rooms, coloured by type."""
     return join(
         f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
-        for room in stage_map.rooms
+        for room in floor_plan.rooms
     )
 
 
-def structure(stage_map: Plan, frame: Frame) -> str:
+def structure(floor_plan: Plan, frame: Frame) -> str:
     """Draw walls, doors and windows."""
     u = frame.unit
-    doors = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "door"]
-    windows = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "window"]
+    doors = [(o.from_m, o.to_m) for o in floor_plan.openings if o.kind == "door"]
+    windows = [(o.from_m, o.to_m) for o in floor_plan.openings if o.kind == "window"]
     wall_cm = max(9.0, 1.1 * u)
     return (
-        f'<g class="walls" stroke-width="{wall_cm:.0f}">{_lines(_distinct(stage_map.walls))}</g>'
+        f'<g class="walls" stroke-width="{wall_cm:.0f}">{_lines(_distinct(floor_plan.walls))}</g>'
         f'<g class="doors" stroke-width="{wall_cm * 1.15:.0f}">{_lines(doors)}</g>'
         f'<g class="windows" stroke-width="{wall_cm * 0.45:.0f}">{_lines(windows)}</g>'
     )
@@ -141,11 +141,11 @@ def furniture(items: Iterable[ObjectPlan], frame: Frame, css: str = "items", *, 
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
-def labels(stage_map: Plan, frame: Frame) -> str:
+def labels(floor_plan: Plan, frame: Frame) -> str:
     """Write the names of rooms where there is least furniture."""
     u = frame.unit
-    taken = [_box(item) for item in stage_map.objects if item.category not in FLAT_CATEGORIES]
-    rooms = join(_room_label(room, u, taken) for room in stage_map.rooms)
+    taken = [_box(item) for item in floor_plan.objects if item.category not in FLAT_CATEGORIES]
+    rooms = join(_room_label(room, u, taken) for room in floor_plan.rooms)
     return f'<g class="rooms" font-size="{ROOM_LETTERS * u:.0f}" stroke-width="{0.9 * u:.1f}">{rooms}</g>'
 
 

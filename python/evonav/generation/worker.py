@@ -16,7 +16,7 @@ from evonav.parallel.pool import Answer
 from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Task
-from evonav.tasks.parameters import GenerationParameters, RecordedParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import Record
 
 WORK = "evonav.generation.worker:make_worker"
@@ -32,7 +32,7 @@ class GenerationOptions(Record):
     """The options that determine the task of a house."""
 
     seed: int = 0
-    parameters: RecordedParameters = GenerationParameters()
+    parameters: GenerationParameters = GenerationParameters()
     dataset: str = "evonav"
     split: str = "none"
     allow_unknown_assets: bool = False

@@ -95,7 +95,7 @@ class PageData:
             "sentence": sentence(record),
             "goal": record.goal.instruction,
             "noun": noun_of(record.goal.category),
-            "reference": None if stage.stage_map is None else stage.stage_map.reference_image,
+            "reference": None if stage.floor_plan is None else stage.floor_plan.reference_image,
             "changed": change_words(record, maps) + _target_words(record),
             "lost": _lost_words(record),
             "facts": _facts(record),

@@ -55,7 +55,7 @@ def write_episode(
     shown = [stage for stage in stages if only is None or stage.record.stage == only]
     if not shown:
         raise InvalidArgumentError(f"no record of stage {only}")
-    maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
+    maps = {stage.record.stage: stage.floor_plan for stage in stages if stage.floor_plan is not None}
     page = _page(shown, maps, _tabs(shown, shown), budget, success_radius_m)
     if len(page.encode()) <= MAX_PAGE_BYTES or len(shown) == 1:
         return [_write(page, shown, out_dir, only, records_sha256)]
@@ -136,7 +136,7 @@ def _drawings(
 def _layers(moment: Moment, frame: Frame, radius_m: float) -> dict[str, Markup]:
     """Return the layers of a map that are the same in all rounds of a moment."""
     record, maps = moment.record, moment.maps
-    stage_map = maps.get(record.stage)
+    floor_plan = maps.get(record.stage)
     ends = ""
     if (start := record.effective_start) is not None:
         ends += start_mark(cm((start.x_m, start.z_m)), frame, "start")
@@ -144,7 +144,7 @@ def _layers(moment: Moment, frame: Frame, radius_m: float) -> dict[str, Markup]:
         ends += (
             f'<g class="terminal">{end_mark(cm((end.x_m, end.z_m)), record.state.value == "success", frame.unit)}</g>'
         )
-    house = stage_map or FloorPlan(
+    house = floor_plan or FloorPlan(
         task_id=record.task_id, house=record.house, stage=record.stage, rooms=(), walls=(), openings=(), objects=()
     )
     layers = {

@@ -69,7 +69,7 @@ class RunReplay:
         with RunStore(run_dir) as store:
             config = store.meta("config") or {}
             models = store.meta("models_dir")
-            self._secret: str = store.meta(NAMES_KEY) or ""  # runs of earlier versions have none
+            self._secret: str = store.meta(NAMES_KEY) or ""
         try:
             self.seed = int(config["seed"])
             self.protocol = ProtocolConfig(**config["protocol"])
@@ -116,7 +116,7 @@ class RunReplay:
             stored = {record.stage: record for record in store.records(agent, task_id)}
             texts = dict(zip(stored, store.record_texts(agent, task_id), strict=True))
             stored = {k: record for k, record in stored.items() if last_stage is None or k <= last_stage}
-            maps = {stage_map.stage: stage_map for stage_map in store.maps(task_id)}
+            maps = {floor_plan.stage: floor_plan for floor_plan in store.floor_plans(task_id)}
         if not stored:
             raise InvalidArgumentError(
                 f"{self._run_dir}: no record of task {task_id!r} by agent {agent!r}{_near(self._run_dir, task_id)}"
@@ -222,4 +222,4 @@ def _differences(stored: str | None, stage: ReplayedStage) -> tuple[str, ...]:
     """Return where a replayed record differs from the stored one."""
     if stored is None or not stage.is_replayed:
         return ()
-    return record_differences(stored, stage.record.to_json(), "replayed")
+    return record_differences(stored, stage.record.model_dump_json(), "replayed")

@@ -102,7 +102,7 @@ class ReplayedStage:
 
     record: StageRecord
     """The replayed one; where nothing was run again, the stored one."""
-    stage_map: FloorPlan | None
+    floor_plan: FloorPlan | None
     rounds: tuple[ReplayedRound, ...]
     why_not: str
     """Reason why it was not run again; empty if it was."""

@@ -174,7 +174,7 @@ class RecordedRun:
                 records = {
                     (agent, record.stage): record for agent in self.agents for record in store.records(agent, task_id)
                 }
-                maps = {stage_map.stage: stage_map for stage_map in store.maps(task_id)}
+                maps = {floor_plan.stage: floor_plan for floor_plan in store.floor_plans(task_id)}
                 yield Task(task_id, num_stages, records, maps)
 
 

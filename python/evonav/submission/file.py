@@ -98,7 +98,7 @@ def write_submission(path: Path, header: Submission, records: Iterable[str]) -> 
         StoreError: It cannot be written.
     """
     with replacing(path) as beside, beside.open("wb") as raw, gzip.GzipFile("", "wb", fileobj=raw, mtime=0) as file:
-        for text in (header.to_json(), *records):
+        for text in (header.model_dump_json(), *records):
             file.write(f"{text}\n".encode())
 
 
@@ -165,6 +165,6 @@ def _parsed(where: str, line: bytes, model: type[_Line]) -> _Line:
         value = model.model_validate_json(line)
     except ValidationError as error:
         raise SubmissionError(f"{where}: {first_problem(error)}") from error
-    if value.to_json().encode() != line:
+    if value.model_dump_json().encode() != line:
         raise SubmissionError(f"{where}: not as evonav writes it")
     return value

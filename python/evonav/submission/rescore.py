@@ -135,7 +135,7 @@ def _checkable(record: StageRecord) -> str:
     """Return a record without the fields that depend on the agent's memory between rounds, which is not recorded."""
     return record.model_copy(
         update={"memory_at_start": None, "num_forgotten": None, "stale_entries": (), "moved_objects": ()}
-    ).to_json()
+    ).model_dump_json()
 
 
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:

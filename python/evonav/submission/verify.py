@@ -284,23 +284,8 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
 def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
     num_stages = sum(task.num_stages for task in header.tasks)
     claimed, computed = header.summary, packed_summary(records, num_stages)
-    if claimed.get("schema_version") == 1:
-        claimed, computed = _without_intervals(claimed), _without_intervals(computed)
     for one in json_differences(claimed, computed, is_equal=_is_close):
         yield f"{one.path} is {one.left}, the records give {one.right}"
-
-
-def _without_intervals(summary: Any) -> Any:  # noqa: ANN401 - JSON
-    """Leave out what version 1 of a summary did not have, or took over tasks instead of houses."""
-    if isinstance(summary, list):
-        return [_without_intervals(each) for each in summary]
-    if not isinstance(summary, dict):
-        return summary
-    return {
-        key: _without_intervals(value)
-        for key, value in summary.items()
-        if key not in ("schema_version", "num_houses") and not key.endswith(("_ci95", "_p", "_verdict"))
-    }
 
 
 def _is_close(claimed: Any, computed: Any) -> bool:  # noqa: ANN401 - JSON

@@ -10,8 +10,18 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 from evonav.errors import StoreError, TaskError
 from evonav.parallel.folders import write_atomically
 from evonav.tasks.manifest import Task, TaskId
-from evonav.tasks.parameters import RecordedParameters
-from evonav.tasks.records import Id, Record, Sha256, field_error, parse_record, read_file, record_bytes, sha256_of
+from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.records import (
+    Id,
+    Record,
+    Sha256,
+    Version,
+    field_error,
+    parse_record,
+    read_file,
+    record_bytes,
+    sha256_of,
+)
 
 DATASET_NAME = "dataset.json"
 
@@ -69,7 +79,7 @@ class HouseRejection(Record):
 class DatasetRecord(Record):
     """The content of `dataset.json`. It depends on the request, not on the number of processes."""
 
-    schema_version: Literal[2] = 2
+    schema_version: Version = 1
     name: Id
     split: Id
     generator: Id
@@ -81,7 +91,7 @@ class DatasetRecord(Record):
     subset: Id | None
     """Named subset that the tasks are limited to (`evonav.tasks.subsets`)."""
     allow_unknown_assets: bool
-    parameters: RecordedParameters
+    parameters: GenerationParameters
     num_houses: NonNegativeInt
     """Number of houses read: `num_tasks` and the rejections."""
     num_tasks: NonNegativeInt

@@ -174,8 +174,8 @@ def _control_problems(task: Task) -> Iterator[str]:
     if control is None:
         return
     numbers = range(1, task.num_stages + 1)
-    if not set(control.forced_stages) < set(numbers):
-        yield f"expected forced_stages of 1 to {task.num_stages}, and not all of them"
+    if not set(control.guided_stages) < set(numbers):
+        yield f"expected guided_stages of 1 to {task.num_stages}, and not all of them"
     is_earlier = all(1 <= shown <= stage for stage, shown in zip(numbers, control.shown_goals, strict=False))
     if len(control.shown_goals) != task.num_stages or not is_earlier:
         yield f"expected shown_goals of {task.num_stages} stages, each its own or an earlier one"

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +13,13 @@ from pydantic import (
     Field,
     NonNegativeInt,
     PositiveInt,
-    SerializerFunctionWrapHandler,
-    model_serializer,
 )
 
 from evonav.house import House
 from evonav.tasks.oracle import Evolution, OracleStage
-from evonav.tasks.parameters import RecordedParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.public import Goal
-from evonav.tasks.records import Id, PoseRecord, Record, Sha256, record_bytes, sha256_of
+from evonav.tasks.records import Id, PoseRecord, Record, Sha256, Version, record_bytes, sha256_of
 from evonav.world.pose import Pose
 
 TaskId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,127}$")]
@@ -47,7 +45,7 @@ class Control(Record):
     """The arm: `fixed` or `evolved`, or a probability of evolution such as `p0.25`."""
     attempt: NonNegativeInt
     """Number of earlier draws that were rejected because a goal was not possible in every arm."""
-    forced_stages: tuple[PositiveInt, ...]
+    guided_stages: tuple[PositiveInt, ...]
     """Stages in which the evaluator moves the agent along the reference trajectory. They are not scored."""
     shown_goals: tuple[PositiveInt, ...]
     """The stage whose instructions and image the agent receives, for each stage.
@@ -59,7 +57,7 @@ class Control(Record):
 class TaskHeader(Record):
     """The content of `task.json` (paper, Sec. A.3)."""
 
-    schema_version: Literal[2] = 2
+    schema_version: Version = 1
     task_id: TaskId
     dataset: Id
     split: Id
@@ -69,22 +67,17 @@ class TaskHeader(Record):
     num_stages: Annotated[int, Field(ge=1, le=64)]
     house: HouseSource
     start_pose: PoseRecord
-    parameters: RecordedParameters
+    parameters: GenerationParameters
     checksums: dict[str, Sha256]
     """Checksum of each file's contents: JSON as it is, `.gz` uncompressed, `.png` its RGB values row by row."""
     control: Control | None = None
-    """The task's place in a controlled analysis; absent from the files of other tasks."""
-
-    @model_serializer(mode="wrap")
-    def _without_control(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        fields: dict[str, Any] = serialize(self)
-        return {key: value for key, value in fields.items() if key != "control" or value is not None}
+    """The task's place in a controlled analysis; `None` for other tasks."""
 
 
 class PublicStage(Record):
     """The content of `public/stage_k.json`: the goal g_k without its start pose, which reveals the previous target."""
 
-    schema_version: Literal[2] = 2
+    schema_version: Version = 1
     stage: Annotated[int, Field(ge=1)]
     category: Id
     basic_instruction: Annotated[str, Field(min_length=1, max_length=2000)]
@@ -126,7 +119,7 @@ class Task:
     @property
     def guided_stages(self) -> tuple[int, ...]:
         """Stages in which the evaluator moves the agent."""
-        return () if self.header.control is None else self.header.control.forced_stages
+        return () if self.header.control is None else self.header.control.guided_stages
 
     @property
     def start_pose(self) -> Pose:

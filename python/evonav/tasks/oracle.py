@@ -7,11 +7,9 @@ from pydantic import (
     NonNegativeFloat,
     NonNegativeInt,
     PositiveInt,
-    SerializerFunctionWrapHandler,
-    model_serializer,
 )
 
-from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256
+from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256, Version
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
 """Modification of a room (paper, Sec. 3.2)."""
@@ -233,18 +231,13 @@ class OracleFields(Record):
     ever_relocated_ids: tuple[Id, ...]
     """Ids of the objects relocated by any change up to the stage's start, sorted."""
     during: DuringRecord | None = None
-    """The change during the stage; absent from the file if there is none."""
-
-    @model_serializer(mode="wrap")
-    def _without_during(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        fields: dict[str, Any] = serialize(self)
-        return {key: value for key, value in fields.items() if key != "during" or value is not None}
+    """The change during the stage, if there is one."""
 
 
 class _OracleFileFields(Record):
     """The fields that identify the file of an oracle stage."""
 
-    schema_version: Literal[2] = 2
+    schema_version: Version = 1
     stage: Annotated[int, Field(ge=1)]
     house_sha256: Sha256
     """SHA-256 of `Task.house_json(stage)` in UTF-8."""

@@ -3,20 +3,11 @@
 import json
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    NonNegativeFloat,
-    PositiveFloat,
-    PositiveInt,
-    SerializerFunctionWrapHandler,
-    ValidationInfo,
-    model_serializer,
-)
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from evonav import _core
 from evonav.tasks.records import Probability, Record
-from evonav.world.simulator import OUTLINED, Style
+from evonav.world.simulator import Style
 
 # The core holds the default values, see `Parameters` in `evonav_core::generation`.
 _DEFAULTS: dict[str, Any] = json.loads(_core.default_generation_parameters())
@@ -64,12 +55,7 @@ class Extensions(Record):
     schedule: Schedule | None = None
     """People who use objects, instead of the paper's independent draws of rooms."""
     during_stage: DuringStage | None = None
-    """Changes during a stage; absent from files of tasks without them."""
-
-    @model_serializer(mode="wrap")
-    def _as_in_older_files(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        fields: dict[str, Any] = serialize(self)
-        return {key: value for key, value in fields.items() if key != "during_stage" or value is not None}
+    """Changes during a stage."""
 
 
 class GenerationParameters(Record):
@@ -107,8 +93,8 @@ class GenerationParameters(Record):
     reference_min_m: PositiveFloat = _DEFAULTS["reference_min_m"]
     reference_max_m: PositiveFloat = _DEFAULTS["reference_max_m"]
     reference_image_px: Annotated[int, Field(ge=16, le=4096)] = _DEFAULTS["reference_image_px"]
-    reference_style: Annotated[Style, Field(json_schema_extra={"default": OUTLINED})] = _DEFAULTS["reference_style"]
-    """Way in which reference images are drawn. Files without it hold `outlined` images."""
+    reference_style: Style = _DEFAULTS["reference_style"]
+    """Way in which reference images are drawn."""
     reference_min_visible_px: PositiveInt = _DEFAULTS["reference_min_visible_px"]
     """Smallest number of pixels of a visible target (the paper says "visible")."""
     relocated_min_m: NonNegativeFloat = _DEFAULTS["relocated_min_m"]
@@ -117,20 +103,3 @@ class GenerationParameters(Record):
     modification_tries: Annotated[int, Field(ge=1, le=1000)] = _DEFAULTS["modification_tries"]
     """Number of attempts at a room's modification, with new places, before it is abandoned."""
     extensions: Extensions = Extensions()
-
-    @model_serializer(mode="wrap")
-    def _as_in_older_files(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out values of files that were written before there were others, so that their bytes stay."""
-        fields: dict[str, Any] = serialize(self)
-        only = {"reference_style": OUTLINED, "goal_room_window": 1}
-        return {key: value for key, value in fields.items() if key not in only or value != only[key]}
-
-
-def _as_recorded(parameters: GenerationParameters, info: ValidationInfo) -> GenerationParameters:
-    if info.mode == "json" and "reference_style" not in parameters.model_fields_set:
-        return parameters.model_copy(update={"reference_style": OUTLINED})
-    return parameters
-
-
-RecordedParameters = Annotated[GenerationParameters, AfterValidator(_as_recorded)]
-"""Parameters as a field of a file: where the file names no style, its reference images are `outlined`."""

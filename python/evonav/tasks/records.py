@@ -27,6 +27,8 @@ Point3 = tuple[float, float, float]
 """`(x, y, z)` in metres, or Unity Euler angles in degrees."""
 Id = Annotated[str, Field(min_length=1, max_length=256)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Version = Annotated[int, Field(ge=1, le=1)]
+"""The schema version of a file, of which there is one so far. `Literal[1]` would take `true` for it."""
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 

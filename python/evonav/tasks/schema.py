@@ -1,8 +1,8 @@
 """Make the JSON Schema (draft 2020-12) of task files from the records that parse them.
 
-The same documents lie in the package's folder `schema/`, so that programs in other languages can check files. JSON has
-no NaN and no infinity, and keys that are not listed are forbidden. Problems that a schema cannot express (files that
-contradict each other, checksums, physics) are found by `evonav tasks validate`.
+`evonav tasks schema` writes them, so that programs in other languages can check files. JSON has no NaN and no infinity,
+and keys that are not listed are forbidden. Problems that a schema cannot express (files that contradict each other,
+checksums, physics) are found by `evonav tasks validate`.
 """
 
 import json

@@ -61,7 +61,7 @@ def video(
     out = out or run / "episode.mp4"
     check_video(out, fps or ROUNDS_FPS, width)
     replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
-    maps = {one.record.stage: one.stage_map for one in stages[0] if one.stage_map is not None}
+    maps = {one.record.stage: one.floor_plan for one in stages[0] if one.floor_plan is not None}
     frame, budget = episode_frame(stages[0], maps), replay.budget(agent)
     with status("Drawing") as tell:
 
@@ -97,7 +97,7 @@ def rerun(
     _, agent, (stages, shown), radius_m = _replayed(
         run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
     )
-    maps = {one.record.stage: one.stage_map for one in stages if one.stage_map is not None}
+    maps = {one.record.stage: one.floor_plan for one in stages if one.floor_plan is not None}
     write_recording(shown, maps, out, success_radius_m=radius_m)
     typer.echo(f"recording: {out} ({agent} in {stages[0].record.task_id}); open it with: rerun {out}")
 

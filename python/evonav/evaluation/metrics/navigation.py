@@ -16,9 +16,6 @@ from evonav.errors import StoreError
 from evonav.evaluation.records.schema import EndState
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
-SUMMARY_VERSION = 2
-"""The version of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
-
 
 class HouseStage(Protocol):
     """A stage in a house."""
@@ -200,7 +197,7 @@ def _agent_pair(a: str, b: str, stages: Sequence[tuple[Stage, Stage]]) -> AgentP
 def summary_json(summaries: Sequence[AgentSummary], pairs: Sequence[AgentPair]) -> dict[str, Any]:
     """Return the content of `summary.json`."""
     return {
-        "schema_version": SUMMARY_VERSION,
+        "schema_version": 1,
         "is_incomplete": any(summary.is_incomplete for summary in summaries),
         "agents": {summary.agent: asdict(summary) for summary in summaries},
         "paired_differences": [

@@ -1,7 +1,6 @@
 """Compute one flat row per stage, the source of all tables, exports and comparisons (defined in docs/measures.md).
 
-`read_stage_metrics` reads the metrics that the store holds beside each record, so no trace is parsed. For older runs
-it derives them from the records. Values that old records lack are `None`.
+`read_stage_metrics` reads the metrics that the store holds beside each record, so no trace is parsed.
 """
 
 import json
@@ -21,8 +20,6 @@ from evonav.tasks.language import STRUCTURE_TYPES
 if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore
 
-METRICS_VERSION = 3
-"""Raised whenever a metric changes: metrics stored under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
 """Largest distance to the target's box for `is_strict_success`."""
 COUNTERS = {
@@ -196,11 +193,8 @@ def encode_metrics(record: StageRecord) -> str:
         record: The whole record, with its trace.
     """
     last = record.trace[-1].counters if record.trace else {}
-    measures = dict(vars(metrics_of(record)))
-    if record.during is None:
-        del measures["during"], measures["spl_after_change"]  # as runs without changes during stages have them
     values = {
-        "measures": measures,
+        "metrics": vars(metrics_of(record)),
         "counters": {name: last[name] for name in COUNTERS if name in last}
         # Agents count failures from the first one on.
         | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
@@ -261,7 +255,6 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
     has_memory = end is not None
     cleared = [(e.evident_round, e.cleared_round) for e in record.stale_entries]
     found = [(m.seen_round, m.found_round) for m in record.moved_objects]
-    # Records of the first runs have no `memory_at_end`, but entries: stale or not is in them.
     has_entries = has_memory or bool(record.entries)
     entries = [entry for entry in record.entries if entry.label not in STRUCTURE_TYPES]
     num_stale = sum(entry.is_stale for entry in entries)
@@ -322,15 +315,12 @@ def _spl_after_change(record: StageRecord) -> float | None:
 
 
 def _stored_metrics(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_StoredMetrics]:
-    """Yield metrics by agent, task and stage; those that the store lacks in this version are derived again."""
+    """Yield metrics by agent, task and stage."""
     wanted = None if agents is None else set(agents)
-    for (agent, task_id, stage), version, text in store.encoded_metrics():
-        if wanted is not None and agent not in wanted:
-            continue
-        if version != METRICS_VERSION or text is None:
-            text = encode_metrics(store.record(agent, task_id, stage))
-        values = json.loads(text)
-        yield _StoredMetrics(RecordMetrics(**values["measures"]), values["counters"], values["is_fresh"])
+    for (agent, _, _), text in store.encoded_metrics():
+        if wanted is None or agent in wanted:
+            values = json.loads(text)
+            yield _StoredMetrics(RecordMetrics(**values["metrics"]), values["counters"], values["is_fresh"])
 
 
 def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:

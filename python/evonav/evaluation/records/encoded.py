@@ -79,13 +79,13 @@ def encode_stage(
         task_id=valid.task_id,
         stage=valid.stage,
         state=valid.state,
-        record=valid.to_json(),
+        record=valid.model_dump_json(),
         metrics=encode_metrics(valid),
         wall_s=wall_s,
         cpu_s=cpu_s,
         costs=None if costs is None else {k: v for k, v in vars(costs).items() if v is not None},
         failure=failure,
-        floor_plan=None if floor_plan is None else floor_plan.to_json(),
+        floor_plan=None if floor_plan is None else floor_plan.model_dump_json(),
     )
 
 

@@ -19,14 +19,11 @@ def record_differences(stored: str, again: str, verb: str) -> tuple[str, ...]:
     """
     if again == stored:
         return ()
-    before, after = json.loads(stored), json.loads(again)
-    # An older evonav recorded less: a field that is not there cannot differ.
-    shared = {key: value for key, value in after.items() if key in before}
     found = tuple(
         f"{one.path}: {_short(one.left)} stored, {_short(one.right)} {verb}"
-        for one in islice(json_differences(before, shared), MAX_DIFFERENCES)
+        for one in islice(json_differences(json.loads(stored), json.loads(again)), MAX_DIFFERENCES)
     )
-    return found or (() if len(shared) < len(after) else ("the same values in other bytes",))
+    return found or ("the same values in other bytes",)
 
 
 def _short(value: Any) -> str:  # noqa: ANN401 - JSON

@@ -25,7 +25,7 @@ class EndState(str, Enum):
     FAILURE = "failure"
     ERRORED = "errored"
     NOT_RUN = "not_run"
-    GUIDED = "forced"
+    GUIDED = "guided"
     """The evaluator moved the agent along a reference trajectory: there is nothing to score (docs/controlled.md)."""
 
     @property
@@ -329,11 +329,6 @@ class StageRecord(Record):
         during = self.during
         return self.target.position_m if during is None or not during.target_position_m else during.target_position_m
 
-    def to_json(self) -> str:
-        """Return the JSON, without what is newer than the records of agents and tasks that do not have it."""
-        untold = {name for name in ("belief_at_start", "during") if getattr(self, name) is None}
-        return self.model_dump_json(exclude=untold)
-
 
 class RoomFootprint(Record):
     """A room's floor."""
@@ -352,7 +347,7 @@ class ObjectFootprint(Record):
     size_m: Point3
     """Size of the axis-aligned box."""
     polygon_m: tuple[Point2, ...]
-    """Corners of the object's box; in older records of a box that is turned with the object."""
+    """Corners of the object's box."""
     outlines_m: tuple[tuple[Point2, ...], ...] = ()
     """Convex outlines of its parts, lower ones first, where they are known: drawn instead of `polygon_m`."""
 
@@ -383,13 +378,9 @@ class FloorPlan(Record):
     reference_image: str | None = None
     """The image that the agent was shown, made small, as a `data:` URI."""
     objects_at_end: tuple[ObjectFootprint, ...] = ()
-    """The objects after the change during the stage; empty, and left out of the JSON, without one."""
+    """The objects after the change during the stage; empty without one."""
 
     @property
     def at_end(self) -> "FloorPlan":
         """The floor plan after the change during the stage; itself without one."""
         return self.model_copy(update={"objects": self.objects_at_end}) if self.objects_at_end else self
-
-    def to_json(self) -> str:
-        """Return the JSON, without `objects_at_end` if it is empty."""
-        return self.model_dump_json(exclude=None if self.objects_at_end else {"objects_at_end"})

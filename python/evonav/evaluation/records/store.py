@@ -11,7 +11,7 @@ import shutil
 import sqlite3
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from contextlib import closing, contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION
 from evonav.evaluation.records.encoded import EncodedStage, invalid_record
 from evonav.evaluation.records.floor_plan_json import FloorPlanReader
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
@@ -35,12 +34,12 @@ _TABLES = {
     "meta": "(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
     "stages": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
-    state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run', 'forced')),
+    state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run', 'guided')),
     record TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID""",
-    "stage_maps": """(
-    task_id TEXT NOT NULL, stage INTEGER NOT NULL, map TEXT NOT NULL,
+    "floor_plans": """(
+    task_id TEXT NOT NULL, stage INTEGER NOT NULL, floor_plan TEXT NOT NULL,
     PRIMARY KEY (task_id, stage)
 ) WITHOUT ROWID""",
     "timings": """(
@@ -48,14 +47,10 @@ _TABLES = {
     wall_s REAL NOT NULL, cpu_s REAL NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID""",
-}
-
-# Later than the first runs of this schema version: a run without them is read as if they were empty.
-# Metrics are derived from the record (`evonav.evaluation.metrics.stage_metrics`), so that tables need no traces.
-_LATER = {
-    "measures": """(
+    # Derived from the record (`evonav.evaluation.metrics.stage_metrics`), so that tables need no traces.
+    "metrics": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
-    version INTEGER NOT NULL, measures TEXT NOT NULL,
+    metrics TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID""",
     "costs": """(
@@ -145,18 +140,16 @@ class RunStore:
     def _open(self, create: bool) -> None:
         for pragma in ("synchronous = FULL", "temp_store = MEMORY"):
             self._db.execute(f"PRAGMA {pragma}")
-        tables = _LATER
         if create:
             # A write-ahead log needs memory that all readers share, which a network file system does not give.
             self._db.execute(f"PRAGMA journal_mode = {'DELETE' if is_on_network(self.path.parent) else 'WAL'}")
             sync_folder(self.path.absolute().parent.parent)
-            tables = {**_TABLES, **_LATER}
-        with self._transaction() if create else nullcontext():
-            there = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master")}
-            for name in tables.keys() - there:
-                self._db.execute(f"CREATE {'' if create else 'TEMP '}TABLE {name} {tables[name]}")
-            if create and "meta" not in there:
-                self._db.execute("INSERT INTO meta VALUES ('schema_version', ?)", (_json(SCHEMA_VERSION),))
+            with self._transaction():
+                there = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master")}
+                for name in _TABLES.keys() - there:
+                    self._db.execute(f"CREATE TABLE {name} {_TABLES[name]}")
+                if "meta" not in there:
+                    self._db.execute("INSERT INTO meta VALUES ('schema_version', ?)", (_json(SCHEMA_VERSION),))
         version = self.meta("schema_version")
         if version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
@@ -202,7 +195,7 @@ class RunStore:
         key = stage.key
         with self._transaction(f"stage {key}: "):
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, stage.state.value, stage.record))
-            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, METRICS_VERSION, stage.metrics))
+            self._db.execute("INSERT INTO metrics VALUES (?, ?, ?, ?)", (*key, stage.metrics))
             self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, stage.wall_s, stage.cpu_s))
             if stage.costs is not None:
                 self._db.execute("INSERT INTO costs VALUES (?, ?, ?, ?)", (*key, _json(stage.costs)))
@@ -217,17 +210,17 @@ class RunStore:
 
     def add_floor_plan(self, task_id: str, stage: int, text: str) -> None:
         """Store the floor plan of a stage, as JSON; a stored one stays, as all writers would write the same."""
-        self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", (task_id, stage, text))
+        self._execute("INSERT OR IGNORE INTO floor_plans VALUES (?, ?, ?)", (task_id, stage, text))
 
     def floor_plan_keys(self) -> set[tuple[str, int]]:
         """Return task and stage of every stored floor plan."""
-        return set(self._query("SELECT task_id, stage FROM stage_maps"))
+        return set(self._query("SELECT task_id, stage FROM floor_plans"))
 
     def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:
         """Drop an episode's stages from `from_stage` on, so that they can be run again."""
         key = (agent, task_id, from_stage)
         with self._transaction():
-            for table in ("stages", "timings", *_LATER):
+            for table in _TABLES.keys() - {"meta", "floor_plans"}:
                 self._db.execute(f"DELETE FROM {table} WHERE agent = ? AND task_id = ? AND stage >= ?", key)  # noqa: S608
 
     def records(
@@ -289,14 +282,11 @@ class RunStore:
         except ValidationError as error:
             raise StoreError(f"{self.path}: {invalid_record(text, error)}") from error
 
-    def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
-        """Yield agent, task and stage, the version of the stored metrics, and the metrics; `None` without metrics."""
-        query = (
-            "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "
-            "USING (agent, task_id, stage) ORDER BY agent, task_id, stage"
-        )
-        for agent, task_id, stage, version, measures in self._rows(query):
-            yield (agent, task_id, stage), version, measures
+    def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], str]]:
+        """Yield agent, task and stage, and the stage's encoded metrics, in this order."""
+        query = "SELECT agent, task_id, stage, metrics FROM metrics ORDER BY agent, task_id, stage"
+        for agent, task_id, stage, metrics in self._rows(query):
+            yield (agent, task_id, stage), metrics
 
     def record_text(self, agent: str, task_id: str, stage: int) -> str | None:
         """Return one record as stored, or `None`."""
@@ -304,10 +294,10 @@ class RunStore:
         rows = self._query(query, (agent, task_id, stage))
         return str(rows[0][0]) if rows else None
 
-    def maps(self, task_id: str | None = None) -> Iterator[FloorPlan]:
+    def floor_plans(self, task_id: str | None = None) -> Iterator[FloorPlan]:
         """Yield floor plans by task and stage."""
         wanted = {} if task_id is None else {"task_id": task_id}
-        query = f"SELECT map FROM stage_maps {_where(wanted)} ORDER BY task_id, stage"  # noqa: S608
+        query = f"SELECT floor_plan FROM floor_plans {_where(wanted)} ORDER BY task_id, stage"  # noqa: S608
         reader = FloorPlanReader()
         for (text,) in self._rows(query, tuple(wanted.values())):
             try:
@@ -317,8 +307,8 @@ class RunStore:
 
     def num_rooms(self) -> dict[str, int]:
         """Return the number of rooms of each task's house, by its first stored floor plan."""
-        rooms = "json_type(map, '$.rooms'), json_array_length(map, '$.rooms')"
-        rows = self._query(f"SELECT task_id, min(stage), {rooms} FROM stage_maps GROUP BY task_id")  # noqa: S608
+        rooms = "json_type(floor_plan, '$.rooms'), json_array_length(floor_plan, '$.rooms')"
+        rows = self._query(f"SELECT task_id, min(stage), {rooms} FROM floor_plans GROUP BY task_id")  # noqa: S608
         if wrong := [f"{task_id}/{stage}: rooms = {kind}" for task_id, stage, kind, _ in rows if kind != "array"]:
             raise StoreError(f"{self.path}: floor plan of {wrong[0]}: expected an array")
         return {row[0]: row[3] for row in rows}

@@ -142,7 +142,7 @@ _NUMBERS = ("int", "float", "bool")
 def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     """Return all numbers, unrounded."""
     return {
-        "schema_version": 2,
+        "schema_version": 1,
         "comparisons": [
             {
                 "a": one.a,

@@ -61,9 +61,9 @@ def instruction_lines(text: str, width: int, max_lines: int, place: str = "") ->
     )
 
 
-def reference_image(stage_map: FloorPlan | None, right_px: int, top_px: int, size_px: int) -> str:
+def reference_image(floor_plan: FloorPlan | None, right_px: int, top_px: int, size_px: int) -> str:
     """Draw the reference image of a stage, where it has one."""
-    if stage_map is None or stage_map.reference_image is None:
+    if floor_plan is None or floor_plan.reference_image is None:
         return ""
     box = f'x="{right_px - size_px}" y="{top_px}" width="{size_px}" height="{size_px}"'
-    return f'<image href="{escape(stage_map.reference_image)}" {box}/>'
+    return f'<image href="{escape(floor_plan.reference_image)}" {box}/>'

@@ -73,7 +73,7 @@ def outcome_words(stage: Stage) -> str:
 
 def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:
     """Return the frame that a task's pictures share: the house, or the path where no house was recorded."""
-    if any(stage_map.rooms or stage_map.walls for stage_map in maps.values()):
+    if any(floor_plan.rooms or floor_plan.walls for floor_plan in maps.values()):
         return frame_of(maps.values())
     points = [point for record in records for entry in record.trace for point in entry.path_m]
     points += [(record.target.position_m[0], record.target.position_m[2]) for record in records]
@@ -91,8 +91,8 @@ def stage_drawing(
     record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float, *, has_item_names: bool
 ) -> str:
     """Return a stage's house and what happened in it, as the content of an `svg` element."""
-    stage_map = maps.get(record.stage)
-    names = item_labels(stage_map.objects, frame) if has_item_names and stage_map is not None else ""
+    floor_plan = maps.get(record.stage)
+    names = item_labels(floor_plan.objects, frame) if has_item_names and floor_plan is not None else ""
     return house_drawing(record, maps, frame, names) + course(record, frame, success_radius_m)
 
 
@@ -100,7 +100,7 @@ def house_drawing(
     record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, item_names: str = "", *, on_it: str = ""
 ) -> str:
     """Return the house of a stage, with what moved before it, `on_it`, and the names of its rooms on top."""
-    stage_map, changed = maps.get(record.stage), change(record, maps, frame)
-    if stage_map is None:
+    floor_plan, changed = maps.get(record.stage), change(record, maps, frame)
+    if floor_plan is None:
         return changed + on_it
-    return ground(stage_map, frame) + changed + item_names + on_it + labels(stage_map, frame)
+    return ground(floor_plan, frame) + changed + item_names + on_it + labels(floor_plan, frame)

@@ -46,7 +46,7 @@ def write_strip(
             [record for record in store.records(agent, task_id) if stages is None or record.stage in stages]
             for agent in agents
         ]
-        maps = {stage_map.stage: stage_map for stage_map in store.maps(task_id)}
+        maps = {floor_plan.stage: floor_plan for floor_plan in store.floor_plans(task_id)}
         config = store.meta("config") or {}
     for agent, row in zip(agents, rows, strict=True):
         if not row:

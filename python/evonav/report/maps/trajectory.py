@@ -51,21 +51,21 @@ def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame) -> 
     relocations = record.transition.relocations
     if not relocations:
         return ""
-    stage_map, previous_map = maps.get(record.stage), maps.get(record.stage - 1)
+    floor_plan, previous_map = maps.get(record.stage), maps.get(record.stage - 1)
     names = {relocation.object_id for relocation in relocations}
-    now = _by_id(stage_map)
+    now = _by_id(floor_plan)
     before = _by_id(previous_map)
     ghosts = furniture([before[name] for name in sorted(names) if name in before], frame, "items ghost")
     stressed = furniture([now[name] for name in sorted(names) if name in now], frame, "items moved")
-    arrows = relocation_arrows(relocations, frame, stage_map=stage_map, previous_map=previous_map)
+    arrows = relocation_arrows(relocations, frame, floor_plan=floor_plan, previous_map=previous_map)
     return f'<g class="change">{ghosts}{stressed}{arrows}</g>'
 
 
 def relocation_arrows(
-    relocations: Sequence[Relocation], frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
+    relocations: Sequence[Relocation], frame: Frame, *, floor_plan: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
     """Draw an arrow for each object that was not carried along by a larger one."""
-    now, before = _by_id(stage_map), _by_id(previous_map)
+    now, before = _by_id(floor_plan), _by_id(previous_map)
     return join(
         _relocation_arrow(relocation, frame, is_large=_area_m2(now.get(relocation.object_id)) >= LARGE_M2)
         for relocation in relocations
@@ -85,8 +85,8 @@ def rounds(trace: Sequence[RoundRecord]) -> list[str]:
     return [choice if count == 1 else f"{choice} ×{count}" for choice, count in runs]
 
 
-def _by_id(stage_map: FloorPlan | None) -> Mapping[str, ObjectFootprint]:
-    return {} if stage_map is None else {item.object_id: item for item in stage_map.objects}
+def _by_id(floor_plan: FloorPlan | None) -> Mapping[str, ObjectFootprint]:
+    return {} if floor_plan is None else {item.object_id: item for item in floor_plan.objects}
 
 
 def _is_carried(

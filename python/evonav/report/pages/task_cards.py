@@ -33,8 +33,8 @@ def task_view(run: RecordedRun, task: Task, prefix: str, hrefs: Mapping[tuple[st
         defs.append(_shared(prefix, ground(shared[0], frame, moving)))
         defs.append(_shared(f"{prefix}n", labels(shared[0], frame)))
         defs.append(_shared(f"{prefix}f", item_labels(fixed, frame)))
-    for stage, stage_map in task.maps.items():
-        items = [item for item in stage_map.objects if item.object_id in moving]
+    for stage, floor_plan in task.maps.items():
+        items = [item for item in floor_plan.objects if item.object_id in moving]
         recorded = next((record for record in records if record.stage == stage), None)
         changed = "" if recorded is None else change(recorded, task.maps, frame)
         defs.append(_shared(f"{prefix}s{stage}", furniture(items, frame) + changed))

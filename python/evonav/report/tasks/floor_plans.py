@@ -106,7 +106,7 @@ def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     ghosts = furniture(old, frame, "items ghost")
     plan = _plan(drawing, drawing.maps[stage], evolution, frame, {"moved": moved - added, "new": added}, ghosts)
     arrows = relocation_arrows(
-        transition_record(oracle.evolution).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
+        transition_record(oracle.evolution).relocations, frame, floor_plan=drawing.maps[stage], previous_map=previous
     )
     return f'{plan}<g class="change">{arrows}</g>{target_mark(target_record(drawing.task, stage), frame)}'
 
@@ -133,30 +133,30 @@ def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
     changed |= {record.id for record in (*evolution.additions, *evolution.removals)}
     changed |= {state.id for state in evolution.states}
     points: list[Point] = []
-    for stage_map in (drawing.maps[stage - 1].at_end, drawing.maps[stage]):
-        points += [p for room in stage_map.rooms if room.room_id == evolution.room_id for p in room.polygon_m]
-        points += [p for item in stage_map.objects if item.object_id in changed for p in item.polygon_m]
+    for floor_plan in (drawing.maps[stage - 1].at_end, drawing.maps[stage]):
+        points += [p for room in floor_plan.rooms if room.room_id == evolution.room_id for p in room.polygon_m]
+        points += [p for item in floor_plan.objects if item.object_id in changed for p in item.polygon_m]
         points += [p for name, ends in drawing.doors.items() if name in changed for p in ends]
     return Frame.around(points)
 
 
 def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
     """Draw a stage's house with nothing but large furniture and what moved: content of an `svg` element."""
-    oracle, frame, stage_map = drawing.task.oracle(stage), drawing.frame, drawing.maps[stage]
+    oracle, frame, floor_plan = drawing.task.oracle(stage), drawing.frame, drawing.maps[stage]
     moved = {change.id for change in oracle.evolution.changes}
-    large = [item for item in stage_map.objects if max(item.size_m[0], item.size_m[2]) >= THUMBNAIL_MIN_M]
+    large = [item for item in floor_plan.objects if max(item.size_m[0], item.size_m[2]) >= THUMBNAIL_MIN_M]
     arrows = relocation_arrows(
         transition_record(oracle.evolution).relocations,
         frame,
-        stage_map=stage_map,
+        floor_plan=floor_plan,
         previous_map=_before(drawing, stage),
     )
     return join(
         [
-            floors(stage_map),
+            floors(floor_plan),
             furniture([item for item in large if item.object_id not in moved], frame, has_parts=False),
             furniture([item for item in large if item.object_id in moved], frame, "items moved", has_parts=False),
-            structure(stage_map, frame),
+            structure(floor_plan, frame),
             f'<g class="change">{arrows}</g>',
         ]
     )
@@ -169,7 +169,7 @@ def _before(drawing: TaskDrawing, stage: int) -> FloorPlan | None:
 
 def _plan(
     drawing: TaskDrawing,
-    stage_map: FloorPlan,
+    floor_plan: FloorPlan,
     evolution: Evolution,
     frame: Frame,
     stressed: Mapping[str, set[str]],
@@ -180,22 +180,22 @@ def _plan(
     def use(name: str) -> str:
         return f'<use href="#{drawing.prefix}-{name}"/>'
 
-    movable = [item for item in stage_map.objects if item.object_id in drawing.moving]
+    movable = [item for item in floor_plan.objects if item.object_id in drawing.moving]
     css_of = {name: css for css, names in stressed.items() for name in names}
     plain = furniture([item for item in movable if item.object_id not in css_of], frame)
     coloured = join(
         furniture([item for item in movable if css_of.get(item.object_id) == css], frame, f"items {css}")
         for css in stressed
     )
-    unmoved = [item for item in stage_map.objects if item.object_id in evolution.unmoved_ids]
+    unmoved = [item for item in floor_plan.objects if item.object_id in evolution.unmoved_ids]
     states = {state.id for state in evolution.states}
-    opened = [item for item in stage_map.objects if item.object_id in states]
+    opened = [item for item in floor_plan.objects if item.object_id in states]
     is_whole = frame == drawing.frame
     return join(
         [
             use("floors"),
-            join(_tint(room, frame) for room in stage_map.rooms if room.room_id == evolution.room_id),
-            _groups(stage_map.objects, frame),
+            join(_tint(room, frame) for room in floor_plan.rooms if room.room_id == evolution.room_id),
+            _groups(floor_plan.objects, frame),
             ghosts,
             use("fixed"),
             plain,
@@ -204,8 +204,8 @@ def _plan(
             furniture(opened, frame, "items opened"),
             use("walls"),
             _opened_doors(drawing, states, frame),
-            item_labels(stage_map.objects, frame, *(() if is_whole else (CLOSE_LABEL_MIN_M2, CLOSE_LETTERS))),
-            labels(stage_map, frame) if is_whole else "",
+            item_labels(floor_plan.objects, frame, *(() if is_whole else (CLOSE_LABEL_MIN_M2, CLOSE_LETTERS))),
+            labels(floor_plan, frame) if is_whole else "",
         ]
     )
 

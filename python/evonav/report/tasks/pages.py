@@ -130,22 +130,22 @@ def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None = 
 
 def _stage_values(drawing: TaskDrawing, stage: int) -> dict[str, object]:
     """Return a stage as the template shows it; `plans` are caption, view box and content."""
-    task, stage_map = drawing.task, drawing.maps[stage]
+    task, floor_plan = drawing.task, drawing.maps[stage]
     public, oracle = task.public_stages[stage - 1], task.oracle(stage)
     plans = _plans(drawing, stage)
     return {
         "number": stage,
         "has_changed": len(plans) > 1,
-        "changed": change_sentence(stage_map, oracle.evolution),
+        "changed": change_sentence(floor_plan, oracle.evolution),
         "plans": [(caption, frame.view_box, Markup(svg)) for caption, frame, svg in plans],  # noqa: S704 - our own SVG
-        "image": stage_map.reference_image or "",
+        "image": floor_plan.reference_image or "",
         "instructions": [
             ("basic instruction", public.basic_instruction),
             ("appearance instruction", public.appearance_instruction),
             ("unified instruction", public.unified_instruction),
         ],
-        "facts": stage_facts(stage_map, oracle),
-        "moves": move_rows(stage_map, oracle.evolution),
+        "facts": stage_facts(floor_plan, oracle),
+        "moves": move_rows(floor_plan, oracle.evolution),
     }
 
 

@@ -23,10 +23,10 @@ FAILURES = {
 }
 
 
-def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, str]]:
+def stage_facts(floor_plan: FloorPlan, oracle: OracleStage) -> list[tuple[str, str]]:
     """Name and value of what a stage's page lists."""
-    nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
-    rooms = room_namer(stage_map)
+    nouns = {item.object_id: noun_of(item.category) for item in floor_plan.objects}
+    rooms = room_namer(floor_plan)
     target, evolution = oracle.target, oracle.evolution
     others = f", {len(target.same_category_ids)} more of its kind" if target.same_category_ids else ", the only one"
     where = f" on the {nouns.get(target.support_id, target.support_id)}" if target.support_id else ""
@@ -44,7 +44,7 @@ def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, st
         facts.append(("goals refused", ", ".join(refused)))
     if oracle.during is not None:
         where = "the target moves" if oracle.during.is_target_relocated else "the target stays"
-        sentence = change_sentence(stage_map, oracle.during.evolution)
+        sentence = change_sentence(floor_plan, oracle.during.evolution)
         facts.append((f"during the stage, round {oracle.during.round}", f"{sentence} {where.capitalize()}."))
     for name, ids in _lists(evolution):
         if ids:
@@ -55,13 +55,13 @@ def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, st
     return facts
 
 
-def change_sentence(stage_map: FloorPlan, evolution: Evolution) -> str:
+def change_sentence(floor_plan: FloorPlan, evolution: Evolution) -> str:
     """Describe what changed before a stage, in one sentence."""
     text = OUTCOMES[evolution.outcome]
     if evolution.outcome == "no_placement":
         text += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
     if evolution.outcome == "evolved" and evolution.mode is not None:
-        room = room_namer(stage_map)(evolution.room_id or "")
+        room = room_namer(floor_plan)(evolution.room_id or "")
         text = f"{mode_words(evolution.mode).capitalize()} in the {room}: {_moved_text(evolution)}."
     extra = [
         (len(evolution.additions), "came"),
@@ -72,9 +72,9 @@ def change_sentence(stage_map: FloorPlan, evolution: Evolution) -> str:
     return f"{text} By extensions: {more}.".strip() if more else text
 
 
-def move_rows(stage_map: FloorPlan, evolution: Evolution) -> list[tuple[str, ...]]:
+def move_rows(floor_plan: FloorPlan, evolution: Evolution) -> list[tuple[str, ...]]:
     """List moved objects, the farthest first: object, id, distance, turn, old and new support, cause."""
-    nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
+    nouns = {item.object_id: noun_of(item.category) for item in floor_plan.objects}
     rows: list[tuple[str, ...]] = []
     for change in sorted(evolution.changes, key=lambda change: (-change.displacement_m, change.id)):
         turn_deg = (change.to_rotation_deg[1] - change.from_rotation_deg[1]) % 360.0
@@ -94,11 +94,11 @@ def move_rows(stage_map: FloorPlan, evolution: Evolution) -> list[tuple[str, ...
     return rows
 
 
-def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
+def room_namer(floor_plan: FloorPlan) -> Callable[[str], str]:
     """Return a function that names rooms: their type, with the room's number where several are of that type."""
-    types = Counter(room.room_type for room in stage_map.rooms)
+    types = Counter(room.room_type for room in floor_plan.rooms)
     names = {}
-    for room in stage_map.rooms:
+    for room in floor_plan.rooms:
         number = room.room_id.rsplit("|", 1)[-1]
         names[room.room_id] = noun_of(room.room_type) + (f" {number}" if types[room.room_type] > 1 else "")
     return lambda room_id: names.get(room_id, room_id)

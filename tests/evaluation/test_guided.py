@@ -60,11 +60,11 @@ def walked():
 def test_every_agent_is_walked_along_the_same_way(walked, name):
     first, second, third = walked[name]
     assert [first.state, second.state] == [EndState.GUIDED] * 2
-    for record, forced in ((first, TO_CHAIR), (second, TO_BED)):
-        corners = [point for point in way(record) if point in forced.path_m]
-        assert corners == list(forced.path_m)
-        assert record.path_length_m == pytest.approx(motion.polyline_length_m(forced.path_m))
-        assert record.terminal.yaw_rad == pytest.approx(forced.end.yaw_rad)
+    for record, guided in ((first, TO_CHAIR), (second, TO_BED)):
+        corners = [point for point in way(record) if point in guided.path_m]
+        assert corners == list(guided.path_m)
+        assert record.path_length_m == pytest.approx(motion.polyline_length_m(guided.path_m))
+        assert record.terminal.yaw_rad == pytest.approx(guided.end.yaw_rad)
         assert all(taken.is_action_success for taken in record.trace)
     assert (third.requested_start.x_m, third.requested_start.z_m) == TO_BED.path_m[-1]
     assert third.is_scored
@@ -75,11 +75,11 @@ def test_nothing_of_a_walk_is_scored(walked, name):
     first, _, third = walked[name]
     assert (first.spl, first.soft_spl, first.reference_length_m, first.has_stopped) == (None, None, None, False)
     summary = summarise(name, walked[name], 3)
-    assert (summary.n, summary.counts["forced"], summary.is_incomplete) == (1, 2, False)
+    assert (summary.n, summary.counts["guided"], summary.is_incomplete) == (1, 2, False)
     assert metrics_of(first).success is None
     assert metrics_of(first).cause is None
     assert metrics_of(third).success is not None
-    assert StageRecord.model_validate_json(first.to_json()) == first
+    assert StageRecord.model_validate_json(first.model_dump_json()) == first
 
 
 def test_what_was_seen_on_the_way_is_remembered(walked):
@@ -115,7 +115,7 @@ def test_arms_share_all_that_precedes_the_change():
 
 def test_runs_are_the_same_again():
     first, again = (run("ftu", pair_case(is_evolved=True)) for _ in range(2))
-    assert [record.to_json() for record in first] == [record.to_json() for record in again]
+    assert [record.model_dump_json() for record in first] == [record.model_dump_json() for record in again]
 
 
 def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():
