@@ -75,7 +75,7 @@ def test_a_retried_run_of_an_agent_that_takes_single_steps(
 
 def test_guided_stages(tmp_path: Path) -> None:
     options = ControlledOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=10))
-    (tmp_path / "houses.jsonl").write_text("\n".join(house.model_dump_json() for house in bundled_houses(3)) + "\n")
+    (tmp_path / "houses.jsonl").write_text("\n".join(house.to_json() for house in bundled_houses(3)) + "\n")
     generate_controlled(tmp_path / "houses.jsonl", tmp_path / "tasks", options=options)
     guided = task_files(tasks_of(tmp_path / "tasks", "evolved"), 1)
     evaluate(["ftu"], guided, tmp_path / "run", num_workers=0)
