@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from evonav._core import RunImage
 from evonav.agents.agent import AgentAction, SensorConfig, Stop
-from evonav.agents.hosting.sandbox import why_not
+from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.component import Component
 from evonav.evaluation.hosting.agent import RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
@@ -176,7 +176,7 @@ def _evaluations() -> Iterator[str]:
     own, shared = [], []
     for _ in range(NUM_PAIRS):
         own.append((_evaluated(1, AgentHosting()), _evaluated(2, AgentHosting())))
-        within = AgentHosting(is_in_process=True)
+        within = AgentHosting("none")
         shared.append((_evaluated(1, within), _evaluated(2, within)))
     cpu_ms = 1e3 * statistics.median(one[0] for one, _ in own)
     shared_ms = 1e3 * statistics.median(one[0] for one, _ in shared)
@@ -204,10 +204,10 @@ def _evaluated(num_workers: int, hosting: AgentHosting) -> tuple[float, float]:
 def _sandboxes() -> Iterator[str]:
     yield "| `fu`, bundled | CPU a stage: sandbox | process | ratio | start: sandbox | process |"
     yield "| --- | --- | --- | --- | --- | --- |"
-    if reason := why_not():
+    if reason := sandbox_problem():
         yield f"| none here | {reason} |"
         return
-    hostings = (AgentHosting(is_sandboxed=True), AgentHosting())
+    hostings = (AgentHosting("sandbox"), AgentHosting())
     pairs = [[_evaluated(1, hosting)[0] for hosting in hostings] for _ in range(2 * NUM_PAIRS + 1)]
     starts = [[_start_s(hosting) for hosting in hostings] for _ in range(2 * NUM_PAIRS + 1)]
     ratio = statistics.median(shut / free for shut, free in pairs)

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from evonav.component import Component
 from evonav.decision.backends import text_match, vlm
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, Reply
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.statistics import wilson
@@ -141,7 +141,7 @@ def main() -> None:
     }
     sys.modules["measure_llm"] = sys.modules["__main__"]
     config = RunConfig(
-        backend=Backend(decision=Component("measure_llm:compared", options)), hosting=AgentHosting(is_in_process=True)
+        backend=Backend(decision=Component("measure_llm:compared", options)), hosting=AgentHosting("none")
     )
     evaluate(
         asked.agents.split(","),

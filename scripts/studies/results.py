@@ -19,7 +19,7 @@ from behaviour_tables import STRATA, cause_share_table, end_table, ends_of, succ
 
 from evonav.component import Component
 from evonav.evaluation.agent_order import PAPER_ORDER
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.evaluation.run.settings import SimulatorSettings
@@ -300,7 +300,7 @@ def run_agents(
             sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
 
     # Our own agents need no process of their own.
-    config = RunConfig(seed=asked.seed, backend=backend, hosting=AgentHosting(is_in_process=True))
+    config = RunConfig(seed=asked.seed, backend=backend, hosting=AgentHosting("none"))
     evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
 
 

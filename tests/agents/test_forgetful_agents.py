@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import check_agent_name
 
 FORGETFUL = (
@@ -46,9 +46,9 @@ def test_agents_with_object_entries_of_ours_take_a_rule() -> None:
 
 
 def test_a_rule_that_does_not_exist_is_named_with_the_nearest() -> None:
-    for is_in_process in (True, False):
+    for isolation in ("none", "process"):
         with pytest.raises(InvalidArgumentError, match=r"no forgetting rule 'baies': did you mean `bayes`[?]$"):
-            check_agent_name("fu@baies", AgentHosting(is_in_process=is_in_process))
+            check_agent_name("fu@baies", AgentHosting(isolation))
 
 
 @pytest.mark.parametrize("name", [name for name in FORGETFUL if name != "dualmap"])  # its anchors are no entries

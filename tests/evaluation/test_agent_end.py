@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from toy_house import write_tasks
 
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcess
+from evonav.evaluation.hosting.isolation import AgentHosting
+from evonav.evaluation.hosting.process import AgentProcess
 from evonav.parallel.local import EndedError
 from evonav.tasks.listing import task_files
 

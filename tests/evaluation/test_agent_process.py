@@ -18,10 +18,10 @@ from evonav.agents.registry import BUILT_IN
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import RemoteAgent
+from evonav.evaluation.hosting.isolation import AgentHosting, ProcessSetup
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentFailedError,
-    AgentHosting,
     AgentProcess,
     check_importable,
 )
@@ -202,9 +202,9 @@ class Killed:
 
 
 def test_a_process_that_does_not_start_is_a_crash(tmp_path):
-    hosting = AgentHosting(log=str(tmp_path / LOG_NAME), is_sandboxed=True, scratch=str(tmp_path))
+    setup = ProcessSetup(log=str(tmp_path / LOG_NAME), scratch=str(tmp_path))
     with pytest.raises(AgentFailedError, match="the agent's process does not start: closed") as caught:
-        AgentProcess("random-walk", hosting, Killed())
+        AgentProcess("random-walk", AgentHosting("sandbox"), setup, Killed())
     assert caught.value.kind is ErrorKind.CRASH
     assert not list(tmp_path.iterdir())
 

@@ -4,7 +4,7 @@ import pytest
 
 from evonav.component import Component, import_callable
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.worker import CONFIG, WorkerConfig
@@ -40,7 +40,7 @@ def test_a_header_with_an_unknown_entry_is_refused() -> None:
 
 
 def test_workers_get_host_options_too() -> None:
-    config = WorkerConfig(PARTS, ProtocolConfig(), AgentHosting(), 1)
+    config = WorkerConfig(PARTS, ProtocolConfig(), AgentHosting(), num_retries=1)
     assert CONFIG.validate_json(CONFIG.dump_json(config)) == config
 
 

@@ -15,7 +15,7 @@ from toy_house import write_tasks
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
@@ -138,7 +138,7 @@ def test_a_worker_that_is_lost_costs_its_episode_alone(tasks, tmp_path, agent, k
         backend=TOY,
         protocol=CONFIG.protocol,
         stage_timeout_s=8.0 if kind is ErrorKind.TIMEOUT else 600.0,
-        hosting=AgentHosting(is_in_process=True),
+        hosting=AgentHosting("none"),
     )
     evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=1, num_retries=0)
     assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
@@ -270,7 +270,7 @@ from pathlib import Path
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.component import Component
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.protocol import ProtocolConfig

@@ -13,7 +13,7 @@ from test_sandbox import NEEDS_SANDBOX
 from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.component import Component
 from evonav.evaluation.hosting.agent import RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
@@ -26,7 +26,7 @@ from evonav.world.pose import Pose
 AGENT = "unruly_agents:Keeping"
 HOSTINGS = [
     pytest.param(AgentHosting(timeout_s=30.0), id="process"),
-    pytest.param(AgentHosting(timeout_s=30.0, is_sandboxed=True), id="sandbox", marks=NEEDS_SANDBOX),
+    pytest.param(AgentHosting("sandbox", timeout_s=30.0), id="sandbox", marks=NEEDS_SANDBOX),
 ]
 
 

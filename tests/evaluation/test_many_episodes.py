@@ -25,8 +25,8 @@ from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.hosting.fork_server import IS_SUPPORTED
-from evonav.evaluation.hosting.isolation import usual_isolation
-from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting, usual_isolation
+from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
@@ -44,7 +44,7 @@ WAITING = "waiting_parts:Waiting"
 CHEAP = RunConfig(
     backend=replace(TOY, tasks=Component("chaos_house:load_case")),
     protocol=ProtocolConfig(max_rounds=3),
-    hosting=AgentHosting(is_sandboxed=usual_isolation() == "sandbox"),
+    hosting=AgentHosting(usual_isolation()),
 )
 NAMES_OF_FAULTS = ("server_error", "malformed", "truncated", "refusal", "broken_json")
 
@@ -96,16 +96,16 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
     assert len(found["1-1"][0]) == (3 + 3 if backend == "bundled" else 18 + 18)
 
 
-@pytest.mark.parametrize("is_in_process", [False, True])
-def test_episodes_share_a_task_unless_their_agents_could_change_it(is_in_process):
-    hosting = AgentHosting(is_in_process=is_in_process)
+@pytest.mark.parametrize("isolation", ["process", "none"])
+def test_episodes_share_a_task_unless_their_agents_could_change_it(isolation):
+    hosting = AgentHosting(isolation)
     config = WorkerConfig(Backend(tasks=Component("pathlib:Path")), ProtocolConfig(), hosting)
     with closing(WorkerContext(config, lambda: None)) as context:
         first = context.task("one")
         assert first.spec == Path("one")
-        assert (context.task("one") is first) is not is_in_process
+        assert (context.task("one") is first) is (isolation == "process")
         assert context.task("two").spec == Path("two")
-        assert (context.task("one") is first) is not is_in_process
+        assert (context.task("one") is first) is (isolation == "process")
         context.task("two")
         known = weakref.ref(first)
         del first

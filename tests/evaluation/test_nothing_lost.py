@@ -17,11 +17,11 @@ from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 from typer.testing import CliRunner
 
-from evonav.agents.hosting.sandbox import why_not
+from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.cli import app
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -155,9 +155,9 @@ CHEAP = RunConfig(
 DRIVER = """
 import sys
 from pathlib import Path
-from evonav.agents.hosting.sandbox import why_not
+from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.component import Component
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
@@ -166,14 +166,14 @@ from evonav.evaluation.protocol import ProtocolConfig
 config = RunConfig(
     backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
-    hosting=AgentHosting(is_sandboxed=not why_not()),
+    hosting=AgentHosting("process" if sandbox_problem() else "sandbox"),
 )
 tasks, run, at_once = task_files(Path(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
 evaluate(["random-walk"], tasks, run, config=config, num_workers=2, num_retries=5, episodes_at_once=at_once)
 """
 HERE_ALONE = {"config": CHEAP, "num_workers": 0}
 MANY_AT_ONCE = {
-    "config": replace(CHEAP, hosting=AgentHosting(is_sandboxed=not why_not())),
+    "config": replace(CHEAP, hosting=AgentHosting("process" if sandbox_problem() else "sandbox")),
     "num_workers": 2,
     "episodes_at_once": 4,
 }

@@ -8,7 +8,8 @@ from contextlib import closing
 
 import pytest
 
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcess
+from evonav.evaluation.hosting.isolation import AgentHosting, ProcessSetup
+from evonav.evaluation.hosting.process import AgentProcess
 from evonav.parallel.local import num_cores
 from evonav.parallel.one_core import IS_SUPPORTED, OneCore
 
@@ -54,8 +55,8 @@ def test_an_agent_that_works_may_use_all_cores_or_those_that_it_chooses(tmp_path
     cores = sorted(os.sched_getaffinity(0))
     (tmp_path / "confined.py").write_text(AGENT)
     chosen = [cores[:1], cores[1:], None]
-    hosting = AgentHosting(is_one_of_many=is_one_of_many)
-    with closing(AgentProcess(f"{tmp_path}/confined.py:Confined", hosting)) as agent:
+    setup = ProcessSetup(is_one_of_many=is_one_of_many)
+    with closing(AgentProcess(f"{tmp_path}/confined.py:Confined", AgentHosting(), setup)) as agent:
         agent.ask("make", "evonav.decision.backends:text_match", 0, {})
         assert len(os.sched_getaffinity(agent._process.pid)) == (len(cores) if is_one_of_many else 1)
         for some in chosen:

@@ -14,8 +14,7 @@ from toy_house import write_tasks
 from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting.isolation import environment, policy_of
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting, environment, policy_of
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
@@ -25,35 +24,37 @@ from evonav.report import write_report
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
-NEEDS_SANDBOX = pytest.mark.skipif(bool(sandbox.why_not()), reason=f"no sandbox here: {sandbox.why_not()}")
+NEEDS_SANDBOX = pytest.mark.skipif(
+    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
+)
 SHORT = ProtocolConfig(max_rounds=3)
-SANDBOX = AgentHosting(is_sandboxed=True, timeout_s=20.0)
+SANDBOX = AgentHosting("sandbox", timeout_s=20.0)
 
 
-def spied(folder, monkeypatch, *, is_sandboxed):
+def spied(folder, monkeypatch, *, isolation):
     """Evaluate the spy from a folder that holds its file, notes, the tasks and the run, and return what it reached."""
     project = folder / "project"
     project.mkdir()
     text = Path(__file__).with_name("spying_agent.py").read_text()
     filled = re.sub(r"(?m)^THE_USERS_HOME = .*$", lambda _: f"THE_USERS_HOME = {str(Path.home())!r}", text)
-    (project / f"spy_{is_sandboxed}.py").write_text(filled)
+    (project / f"spy_{isolation}.py").write_text(filled)
     (project / "notes.txt").write_text("the agent's own")
     write_tasks(project / "tasks")
     (project / "shortcut").symlink_to(project / "tasks")
     monkeypatch.setenv("SOME_KEY", "canary-of-the-evaluator")
     monkeypatch.chdir(project)
-    config = RunConfig(backend=TOY, protocol=SHORT, hosting=replace(SANDBOX, is_sandboxed=is_sandboxed))
+    config = RunConfig(backend=TOY, protocol=SHORT, hosting=replace(SANDBOX, isolation=isolation))
     tasks = task_files(project / "tasks", 1)
-    evaluate([f"./spy_{is_sandboxed}.py:Spy"], tasks, project / "run", config=config, num_workers=1)
-    (first, *_) = records(project / "run", f"./spy_{is_sandboxed}.py:Spy")
+    evaluate([f"./spy_{isolation}.py:Spy"], tasks, project / "run", config=config, num_workers=1)
+    (first, *_) = records(project / "run", f"./spy_{isolation}.py:Spy")
     assert first.error is None
     return project, first.trace[0].details
 
 
 @NEEDS_SANDBOX
 def test_a_spy_in_a_sandbox_reaches_nothing(tmp_path, monkeypatch):
-    project, found = spied(tmp_path, monkeypatch, is_sandboxed=True)
-    assert found["files beside"] == ["notes.txt", "spy_True.py"]
+    project, found = spied(tmp_path, monkeypatch, isolation="sandbox")
+    assert found["files beside"] == ["notes.txt", "spy_sandbox.py"]
     assert found["link"] == []
     assert found["package"] == ["wordpiece.txt.gz"]
     assert found["home"][:-1] == []
@@ -78,7 +79,7 @@ def test_a_spy_in_a_sandbox_reaches_nothing(tmp_path, monkeypatch):
 
 def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
     """Or the test above would show nothing."""
-    _, found = spied(tmp_path, monkeypatch, is_sandboxed=False)
+    _, found = spied(tmp_path, monkeypatch, isolation="process")
     assert "records.sqlite" in found["files beside"]
     assert "records.sqlite" in found["link"]
     assert "houses.jsonl.gz" in found["package"]
@@ -129,7 +130,7 @@ def test_failures_are_contained_as_without_a_sandbox(tmp_path):
     ],
 )
 def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, change, num_workers, reason):
-    monkeypatch.setattr("evonav.evaluation.run.components.why_not", lambda: "")
+    monkeypatch.setattr("evonav.evaluation.run.components.sandbox_problem", lambda: None)
     write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=replace(TOY, **change), hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match=f"isolation = sandbox: .*{reason}"):
@@ -140,7 +141,7 @@ def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, 
 
 
 def test_a_system_without_one_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("evonav.evaluation.run.components.why_not", lambda: "this kernel offers no Landlock")
+    monkeypatch.setattr("evonav.evaluation.run.components.sandbox_problem", lambda: "this kernel offers no Landlock")
     write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=TOY, hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match="isolation = sandbox: this kernel offers no Landlock"):

@@ -10,7 +10,7 @@ from short_tasks import short_tasks
 from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting, Isolation
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -18,11 +18,13 @@ from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import KEY, check_request, serving
 
-NEEDS_SANDBOX = pytest.mark.skipif(bool(sandbox.why_not()), reason=f"no sandbox here: {sandbox.why_not()}")
+NEEDS_SANDBOX = pytest.mark.skipif(
+    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
+)
 PRICE = [2.0, 8.0]
 
 
-def run(folder: Path, agents: list[str], url: str | None, *, is_sandboxed: bool, num_stages: int = 1) -> RunStore:
+def run(folder: Path, agents: list[str], url: str | None, *, isolation: Isolation, num_stages: int = 1) -> RunStore:
     """Evaluate agents with a model at an address; without one, with what is cached."""
     host = {
         "server": {"base_url": url or "http://127.0.0.1:9/v1", "timeout_s": 20.0, "max_retries": 0},
@@ -32,7 +34,7 @@ def run(folder: Path, agents: list[str], url: str | None, *, is_sandboxed: bool,
         "mode": "auto" if url else "replay",
     }
     decision = Component("evonav.decision.backends:vlm", {"model": "gpt-4o"}, host)
-    hosting = AgentHosting(is_sandboxed=is_sandboxed, timeout_s=60.0)
+    hosting = AgentHosting(isolation, timeout_s=60.0)
     with bundled_tasks() as directory:
         tasks, reader = short_tasks(directory, num_stages)
         backend = Backend(tasks=reader, decision=decision)
@@ -55,19 +57,20 @@ def test_a_model_is_asked_for_an_agent_in_a_sandbox_as_for_any_other(
     """Records, exchanges and spending are the same, also where the model fails now and then."""
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     found = {}
-    for name in ("process", "sandbox"):
+    isolations: tuple[Isolation, ...] = ("process", "sandbox")
+    for isolation in isolations:
         numbers = iter(range(10**6))
         replies = {3: {"status": 500, "raw": b"down"}, 5: {"text": ""}, 7: {"message": {"refusal": "no"}}}
         with serving(lambda request, n=numbers, r=replies: r.get(next(n), {"text": mock_answer(request)})) as stub:  # type: ignore[misc]
             stub.check = check_request
-            with run(tmp_path / name, ["fu", "msgnav"], stub.url, is_sandboxed=name == "sandbox") as store:
+            with run(tmp_path / isolation, ["fu", "msgnav"], stub.url, isolation=isolation) as store:
                 texts, costs = list(store.record_texts()), store.costs()
             assert stub.num_requests > 5
-        spent, exchanges = (contents(tmp_path / f"{name}.{kind}") for kind in ("spending", "exchanges"))
+        spent, exchanges = (contents(tmp_path / f"{isolation}.{kind}") for kind in ("spending", "exchanges"))
         tokens = {key: (one["input_tokens"], one["output_tokens"], one["cost_usd"]) for key, one in costs.items()}
-        found[name] = (texts, spent, exchanges, tokens)
+        found[isolation] = (texts, spent, exchanges, tokens)
     assert found["sandbox"] == found["process"]
-    with run(tmp_path / "sandbox", ["fu", "msgnav"], None, is_sandboxed=True) as store:  # already complete
+    with run(tmp_path / "sandbox", ["fu", "msgnav"], None, isolation="sandbox") as store:  # already complete
         assert list(store.record_texts()) == found["process"][0]
 
 
@@ -77,7 +80,7 @@ def test_an_agent_reaches_the_model_and_nothing_else_of_it(tmp_path: Path, monke
     agent = f"{Path(__file__).with_name('asking_agent.py')}:Asking"
     with (
         serving(lambda _: {"text": "2"}) as stub,
-        run(tmp_path / "run", [agent], stub.url, is_sandboxed=True, num_stages=3) as store,
+        run(tmp_path / "run", [agent], stub.url, isolation="sandbox", num_stages=3) as store,
     ):
         first, second, third = store.records()
         assert stub.keys == {f"Bearer {KEY}"}

@@ -12,7 +12,8 @@ from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting import isolation, scratch
-from evonav.evaluation.hosting.process import AgentHosting, check_importable
+from evonav.evaluation.hosting.isolation import AgentHosting
+from evonav.evaluation.hosting.process import check_importable
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import evaluate
@@ -21,7 +22,9 @@ from evonav.evaluation.run.settings import DecisionSettings
 from evonav.parallel.folders import writing
 from evonav.tasks.listing import task_files
 
-NEEDS_SANDBOX = pytest.mark.skipif(bool(sandbox.why_not()), reason=f"no sandbox here: {sandbox.why_not()}")
+NEEDS_SANDBOX = pytest.mark.skipif(
+    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
+)
 READING = """
 import os
 from pathlib import Path
@@ -43,7 +46,7 @@ class Stealing(RandomWalk):
 
 @pytest.fixture
 def has_sandbox(monkeypatch):
-    monkeypatch.setattr(isolation, "why_not", lambda: "")
+    monkeypatch.setattr(isolation, "sandbox_problem", lambda: None)
     monkeypatch.setattr(isolation, "_GPU_DEVICES", ())
 
 
@@ -70,9 +73,9 @@ def test_a_model_that_needs_files_has_no_sandbox(has_sandbox):
     assert config_of(own, workers=1).hosting.isolation == "process"
 
 
-@pytest.mark.parametrize(("reason", "devices"), [("no Landlock", ()), ("", ("/dev/null",))])
+@pytest.mark.parametrize(("reason", "devices"), [("no Landlock", ()), (None, ("/dev/null",))])
 def test_without_one_or_beside_a_gpu_a_process_is_the_default(monkeypatch, reason, devices):
-    monkeypatch.setattr(isolation, "why_not", lambda: reason)
+    monkeypatch.setattr(isolation, "sandbox_problem", lambda: reason)
     monkeypatch.setattr(isolation, "_GPU_DEVICES", devices)
     assert config_of(workers=1).hosting.isolation == "process"
 
@@ -124,4 +127,4 @@ def test_a_module_that_reads_elsewhere_is_told_what_a_sandbox_allows(tmp_path):
     (tmp_path / "agents").mkdir()
     (tmp_path / "agents" / "mine.py").write_text(f"open({str(tmp_path / 'secret')!r})\n")
     with pytest.raises(InvalidArgumentError, match=r"PermissionError.*EVONAV_MODELS.*--isolation process"):
-        check_importable(f"{tmp_path}/agents/mine.py:Mine", AgentHosting(is_sandboxed=True))
+        check_importable(f"{tmp_path}/agents/mine.py:Mine", AgentHosting("sandbox"))

@@ -12,7 +12,7 @@ from serve_llm import NAME
 from short_tasks import short_tasks
 
 from evonav.component import Component
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -64,9 +64,7 @@ def test_an_agent_is_evaluated_with_the_model_and_replayed(base_url: str, tmp_pa
         tasks, reader = short_tasks(folder, num_stages=1)
         for name, host in hosts.items():
             decision = Component("evonav.decision.backends:vlm", options, host)
-            config = RunConfig(
-                backend=Backend(tasks=reader, decision=decision), hosting=AgentHosting(is_in_process=True)
-            )
+            config = RunConfig(backend=Backend(tasks=reader, decision=decision), hosting=AgentHosting("none"))
             evaluate(["fu"], tasks, tmp_path / name, config=config, num_workers=0)
             with RunStore(tmp_path / name) as store:
                 texts[name] = list(store.record_texts())

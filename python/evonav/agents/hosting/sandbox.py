@@ -116,8 +116,8 @@ def landlock_abi() -> int:
     return max(0, int(_LIBC.syscall(_CREATE_RULESET, None, 0, 1)))
 
 
-def why_not() -> str:
-    """Return why this system has no sandbox for agents, in a few words; empty if it has one."""
+def sandbox_problem() -> str | None:
+    """Return why this system has no sandbox for agents, in a few words; `None` if it has one."""
     if not _IS_LINUX:
         return "it needs Linux"
     if platform.machine() not in _AUDIT_ARCH:
@@ -126,7 +126,7 @@ def why_not() -> str:
         return "this kernel offers no Landlock (Linux 5.13 or newer, switched on)"
     if _LIBC is not None and _LIBC.prctl(_GET_SECCOMP, 0, 0, 0, 0) < 0:
         return "this kernel offers no seccomp"
-    return ""
+    return None
 
 
 def begin(socket_fd: int) -> None:
@@ -163,7 +163,7 @@ def restrict(policy: Policy) -> None:
     Raises:
         InvalidArgumentError: The system does not offer it, or another thread is running.
     """
-    if reason := why_not():
+    if reason := sandbox_problem():
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")
     num_threads = len(list(Path("/proc/self/task").iterdir()))
     if num_threads != 1:  # it would stay free, and could be made to work for the agent

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
-from evonav.agents.hosting.sandbox import landlock_abi, why_not
+from evonav.agents.hosting.sandbox import landlock_abi, sandbox_problem
 from evonav.cli.examples import DOCS
 from evonav.counted import counted
 from evonav.evaluation.hosting.isolation import usual_isolation
@@ -241,7 +241,7 @@ def _extra(extra: str) -> Result:
 
 
 def _sandbox() -> Result:
-    if reason := why_not():
+    if reason := sandbox_problem():
         return "missing", f"--isolation sandbox: {reason}"
     usual = "" if usual_isolation() == "sandbox" else "; not the default where there is a GPU"
     return "ok", f"--isolation sandbox: Landlock {landlock_abi()} and seccomp shut agents in{usual}"

@@ -123,6 +123,7 @@ def evaluate(
         run = profiled(run)
     if pdb:
         from evonav.evaluation.hosting.debugger import check_terminal
+        from evonav.evaluation.hosting.isolation import AgentHosting
 
         check_terminal()
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
@@ -134,7 +135,8 @@ def evaluate(
         decision=decision_component(run.decision, run, out, seed, run.num_episodes, dry_run=dry_run),
     )
     config = run.config(seed, backend, run.decision)
-    config = replace(config, hosting=replace(config.hosting, is_debugged=pdb))
+    if pdb:
+        config = replace(config, hosting=AgentHosting("debugger"))
     names = names_of(agent)
     allows_any = run.simulator.allow_unknown_assets
     texts = None if houses is None else read_houses(houses, assets, start)

@@ -152,7 +152,7 @@ def _print_plan(
     from rich.table import Table
 
     from evonav.cli.display import status
-    from evonav.evaluation.hosting.process import AgentHosting
+    from evonav.evaluation.hosting.isolation import AgentHosting
     from evonav.evaluation.run.components import check_agent_name
     from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
     from evonav.sweeps.run import cell_runs

@@ -23,7 +23,7 @@ from evonav.evaluation.contract.situations import check_situations
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend

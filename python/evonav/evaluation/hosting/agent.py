@@ -210,7 +210,7 @@ class RemoteAgent(HostedAgent):
         """Return the object memory; None if the agent does not explain itself."""
         failure, text = (self._last_parts.pop(name, None) for name in ("entries_failure", "entries"))
         if failure is not None:
-            raise failure_of(failure, is_sandboxed=self._processes.hosting.is_sandboxed)
+            raise failure_of(failure, is_sandboxed=self._processes.hosting.isolation == "sandbox")
         if text is None:
             text = self._ask("entries").get("entries")
         return None if text is None else self._entries.read(text)

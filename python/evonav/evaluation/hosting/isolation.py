@@ -3,16 +3,19 @@
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from evonav.agents.hosting.sandbox import Policy, landlock_abi, why_not
+from evonav.agents.hosting.sandbox import Policy, landlock_abi, sandbox_problem
 from evonav.parallel.local import SPARING, THREAD_VARIABLES, search_path
 from evonav.perception.weights import MODELS_VARIABLE
 
 Isolation = Literal["none", "process", "sandbox"]
 """`none`: the evaluator's own process; `process`: one of the agent's own; `sandbox`: that, shut in."""
+IS_SUPPORTED = os.name == "posix"
+"""True where agents can have processes of their own; elsewhere they run in the evaluator's."""
 
 _GPU_DEVICES = ("/dev/nvidiactl", "/dev/kfd")
 _SYSTEM = (
@@ -55,6 +58,46 @@ _TOKENS = ("token", "stored_tokens")
 """Files with keys in `HF_HOME`."""
 
 
+@dataclass(frozen=True, slots=True)
+class AgentHosting:
+    """How agents are run: what a user sets of their processes. It is not part of a run's identity."""
+
+    isolation: Isolation | Literal["debugger"] = "process"
+    """`none` and `debugger` contain only exceptions; `debugger` also opens Python's where one is raised (a terminal).
+
+    `sandbox`: the process reads no file of a run or a task, and reaches no network (Linux).
+    """
+    timeout_s: float = 600.0
+    """Time limit of an answer, after which the process is ended."""
+    memory_mb: int | None = None
+    """Largest address space of an agent's process; default: no limit."""
+
+    @property
+    def is_in_process(self) -> bool:
+        """True if agents run in the evaluator's own process."""
+        return self.isolation in ("none", "debugger")
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSetup:
+    """What a run sets of its agents' processes."""
+
+    log: str | None = None
+    """File to which the output of agents is appended; default: the evaluator's standard error."""
+    hidden: tuple[str, ...] = ()
+    """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
+    scratch: str | None = None
+    """Folder for the folders in which processes in a sandbox may write; default: the system's for temporary files."""
+    relays_model: bool = False
+    """Ask the decision model for agents' processes: those in a sandbox have no network."""
+    is_one_of_many: bool = False
+    """A worker has many episodes at once: unused shared memory is given back, and an agent may wake on any core."""
+
+
+NO_SETUP = ProcessSetup()
+"""That of a process which no run starts."""
+
+
 def usual_isolation() -> Isolation:
     """Return how agents are shut off if nobody says it: in a sandbox if this machine has one, else in a process.
 
@@ -62,12 +105,14 @@ def usual_isolation() -> Isolation:
     address space than there is memory, and a library that cannot find its GPU may go on without it, unnoticed.
     """
     has_gpu = any(Path(device).exists() for device in _GPU_DEVICES)
-    return "process" if why_not() or has_gpu else "sandbox"
+    return "process" if sandbox_problem() or has_gpu else "sandbox"
 
 
-def isolation_facts(isolation: Isolation) -> str:
+def isolation_facts(hosting: AgentHosting) -> str:
     """Return how agents are shut off, as a run's header says it."""
-    return f"sandbox (Landlock {landlock_abi()}, seccomp)" if isolation == "sandbox" else isolation
+    if hosting.isolation == "sandbox":
+        return f"sandbox (Landlock {landlock_abi()}, seccomp)"
+    return "none" if hosting.is_in_process else hosting.isolation
 
 
 def environment(scratch: Path) -> dict[str, str]:

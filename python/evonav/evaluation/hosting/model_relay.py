@@ -34,12 +34,12 @@ def is_relayed(decision: Component[DecisionModel]) -> bool:
     return decision.path == RELAYED
 
 
-def why_not_shut_in(decision: Component[DecisionModel]) -> str:
-    """Return why a decision model cannot be used by agents in a sandbox, in a few words; empty if it can."""
+def sandboxed_model_problem(decision: Component[DecisionModel]) -> str | None:
+    """Return why agents in a sandbox cannot use a decision model, in a few words; `None` if they can."""
     needs_more = decision.host_options or "path" in decision.options
     if needs_more and not is_relayed(decision):
         return "a decision model of your own needs files or a network, which a sandbox shuts: use `process`"
-    return ""
+    return None
 
 
 class ModelRelay:

@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from pathlib import Path
 
 from evonav.agents.hosting import forking, wire
@@ -32,7 +32,14 @@ from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
-from evonav.evaluation.hosting.isolation import Isolation, environment, policy_of, with_absolute_file
+from evonav.evaluation.hosting.isolation import (
+    NO_SETUP,
+    AgentHosting,
+    ProcessSetup,
+    environment,
+    policy_of,
+    with_absolute_file,
+)
 from evonav.evaluation.hosting.model_relay import ModelRelay
 from evonav.evaluation.hosting.scratch import new_scratch
 from evonav.evaluation.records.schema import ErrorKind
@@ -43,8 +50,6 @@ LOG_NAME = "agents.log"
 """File in a run's folder with all output of agents."""
 LOAD_TIMEOUT_S = 300.0
 """Shortest limit for importing an agent's module."""
-IS_SUPPORTED = os.name == "posix"
-"""True where agents can have processes of their own; elsewhere they run in the evaluator's."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
 _STDERR = 2
 _PART_BYTES = 1 << 18
@@ -74,37 +79,6 @@ class AgentFailedError(EvonavError):
         self.traceback = traceback
 
 
-@dataclass(frozen=True, slots=True)
-class AgentHosting:
-    """Settings of agents' processes; they are not part of a run's identity."""
-
-    is_in_process: bool = False
-    """Run agents in the evaluator's own process, where only exceptions are contained."""
-    timeout_s: float = 600.0
-    """Time limit of an answer, after which the process is ended."""
-    memory_mb: int | None = None
-    """Largest address space of an agent's process; default: no limit."""
-    log: str | None = None
-    """File to which the output of agents is appended; default: the evaluator's standard error."""
-    is_sandboxed: bool = False
-    """Shut an agent's process in, so that it reads no file of a run or a task, and reaches no network (Linux)."""
-    relays_model: bool = False
-    """Ask the decision model for agents' processes: those in a sandbox have no network."""
-    hidden: tuple[str, ...] = ()
-    """Files and folders that a sandbox hides, even in folders that can be read otherwise."""
-    scratch: str | None = None
-    """Folder for the folders in which processes in a sandbox may write; default: the system's for temporary files."""
-    is_one_of_many: bool = False
-    """A worker has many episodes at once: unused shared memory is given back, and an agent may wake on any core."""
-    is_debugged: bool = False
-    """Open Python's debugger where an agent raises; only in the evaluator's own process, on a terminal."""
-
-    @property
-    def isolation(self) -> Isolation:
-        """The isolation of agents, in one word."""
-        return "none" if self.is_in_process else "sandbox" if self.is_sandboxed else "process"
-
-
 class AgentProcess:
     """A process with an agent in it."""
 
@@ -115,11 +89,16 @@ class AgentProcess:
     max_answer_bytes = MAX_ANSWER_BYTES
     """Largest answer."""
 
-    def __init__(self, name: str, hosting: AgentHosting, fork_server: ForkServer | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        hosting: AgentHosting,
+        setup: ProcessSetup = NO_SETUP,
+        fork_server: ForkServer | None = None,
+    ) -> None:
         """Start the process and import the agent's module in it.
 
         Args:
-            hosting: Settings of the process.
             fork_server: Server that forks the process; default: a fresh one is started.
 
         Raises:
@@ -128,20 +107,21 @@ class AgentProcess:
         self.name = name
         self._own_cpu_s = 0.0
         self._hosting = hosting
+        self._setup = setup
         self._closing = threading.RLock()
         self._ends = ExitStack()
-        self._block = SharedBlock(saves_memory=hosting.is_one_of_many)
+        self._block = SharedBlock(saves_memory=setup.is_one_of_many)
         self._ends.callback(self._block.close)
-        self._scratch = new_scratch(hosting.scratch) if hosting.is_sandboxed else None
+        self._scratch = new_scratch(setup.scratch) if hosting.isolation == "sandbox" else None
         if self._scratch is not None:
             self._ends.callback(shutil.rmtree, self._scratch, ignore_errors=True)
-        self.relay = ModelRelay() if hosting.relays_model else None
+        self.relay = ModelRelay() if setup.relays_model else None
         """Asks the decision model for the process."""
         if self.relay is not None:
             self._ends.callback(self.relay.close)
         self._connection, far_end = socket.socketpair()
         life, own_end = os.pipe()
-        output = None if hosting.log is None else OutputLog(Path(hosting.log), name)
+        output = None if setup.log is None else OutputLog(Path(setup.log), name)
         self._log = output
         if output is not None:
             self._ends.callback(output.end)
@@ -182,7 +162,7 @@ class AgentProcess:
         try:
             if self._scratch is not None:
                 name = with_absolute_file(name)
-                self._shut_in(policy_of(name, self._scratch, hosting.hidden, hosting.memory_mb))
+                self._shut_in(policy_of(name, self._scratch, setup.hidden, hosting.memory_mb))
             self.ask("load", name, hosting.memory_mb, timeout_s=max(hosting.timeout_s, LOAD_TIMEOUT_S))
         except BaseException:
             self.close(is_at_once=True)
@@ -298,7 +278,7 @@ class AgentProcess:
         self._num_asked += 1
         request = write_request(self._num_asked, operation, arguments, self._block.write)
         self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
-        if self._num_asked > 1 and not self._hosting.is_one_of_many:  # it waits, it does not start
+        if self._num_asked > 1 and not self._setup.is_one_of_many:  # it waits, it does not start
             self._one_core.stay(self._process.pid)
         self._connection.sendall(LENGTH.pack(len(request)) + request)
 
@@ -367,18 +347,22 @@ class AgentProcess:
         self._is_group_ended = True
 
 
-def check_importable(name: str, hosting: AgentHosting, fork_server: ForkServer | None = None) -> None:
+def check_importable(
+    name: str,
+    hosting: AgentHosting,
+    setup: ProcessSetup = NO_SETUP,
+    fork_server: ForkServer | None = None,
+) -> None:
     """Check that an agent can be imported, in a process of its own, which then ends.
 
     Args:
-        hosting: Settings of the process.
         fork_server: See `AgentProcess`.
 
     Raises:
         InvalidArgumentError: The agent cannot be imported.
     """
     try:
-        AgentProcess(name, replace(hosting, log=None), fork_server).close()
+        AgentProcess(name, hosting, setup, fork_server).close()
     except AgentFailedError as error:
         text, advice, _ = str(error).partition(_SANDBOX_ADVICE)
         message = text.removeprefix("InvalidArgumentError: ").partition(" [")[0] + advice

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from evonav.evaluation.hosting import fork_server
 from evonav.evaluation.hosting.fork_server import ForkServer
-from evonav.evaluation.hosting.isolation import environment
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcess
+from evonav.evaluation.hosting.isolation import NO_SETUP, AgentHosting, ProcessSetup, environment
+from evonav.evaluation.hosting.process import AgentProcess
 from evonav.parallel.local import one_thread_each, search_path
 
 MAX_PROCESSES = 8
@@ -21,7 +21,10 @@ class AgentProcesses:
     """The agents' processes of a worker, each lent to one episode at a time. Any number of threads may use it."""
 
     def __init__(
-        self, hosting: AgentHosting, waiting: Callable[[], AbstractContextManager[None]] = nullcontext
+        self,
+        hosting: AgentHosting,
+        setup: ProcessSetup = NO_SETUP,
+        waiting: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
         """Remember the settings; processes start when they are needed.
 
@@ -29,8 +32,9 @@ class AgentProcesses:
             waiting: Lets other episodes compute while the block waits for a process.
         """
         self.hosting = hosting
+        self._setup = setup
         self.waiting = waiting
-        self._fork_server = new_fork_server(hosting)
+        self._fork_server = new_fork_server(hosting, setup)
         self._lock = threading.Lock()
         self._idle: list[AgentProcess] = []
         """Those that were used last come last."""
@@ -55,7 +59,7 @@ class AgentProcesses:
             self._idle = [process for process in self._idle if process not in ended]
         for process in ended:
             process.close()
-        process = AgentProcess(name, self.hosting, self._fork_server)
+        process = AgentProcess(name, self.hosting, self._setup, self._fork_server)
         with self._lock:
             self._lent.append(process)
         return process
@@ -80,11 +84,11 @@ class AgentProcesses:
             self._fork_server.close()
 
 
-def new_fork_server(hosting: AgentHosting) -> ForkServer | None:
+def new_fork_server(hosting: AgentHosting, setup: ProcessSetup) -> ForkServer | None:
     """Return what forks processes; what they inherit of it holds nothing that an agent in a sandbox must not have."""
     if not fork_server.IS_SUPPORTED:
         return None
-    if not hosting.is_sandboxed:
+    if hosting.isolation != "sandbox":
         return ForkServer(None, sys.path)
     with one_thread_each():
-        return ForkServer(environment(Path(hosting.scratch or tempfile.gettempdir())), search_path())
+        return ForkServer(environment(Path(setup.scratch or tempfile.gettempdir())), search_path())

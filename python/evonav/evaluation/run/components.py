@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
-from evonav.agents.hosting.sandbox import why_not
+from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.agents.registry import BUILT_IN, RULE_MARK, agent_descriptions, agent_factory, new_agent
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
@@ -17,8 +17,9 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.fork_server import ForkServer
-from evonav.evaluation.hosting.model_relay import why_not_shut_in
-from evonav.evaluation.hosting.process import AgentHosting, check_importable
+from evonav.evaluation.hosting.isolation import NO_SETUP, AgentHosting, ProcessSetup
+from evonav.evaluation.hosting.model_relay import sandboxed_model_problem
+from evonav.evaluation.hosting.process import check_importable
 from evonav.evaluation.hosting.processes import new_fork_server
 from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
@@ -150,23 +151,28 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     return new_agent(agent_factory(name), decision)
 
 
-def check_agent_names(names: Sequence[str], hosting: AgentHosting) -> None:
+def check_agent_names(names: Sequence[str], hosting: AgentHosting, setup: ProcessSetup) -> None:
     """Check that workers can make agents of these names: several share the imports of one process.
 
     Raises:
         InvalidArgumentError: See `check_agent_name`.
     """
-    fork_server = new_fork_server(hosting) if len(names) > 1 else None  # which starts nothing yet
+    fork_server = new_fork_server(hosting, setup) if len(names) > 1 else None  # which starts nothing yet
     with nullcontext() if fork_server is None else closing(fork_server):
         for name in names:
-            check_agent_name(name, hosting, fork_server)
+            check_agent_name(name, hosting, setup, fork_server)
 
 
-def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server: ForkServer | None = None) -> None:
+def check_agent_name(
+    name: str,
+    hosting: AgentHosting | None = None,
+    setup: ProcessSetup = NO_SETUP,
+    fork_server: ForkServer | None = None,
+) -> None:
     """Check that workers can make an agent of this name.
 
     Args:
-        hosting: Settings of agents' processes: one that is not built in is imported there. Default: in this process.
+        hosting: Where agents run: one that is not built in is imported there. Default: in this process.
         fork_server: Server that forks the process; default: a fresh one is started.
 
     Raises:
@@ -178,7 +184,7 @@ def check_agent_name(name: str, hosting: AgentHosting | None = None, fork_server
         if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
             agent_factory(name)
         else:
-            check_importable(name, hosting, fork_server)
+            check_importable(name, hosting, setup, fork_server)
     except InvalidArgumentError as error:
         if ":" in name or name.endswith(".py") or RULE_MARK in name:
             raise
@@ -235,18 +241,11 @@ def _config(hfov_deg: float = USUAL_CAMERA["hfov_deg"], **values: Any) -> Simula
     return replace(config, vertical_fov_deg=vertical_fov_deg(hfov_deg, config.width_px, config.height_px))
 
 
-def check_sandbox(hosting: AgentHosting, decision: Component[DecisionModel]) -> None:
-    """Check that agents can be shut in.
-
-    Args:
-        hosting: Settings of the processes.
-        decision: The run's decision model.
+def check_sandbox(decision: Component[DecisionModel]) -> None:
+    """Check that agents which ask this decision model can run in a sandbox.
 
     Raises:
         InvalidArgumentError: They cannot, and why.
     """
-    reason = why_not()
-    if hosting.is_in_process:
-        reason = reason or "agents run in the evaluator's own process: use one worker or more"
-    if reason := reason or why_not_shut_in(decision):
+    if reason := sandbox_problem() or sandboxed_model_problem(decision):
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")

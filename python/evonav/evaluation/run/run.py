@@ -11,9 +11,9 @@ from typing import Any
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import opaque_task_id
-from evonav.evaluation.hosting.isolation import isolation_facts
+from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, ProcessSetup, isolation_facts
 from evonav.evaluation.hosting.model_relay import is_relayed
-from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
+from evonav.evaluation.hosting.process import LOG_NAME
 from evonav.evaluation.hosting.scratch import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
@@ -140,11 +140,13 @@ def evaluate_all(
         if not (request.run_dir / FILE_NAME).exists():  # a run that cannot begin leaves no folder behind
             request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
-        requests = _with_scratch(requests, stack)
+        has_sandbox = any(request.config.hosting.isolation == "sandbox" for request in requests)
+        # Deleted at the end, also if a worker could not clean up.
+        scratch = stack.enter_context(agents_scratch()) if has_sandbox else None
         runs: list[RunJobs] = []
         for index, request in enumerate(requests):
             stack.enter_context(writing(request.run_dir))
-            runs.append(stack.enter_context(closing(_begin(request, workforce, num_retries, retry_errored))))
+            runs.append(stack.enter_context(closing(_begin(request, workforce, scratch, num_retries, retry_errored))))
             on_progress(index, runs[-1].progress(None))
         if num_jobs := sum(len(run.jobs) for run in runs):
             schedule = Schedule(runs, num_retries)
@@ -164,7 +166,9 @@ def evaluate_all(
         return [run.summaries or run.summarise() for run in runs]
 
 
-def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_errored: bool) -> RunJobs:
+def _begin(
+    request: RunRequest, workforce: Workforce, scratch: str | None, num_retries: int, retry_errored: bool
+) -> RunJobs:
     """Claim a run's folder and return the jobs that are left."""
     with RunStore(request.run_dir, create=True) as store:
         _claim(store, request)
@@ -175,7 +179,8 @@ def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_er
         floor_plans = store.floor_plan_keys()
     config = request.config
     hosting = _hosting(request, workforce)
-    worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
+    processes = _process_setup(request, workforce, scratch)
+    worker_config = WorkerConfig(config.backend, config.protocol, hosting, processes, num_retries)
     # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     jobs = []
@@ -200,7 +205,7 @@ def _begin(request: RunRequest, workforce: Workforce, num_retries: int, retry_er
     if jobs:
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)
-            note_session(store, workforce.num_workers, isolation_facts(hosting.isolation))
+            note_session(store, workforce.num_workers, isolation_facts(hosting))
     return RunJobs(request.run_dir, worker_config, limit_s, request.agents, request.tasks, jobs, states)
 
 
@@ -216,25 +221,23 @@ def _forget_errored(store: RunStore, request: RunRequest) -> None:
             store.forget_episode(agent, task_id, stage)
 
 
-def _with_scratch(requests: Sequence[RunRequest], stack: ExitStack) -> Sequence[RunRequest]:
-    """Give sandboxes a folder that is deleted at the end, also if a worker could not clean up."""
-    if not any(request.config.hosting.is_sandboxed for request in requests):
-        return requests
-    scratch = stack.enter_context(agents_scratch())
-    configs = [replace(one.config, hosting=replace(one.config.hosting, scratch=scratch)) for one in requests]
-    return [replace(one, config=config) for one, config in zip(requests, configs, strict=True)]
-
-
 def _hosting(request: RunRequest, workforce: Workforce) -> AgentHosting:
+    """Return how agents are hosted with these workers: without any, in this process."""
     hosting = request.config.hosting
-    return replace(
-        hosting,
-        is_in_process=hosting.is_in_process or workforce.num_workers == 0 or not IS_SUPPORTED,
+    has_processes = workforce.num_workers > 0 and IS_SUPPORTED
+    return hosting if has_processes or hosting.is_in_process else replace(hosting, isolation="none")
+
+
+def _process_setup(request: RunRequest, workforce: Workforce, scratch: str | None) -> ProcessSetup:
+    is_one_of_many = workforce.jobs_at_once > 1
+    is_sandboxed = request.config.hosting.isolation == "sandbox"
+    return ProcessSetup(
+        log=str(request.run_dir.absolute() / LOG_NAME),
         hidden=tuple(sorted({str(path.absolute()) for path in _hidden_from_agents(request)})),
-        relays_model=(hosting.is_sandboxed or workforce.jobs_at_once > 1)  # else each process has the client's memory
+        scratch=scratch,
+        relays_model=(is_sandboxed or is_one_of_many)  # else each process has the client's memory
         and is_relayed(request.config.backend.decision),
-        is_one_of_many=workforce.jobs_at_once > 1,
-        log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
+        is_one_of_many=is_one_of_many,
     )
 
 
@@ -269,8 +272,11 @@ def _check_requests(requests: Sequence[RunRequest], workforce: Workforce) -> Non
         if hosting.is_in_process and workforce.jobs_at_once > 1:
             message = "several episodes at once need agents in processes of their own"
             raise InvalidArgumentError(f"episodes_at_once = {workforce.jobs_at_once}: {message}")
-        if hosting.is_sandboxed:
-            check_sandbox(hosting, request.config.backend.decision)
+        if request.config.hosting.isolation == "sandbox":
+            check_sandbox(request.config.backend.decision)
+            if hosting.is_in_process:
+                reason = "agents run in the evaluator's own process: use one worker or more"
+                raise InvalidArgumentError(f"isolation = sandbox: {reason}")
         backend = request.config.backend
         parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
         for name in (*request.agents, *(part.path for part in parts)):
@@ -279,7 +285,8 @@ def _check_requests(requests: Sequence[RunRequest], workforce: Workforce) -> Non
                     f"`{name}`: a worker cannot import the script that is running; move it to a module of its own, "
                     "or use num_workers=0"
                 )
-        check_agent_names([one for one in request.agents if (one, hosting.isolation) not in checked], hosting)
+        new = [one for one in request.agents if (one, hosting.isolation) not in checked]
+        check_agent_names(new, hosting, replace(_process_setup(request, workforce, None), log=None))
         checked.update((agent, hosting.isolation) for agent in request.agents)
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import Field
 
-from evonav.evaluation.hosting.isolation import Isolation
+from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, Isolation, usual_isolation
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.settings_model import NUM_RETRIES, SettingError, Settings
 from evonav.parallel.local import num_cores
@@ -67,8 +67,6 @@ class RunSettings(Settings):
             decisions: The decision models that these workers use.
             simulators: Their simulators; AI2-THOR's has a process for each episode, so only one runs by default.
         """
-        from evonav.evaluation.hosting.process import IS_SUPPORTED
-
         if self.episodes_at_once is not None:
             return self
         waits = any(decision.kind == "vlm" for decision in decisions)
@@ -107,7 +105,6 @@ class RunSettings(Settings):
             decisions: Settings of the decision model, which have the default limits.
             protocol: Default: the paper's.
         """
-        from evonav.evaluation.hosting.process import AgentHosting
         from evonav.evaluation.run.run import RunConfig
 
         isolation = self.isolation or self._usual_isolation(backend)
@@ -117,18 +114,12 @@ class RunSettings(Settings):
             protocol=protocol or ProtocolConfig(),
             backend=backend,
             stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
-            hosting=AgentHosting(
-                isolation == "none",
-                timeout_s,
-                self.agent_memory_mb,
-                is_sandboxed=isolation == "sandbox",
-            ),
+            hosting=AgentHosting(isolation, timeout_s, self.agent_memory_mb),
         )
 
     def _usual_isolation(self, backend: "Backend") -> Isolation:
         """Return the isolation of a run for which none is given."""
-        from evonav.evaluation.hosting.isolation import usual_isolation
-        from evonav.evaluation.hosting.model_relay import why_not_shut_in
+        from evonav.evaluation.hosting.model_relay import sandboxed_model_problem
 
         is_here = self.num_workers > 0 and self.engine == "local"
-        return usual_isolation() if is_here and not why_not_shut_in(backend.decision) else "process"
+        return usual_isolation() if is_here and not sandboxed_model_problem(backend.decision) else "process"

@@ -34,7 +34,7 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
-from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.hosting.isolation import NO_SETUP, AgentHosting, ProcessSetup
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
@@ -59,6 +59,8 @@ class WorkerConfig:
     backend: Backend
     protocol: ProtocolConfig
     hosting: AgentHosting
+    processes: ProcessSetup = NO_SETUP
+    """Of agents' processes, if they have some."""
     num_retries: int = 0
     """Number of retries of a stage."""
 
@@ -157,7 +159,7 @@ class WorkerContext:
         self._tasks: WeakValueDictionary[str, LoadedTask] = WeakValueDictionary()
         self._last_task: LoadedTask | None = None
         """The task that was asked for last: the next episode is often another agent's in it."""
-        self._processes = None if hosting.is_in_process else AgentProcesses(hosting, waiting)
+        self._processes = None if hosting.is_in_process else AgentProcesses(hosting, config.processes, waiting)
 
     def task(self, path: str) -> LoadedTask:
         """Return the task in a folder. It is read for each agent in this process alone, which could change arrays."""
@@ -204,7 +206,7 @@ class WorkerContext:
         if self._processes is not None and job.agent not in ORACLE_BASELINE_NAMES:
             return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed, job.task_id)
         try:
-            if self.config.hosting.is_debugged and job.agent not in ORACLE_BASELINE_NAMES:
+            if self.config.hosting.isolation == "debugger" and job.agent not in ORACLE_BASELINE_NAMES:
                 return self._debugged_agent(job)
             return make_agent(job.agent, self.config.backend.decision.create(job.seed))
         except (KeyboardInterrupt, EndedError):

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from evonav.component import Component
-from evonav.evaluation.hosting.process import AgentFailedError, AgentHosting, AgentProcess
+from evonav.evaluation.hosting.isolation import AgentHosting
+from evonav.evaluation.hosting.process import AgentFailedError, AgentProcess
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.memory_benchmark.answers import (
     MAX_ENTRIES,
