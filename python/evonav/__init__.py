@@ -5,8 +5,4 @@ Names are imported when they are first used, so that the package starts fast; `_
 
 import lazy_loader
 
-from evonav import _gymnasium_hook
-
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-_gymnasium_hook.register_when_imported()

@@ -23,7 +23,7 @@ NOTES = """\
 `evonav/LifelongNav-v0` over the bundled tasks: 128x128 depth, random moves, new houses as in training; two threads.
 Times are CPU time of all threads and processes; steps/s are by the wall clock, at that load.
 """
-ENV_ID = "evonav/LifelongNav-v0"
+ENV_ID = "evonav.gym:evonav/LifelongNav-v0"
 NUM_ENVS = (1, 8, 64)
 STEPS, ROUNDS = 64, 3
 MAX_ASYNC = 8
