@@ -7,7 +7,7 @@ import numpy as np
 
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.protocol import MemoryEntry
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
@@ -50,7 +50,7 @@ class HandMade:
     """A stream of shots; the camera moves half a metre a frame, and an hour passes between visits."""
 
     shots: Sequence[Shot]
-    changes: Sequence[Change] = ()
+    changes: Sequence[TrueChange] = ()
     name: str = "S0/hand-made/0"
     kind: str = "S0"
     house: str = "hand-made"

@@ -12,7 +12,7 @@ from hand_made import HandMade, Shot, body, entry
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import MemoryFailedError, read_entries, read_num_bytes, read_places
 from evonav.memory_benchmark.protocol import Place
-from evonav.memory_benchmark.run import NO_DETECTIONS, Settings, measure, measure_all
+from evonav.memory_benchmark.run import NO_DETECTIONS, MeasureSettings, measure, measure_all
 
 FILE = Path(bad_memories.__file__)
 MUG = (body("mug", 1.0),)
@@ -36,7 +36,7 @@ STREAM = HandMade([Shot(MUG, visible={"mug": 50})] * 60)
     ],
 )
 def test_failure_in_its_own_process(name: str, kind: str, message: str, frame: int | None) -> None:
-    result = measure(f"{FILE}:{name}", STREAM, Settings(timeout_s=1.0, every=1))
+    result = measure(f"{FILE}:{name}", STREAM, MeasureSettings(timeout_s=1.0, every=1))
     assert result.failure is not None
     assert (result.failure.kind, result.failure.frame) == (kind, frame)
     assert message in result.failure.message
@@ -55,7 +55,7 @@ def test_failure_is_the_same_in_this_process(name: str) -> None:
 
 def test_memories_side_by_side_do_not_disturb_each_other() -> None:
     names = ["Good", "Raises", "Hangs", "Good"]
-    results = measure_all([f"{FILE}:{name}" for name in names], STREAM, Settings(timeout_s=1.0))
+    results = measure_all([f"{FILE}:{name}" for name in names], STREAM, MeasureSettings(timeout_s=1.0))
     assert [result.failure and result.failure.kind for result in results] == [None, "raised", "hung", None]
     alone = measure(Good, STREAM)
     for good in (results[0], results[3]):
@@ -81,7 +81,7 @@ def test_a_stream_is_rendered_once_and_not_to_its_end_if_all_failed() -> None:
 
 
 def test_good_memory_gives_the_same_wherever_it_runs() -> None:
-    here, there = measure(Good, STREAM), measure(f"{FILE}:Good", STREAM, Settings(runs_twice=True))
+    here, there = measure(Good, STREAM), measure(f"{FILE}:Good", STREAM, MeasureSettings(runs_twice=True))
     assert there.failure is None, there.failure
     assert (here.hosting, there.hosting) == ("here", "process")
     assert here.update == there.update
@@ -106,7 +106,7 @@ def test_memory_without_entries_keeps_the_contract() -> None:
 
 
 def test_other_bits_in_the_second_run_are_found() -> None:
-    assert measure(bad_memories.Forgetful, STREAM, Settings(runs_twice=True)).is_deterministic is False
+    assert measure(bad_memories.Forgetful, STREAM, MeasureSettings(runs_twice=True)).is_deterministic is False
 
 
 def test_leak_is_measured_and_noted() -> None:
@@ -119,14 +119,14 @@ def test_leak_is_measured_and_noted() -> None:
 
 def test_function_has_no_process_of_its_own() -> None:
     with pytest.raises(InvalidArgumentError, match="own_process: a function cannot be sent"):
-        measure(Good, STREAM, Settings(own_process=True))
+        measure(Good, STREAM, MeasureSettings(own_process=True))
 
 
 def test_settings_are_checked() -> None:
     with pytest.raises(InvalidArgumentError, match="every = 0"):
-        Settings(every=0)
+        MeasureSettings(every=0)
     with pytest.raises(InvalidArgumentError, match="timeout_s = 0"):
-        Settings(timeout_s=0.0)
+        MeasureSettings(timeout_s=0.0)
 
 
 @pytest.mark.parametrize(
@@ -196,5 +196,5 @@ def test_a_memory_without_truth_is_timed_and_not_judged() -> None:
     assert result.speed.observe_wall.n == 40
     assert result.size is not None
     assert result.size.bytes_per_entry == 1000.0
-    assert result.digest == measure(Good, STREAM, Settings(every=10)).digest
+    assert result.digest == measure(Good, STREAM, MeasureSettings(every=10)).digest
     assert result.notes == (NO_DETECTIONS,)

@@ -11,12 +11,12 @@ from evonav.memory_benchmark.benchmark import NamedMemory, benchmark, record_pat
 from evonav.memory_benchmark.memories import MEMORIES, PEERS, named_memories
 from evonav.memory_benchmark.results.page import write_memory_report
 from evonav.memory_benchmark.results.tables import memory_tables, scores, text_of
-from evonav.memory_benchmark.run import Settings
+from evonav.memory_benchmark.run import MeasureSettings
 from evonav.memory_benchmark.streams import StreamSpec
 from evonav.statistics import Estimate
 
 SPECS = [StreamSpec("S1", f"bundled:{number}", 0, 64, 48, frames_a_visit=30) for number in (4, 9)]
-HERE = Settings(own_process=False)
+HERE = MeasureSettings(own_process=False)
 OWN = """
 class Own:
     def reset(self, info): self.num = 0
@@ -98,7 +98,7 @@ def test_another_configuration_is_refused(tmp_path: Path):
     out = tmp_path / "out"
     run(named_memories(["numpy-list"]), out, SPECS[:1])
     with pytest.raises(StoreError, match="every"):
-        run(named_memories(["numpy-list"]), out, SPECS[:1], settings=Settings(own_process=False, every=5))
+        run(named_memories(["numpy-list"]), out, SPECS[:1], settings=MeasureSettings(own_process=False, every=5))
     (out / "memory.json").write_text("{}")
     with pytest.raises(StoreError, match="no header"):
         run(named_memories(["numpy-list"]), out, SPECS[:1])

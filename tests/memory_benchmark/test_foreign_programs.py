@@ -11,7 +11,7 @@ import pytest
 
 from evonav.memory_benchmark.offline import score
 from evonav.memory_benchmark.peers.open3d_faiss import Open3DFaissMemory
-from evonav.memory_benchmark.run import Settings, measure
+from evonav.memory_benchmark.run import MeasureSettings, measure
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.memory_benchmark.streams.export import export_stream, read_exported
 
@@ -37,7 +37,7 @@ def exported(stream, tmp_path):
 def require_same(folder, memory, stream):
     """Compare all counts of the judge; depth in files is rounded, so a few may differ."""
     theirs = score(read_exported(folder), folder / "entries.jsonl")
-    ours = measure(memory, stream, Settings(own_process=False))
+    ours = measure(memory, stream, MeasureSettings(own_process=False))
     assert ours.failure is None, ours.failure
     assert ours.update is not None
     assert theirs.update is not None

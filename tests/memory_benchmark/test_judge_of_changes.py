@@ -9,21 +9,21 @@ from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.protocol import MemoryEntry
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import Settings, measure
-from evonav.memory_benchmark.truth import Change
+from evonav.memory_benchmark.run import MeasureSettings, measure
+from evonav.memory_benchmark.truth import TrueChange
 
 OLD, NEW, OTHER = body("mug", 1.0), body("mug", 3.0), body("plate", 5.0, "Plate")
 BEFORE, GONE, AFTER = (OLD, OTHER), (OTHER,), (NEW, OTHER)
-REMOVED = Change("mug", "Mug", "removed", 4, OLD, None)
-MOVED = Change("mug", "Mug", "moved", 4, OLD, NEW)
+REMOVED = TrueChange("mug", "Mug", "removed", 4, OLD, None)
+MOVED = TrueChange("mug", "Mug", "moved", 4, OLD, NEW)
 PLATE = entry(2, 5.0, "Plate")
 FIRST = [Shot(BEFORE, visible={"mug": 100, "plate": 100})] * 4
 
 
 def judged(
-    shots: Sequence[Shot], changes: Sequence[Change], answer: Callable[[int], Sequence[MemoryEntry]], every: int = 1
+    shots: Sequence[Shot], changes: Sequence[TrueChange], answer: Callable[[int], Sequence[MemoryEntry]], every: int = 1
 ) -> StreamResult:
-    result = measure(lambda: Scripted(answer), HandMade(shots, changes), Settings(every=every))
+    result = measure(lambda: Scripted(answer), HandMade(shots, changes), MeasureSettings(every=every))
     assert result.failure is None, result.failure
     assert result.update is not None
     return result
@@ -104,7 +104,7 @@ def test_move_without_a_look_at_the_old_place_is_not_judged() -> None:
 
 
 def test_addition_seen_late() -> None:
-    added = Change("cup", "Mug", "added", 4, None, body("cup", 7.0))
+    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
     objects = (*BEFORE, body("cup", 7.0))
     shots = [*FIRST, *[Shot(objects, 2)] * 3, *[Shot(objects, 2, {"cup": 25})] * 3, *[Shot(objects, 3)] * 2]
     old = [entry(1, 1.0), PLATE]
@@ -117,7 +117,7 @@ def test_addition_seen_late() -> None:
 
 
 def test_object_that_perception_missed_was_not_seen() -> None:
-    added = Change("cup", "Mug", "added", 4, None, body("cup", 7.0))
+    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
     shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 60}, detected=())] * 6]
     result = judged(shots, [added], lambda i: [entry(1, 1.0), PLATE])
     assert result.spells == ()
@@ -125,7 +125,7 @@ def test_object_that_perception_missed_was_not_seen() -> None:
 
 
 def test_added_object_that_is_forgotten_later_was_found() -> None:
-    added = Change("cup", "Mug", "added", 4, None, body("cup", 7.0))
+    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
     shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 25})] * 6]
     old = [entry(1, 1.0), PLATE]
     result = judged(shots, [added], lambda i: [*old, entry(9, 7.1)] if i in (6, 7) else old)
@@ -164,7 +164,7 @@ def test_moved_object_is_no_false_forget() -> None:
 
 
 def test_object_put_back_ends_the_spell() -> None:
-    back = Change("mug", "Mug", "moved", 8, NEW, OLD)
+    back = TrueChange("mug", "Mug", "moved", 8, NEW, OLD)
     shots = [*FIRST, *[Shot(AFTER, 2, {}, {0: 30})] * 4, *[Shot(BEFORE, 3, {"mug": 50})] * 4]
     result = judged(shots, [MOVED, back], lambda i: [entry(1, 1.0), PLATE])
     assert Spell("evident", 0, Clocks(3, 1.5, 1.5, 4), is_over=False) in result.spells
@@ -175,7 +175,7 @@ def test_object_put_back_ends_the_spell() -> None:
 def test_small_move_is_no_change_for_a_memory() -> None:
     near = body("mug", 1.2)
     shots = [*FIRST, *[Shot((near, OTHER), 2, {"mug": 30}, {0: 30})] * 4]
-    result = judged(shots, [Change("mug", "Mug", "moved", 4, OLD, near)], lambda i: [entry(1, 1.0), PLATE])
+    result = judged(shots, [TrueChange("mug", "Mug", "moved", 4, OLD, near)], lambda i: [entry(1, 1.0), PLATE])
     assert result.spells == ()
     assert (result.update.moves, result.update.removals) == (0, 0)
 
@@ -214,7 +214,7 @@ def test_entries_asked_for_less_often() -> None:
 def test_entry_that_is_nearer_to_another_object_is_not_forgotten() -> None:
     near = body("cup", 1.12)  # it comes next to the mug, and nearer to the mug's entry
     shots = [*FIRST, *[Shot((*BEFORE, near), 2, {"cup": 30})] * 4]
-    added = Change("cup", "Mug", "added", 4, None, near)
+    added = TrueChange("cup", "Mug", "added", 4, None, near)
     update = judged(shots, [added], lambda i: [entry(1, 1.25), PLATE]).update
     assert (update.standing, update.false_forgets) == (5, 0)
 

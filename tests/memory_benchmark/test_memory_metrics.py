@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from evonav.evaluation.episode.staleness import matched_object
 from evonav.memory_benchmark.metrics.belief import BeliefSums, calibration_error
-from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts, Snapshot, change_counts
-from evonav.memory_benchmark.metrics.matching import NONE, Boxes
+from evonav.memory_benchmark.metrics.change_f1 import BeliefSnapshot, ChangeCounts, change_counts
+from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
 from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
 from evonav.memory_benchmark.metrics.size import byte_note, growth_per_minute
 from evonav.memory_benchmark.metrics.speed import (
@@ -36,7 +36,7 @@ BODY = st.builds(lambda label, centre_m: (label, centre_m), LABEL, POINT)
 @given(st.lists(BODY, max_size=8), st.lists(BODY, max_size=8))
 def test_match_is_that_of_the_evaluation(bodies: list, entries: list) -> None:
     objects = [SceneObject(str(i), label, "object", centre_m, SIZE_M) for i, (label, centre_m) in enumerate(bodies)]
-    boxes = Boxes(objects)
+    boxes = BodyBoxes(objects)
     by_label = {label: [one for one in objects if one.category == label] for label in ("Mug", "Plate")}
     found, is_covered = boxes.match([label for label, _ in entries], np.array([c for _, c in entries]).reshape(-1, 3))
     for body_index, one in enumerate(boxes.bodies):
@@ -159,16 +159,16 @@ def test_rank_of_the_true_place() -> None:
 
 def test_change_counts_over_three_visits() -> None:
     old, new = ("mug", 0), ("mug", 1)
-    first = Snapshot(frozenset({old}), frozenset({old}), frozenset({old}), frozenset())
-    stale = Snapshot(frozenset({old}), frozenset({new}), frozenset({old, new}), frozenset({old}))
-    right = Snapshot(frozenset({new}), frozenset({new}), frozenset({old, new}), frozenset({old}))
+    first = BeliefSnapshot(frozenset({old}), frozenset({old}), frozenset({old}), frozenset())
+    stale = BeliefSnapshot(frozenset({old}), frozenset({new}), frozenset({old, new}), frozenset({old}))
+    right = BeliefSnapshot(frozenset({new}), frozenset({new}), frozenset({old, new}), frozenset({old}))
     assert change_counts([first, right]) == (ChangeCounts(hits=1), ChangeCounts(hits=1))
     assert change_counts([first, stale]) == (ChangeCounts(misses=1), ChangeCounts(misses=1))
     # The third visit tells the change from the first on, and from the second on a false appearance.
     gone, come = change_counts([first, stale, right])
     assert gone == ChangeCounts(hits=1, misses=1)
     assert come == ChangeCounts(hits=1, false_alarms=1, misses=1)
-    unseen = Snapshot(frozenset({old}), frozenset({new}), frozenset({old}), frozenset())
+    unseen = BeliefSnapshot(frozenset({old}), frozenset({new}), frozenset({old}), frozenset())
     assert change_counts([first, unseen]) == (ChangeCounts(), ChangeCounts())
-    taken = Snapshot(frozenset(), frozenset({new}), frozenset({old}), frozenset(), taken=frozenset({old}))
+    taken = BeliefSnapshot(frozenset(), frozenset({new}), frozenset({old}), frozenset(), taken=frozenset({old}))
     assert change_counts([first, taken]) == (ChangeCounts(), ChangeCounts())

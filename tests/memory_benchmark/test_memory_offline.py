@@ -12,11 +12,11 @@ from evonav.errors import StoreError
 from evonav.memory_benchmark.offline import score
 from evonav.memory_benchmark.protocol import MemoryEntry
 from evonav.memory_benchmark.run import measure
-from evonav.memory_benchmark.truth import Change
+from evonav.memory_benchmark.truth import TrueChange
 
 OLD = body("mug", 1.0)
 SHOTS = [Shot((OLD,), visible={"mug": 100})] * 4 + [Shot((), 2, {}, {0: 60})] * 26
-STREAM = HandMade(SHOTS, [Change("mug", "Mug", "removed", 4, OLD, None)])
+STREAM = HandMade(SHOTS, [TrueChange("mug", "Mug", "removed", 4, OLD, None)])
 
 
 def answer(index: int) -> list[MemoryEntry]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.figures import FIGURES, estimates, ratios
+from evonav.memory_benchmark.figures import METRICS, estimates, ratios
 from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts
 from evonav.memory_benchmark.metrics.size import Size
@@ -16,9 +16,9 @@ from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.metrics.update import UpdateCounts
 from evonav.memory_benchmark.records import (
-    Belief,
+    BeliefScore,
     BenchmarkResult,
-    Failure,
+    MemoryFailure,
     MemoryResult,
     Speed,
     StreamResult,
@@ -65,7 +65,7 @@ def stream(house: str, ms: float = 1.0, kind: str = "S1", clears_after: int | No
         size=Size(40, 40_000, 1000.0, 0.5, 3.0, 90.0),
         update=COUNTS,
         spells=(spell, late),
-        belief=Belief(n=4, squared_error=1.0, log_loss=2.0, bins=((4.0, 2.0, 1.0), *[(0.0, 0.0, 0.0)] * 9)),
+        belief=BeliefScore(n=4, squared_error=1.0, log_loss=2.0, bins=((4.0, 2.0, 1.0), *[(0.0, 0.0, 0.0)] * 9)),
         queries={"before": QueryCounts(10, 5, 8, 6.5)},
     )
 
@@ -107,7 +107,7 @@ def test_figures_of_known_counts() -> None:
     assert "hit_at_1_after" not in values
     assert "locate_cpu_p50_ms" not in values
     assert found["half_life_frames"].num_clusters == 6
-    assert set(values) <= {figure.name for figure in FIGURES}
+    assert set(values) <= {figure.name for figure in METRICS}
 
 
 def test_intervals_are_over_houses() -> None:
@@ -128,7 +128,7 @@ def test_half_life_that_is_not_reached_is_infinite() -> None:
 
 def test_failed_streams_have_no_part_in_figures() -> None:
     failed = stream("a").model_copy(
-        update={"failure": Failure(kind="died", message="died", frame=3), "update": None, "spells": ()}
+        update={"failure": MemoryFailure(kind="died", message="died", frame=3), "update": None, "spells": ()}
     )
     mine = memory("mine", [failed, *[stream(house) for house in HOUSES[1:]]])
     assert len(mine.failures) == 1
@@ -231,7 +231,7 @@ def test_time_is_compared_relative_to_the_baseline() -> None:
 
 
 def test_new_failure_is_worse() -> None:
-    failed = stream("a").model_copy(update={"failure": Failure(kind="raised", message="raises", frame=1)})
+    failed = stream("a").model_copy(update={"failure": MemoryFailure(kind="raised", message="raises", frame=1)})
     found = compared([failed, *[stream(house) for house in HOUSES[1:]]], [stream(house) for house in HOUSES])
     assert found["failed_streams"].is_worse
     assert (found["failed_streams"].before, found["failed_streams"].now) == (0, 1)

@@ -10,7 +10,7 @@ from evonav.errors import StoreError
 from evonav.memory_benchmark.peers import open3d_faiss
 from evonav.memory_benchmark.peers.open3d_faiss import Open3DFaissMemory
 from evonav.memory_benchmark.references import ObjectMapMemory
-from evonav.memory_benchmark.run import Settings, measure
+from evonav.memory_benchmark.run import MeasureSettings, measure
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 
 HAS_PEER = find_spec("open3d") is not None and find_spec("faiss") is not None
@@ -23,7 +23,7 @@ def test_without_the_extra_the_memory_names_it():
     with pytest.raises(StoreError, match=r"pip install 'evonav\[bench\]'"):
         Open3DFaissMemory()
     stream = make_stream(StreamSpec("S6", "bundled:4", 0, 64, 48))
-    failure = measure(Open3DFaissMemory, stream, Settings(own_process=False)).failure
+    failure = measure(Open3DFaissMemory, stream, MeasureSettings(own_process=False)).failure
     assert failure is not None
     assert failure.kind == "load"
 

@@ -46,7 +46,7 @@ class MemoryFailedError(EvonavError):
 
 
 @dataclass(frozen=True, slots=True)
-class Entries:
+class CheckedEntries:
     """All entries of one answer as columns; every number has been checked."""
 
     ids: NDArray[np.int64]
@@ -78,13 +78,13 @@ class Entries:
 
 _FIELDS = ("centre_m",) * 3 + ("size_m",) * 3 + ("confidence", "p_present", "first_seen_s", "last_seen_s")
 NUM_COLUMNS = len(_FIELDS)
-"""Columns of `Entries.numbers`."""
+"""Columns of `CheckedEntries.numbers`."""
 _NUM_GIVEN = 7
 """Columns that every entry has."""
 _NAN = math.nan
 
 
-def read_entries(answer: object) -> Entries:
+def read_entries(answer: object) -> CheckedEntries:
     """Return a memory's answer to `entries()` as columns.
 
     Raises:
@@ -104,10 +104,10 @@ def read_entries(answer: object) -> Entries:
         is_typed = False
     if not is_typed or not all(isinstance(label, str) for label in labels):
         raise _first_of_wrong_type(answer)
-    return checked(Entries(ids.astype(np.int64), labels, numbers.astype(np.float64)))
+    return checked(CheckedEntries(ids.astype(np.int64), labels, numbers.astype(np.float64)))
 
 
-def checked(entries: Entries) -> Entries:
+def checked(entries: CheckedEntries) -> CheckedEntries:
     """Check the values of entries whose types are right.
 
     Raises:

@@ -18,7 +18,7 @@ from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.protocol import Memory
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, StreamResult
-from evonav.memory_benchmark.run import MemorySource, Settings, measure_all
+from evonav.memory_benchmark.run import MeasureSettings, MemorySource, measure_all
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.memory_benchmark.streams.export.recording import RecordingSpec
 from evonav.parallel.folders import check_same_run, write_atomically, writing
@@ -59,7 +59,7 @@ class NamedMemory:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredMemories:
     """Result of a command."""
 
     result: BenchmarkResult
@@ -76,10 +76,10 @@ def benchmark(
     streams: Sequence[AnySpec],
     out: Path,
     *,
-    settings: Settings | None = None,
+    settings: MeasureSettings | None = None,
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
-) -> Measured:
+) -> MeasuredMemories:
     """Run every memory through every stream, and keep a record of each in a folder.
 
     Args:
@@ -95,7 +95,7 @@ def benchmark(
         StoreError: The folder holds other settings, or cannot be written.
         EngineError: Workers cannot be had.
     """
-    settings = settings or Settings()
+    settings = settings or MeasureSettings()
     names = [memory.name for memory in memories]
     if not memories or not streams:
         raise InvalidArgumentError(f"no {'stream' if memories else 'memory'} to measure")
@@ -130,7 +130,7 @@ def benchmark(
                         failures.extend((memory.name, stream.name, last) for memory in left)
                     num_done += len(left)
                     on_progress(num_done, num_all, stream.name)
-        return Measured(read_folder(out, known, streams), tuple(sorted(failures)))
+        return MeasuredMemories(read_folder(out, known, streams), tuple(sorted(failures)))
 
 
 def record_path(folder: Path, memory: str, stream: str) -> Path:
@@ -155,7 +155,7 @@ def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnySpec
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the function from a job to its records, as `evonav.parallel.pool` calls it."""
-    run_settings = Settings(**json.loads(settings))
+    run_settings = MeasureSettings(**json.loads(settings))
 
     def work(text: str) -> str:
         given = json.loads(text)
@@ -169,7 +169,7 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
     return work
 
 
-def _begun(memories: Sequence[NamedMemory], out: Path, settings: Settings) -> list[str]:
+def _begun(memories: Sequence[NamedMemory], out: Path, settings: MeasureSettings) -> list[str]:
     """Claim the folder, delete the records of memories that have changed, and return the names of all memories."""
     identity = {"evonav": __version__, "settings": asdict(settings)}
     there = _read_header(out / HEADER_NAME)

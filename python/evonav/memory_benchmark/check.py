@@ -12,8 +12,8 @@ from evonav.memory_benchmark.answers import MemoryFailedError
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import LocalMemory
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import HostedMemory, MemorySource, Settings, host, measure
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.run import HostedMemory, MeasureSettings, MemorySource, host, measure
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
@@ -66,10 +66,10 @@ def check_memory(memory: MemorySource, *, timeout_s: float = 60.0) -> MemoryRepo
         ['updates']
     """
     name = memory if isinstance(memory, str) else getattr(memory, "path", None) or getattr(memory, "__name__", "memory")
-    return MemoryReport(str(name), tuple(_checks(memory, Settings(timeout_s=timeout_s, runs_twice=True))))
+    return MemoryReport(str(name), tuple(_checks(memory, MeasureSettings(timeout_s=timeout_s, runs_twice=True))))
 
 
-def _checks(memory: MemorySource, settings: Settings) -> Iterator[Check]:
+def _checks(memory: MemorySource, settings: MeasureSettings) -> Iterator[Check]:
     stream = _TinyStream()
     result = measure(memory, stream, settings)
     if (failure := result.failure) is not None:
@@ -86,7 +86,7 @@ def _checks(memory: MemorySource, settings: Settings) -> Iterator[Check]:
     yield _determinism(result)
     with closing(host(memory, settings)) as hosted:
         yield _reset(hosted, stream)
-    with closing(host(memory, Settings(own_process=False))) as hosted:
+    with closing(host(memory, MeasureSettings(own_process=False))) as hosted:
         yield from _last_points(hosted, _TinyStream())  # whose arrays nobody has had
 
 
@@ -198,7 +198,7 @@ class _TinyStream:
     def __init__(self) -> None:
         fov_rad = 2.0 * float(np.arctan(_SIDE_PX / 2.0 / _FOCAL_PX))
         self.info = StreamInfo(Intrinsics(_SIDE_PX, _SIDE_PX, fov_rad), ("Mug",), rate_hz=2.0)
-        self.changes = (Change("mug", "Mug", "removed", _NUM_FRAMES, _MUG, None),)
+        self.changes = (TrueChange("mug", "Mug", "removed", _NUM_FRAMES, _MUG, None),)
         self._views = [self._view(is_there=index < _NUM_FRAMES) for index in range(2 * _NUM_FRAMES)]
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:

@@ -12,7 +12,7 @@ from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
 from evonav.memory_benchmark.metrics.speed import Percentiles
 from evonav.memory_benchmark.metrics.staleness import Clock, SpellKind, durations_of, risk_table, survival
 from evonav.memory_benchmark.metrics.update import UpdateCounts
-from evonav.memory_benchmark.records import Belief, MemoryResult, StreamResult
+from evonav.memory_benchmark.records import BeliefScore, MemoryResult, StreamResult
 from evonav.statistics import ClusterBootstrap, Estimate
 
 BASELINE = "never"
@@ -26,7 +26,7 @@ Better = Literal["lower", "higher"]
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class MemoryMetric:
     """One number of a memory: its name, and how it is taken from streams."""
 
     name: str
@@ -47,7 +47,7 @@ def estimates(result: MemoryResult, kind: str | None = None) -> dict[str, Estima
     if not streams:
         return {}
     bootstrap = bootstrap_of(streams)
-    found = {figure.name: figure.estimate(streams, bootstrap) for figure in FIGURES}
+    found = {figure.name: figure.estimate(streams, bootstrap) for figure in METRICS}
     return {name: estimate for name, estimate in found.items() if estimate.value is not None}
 
 
@@ -163,7 +163,7 @@ def _ece(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
     return bootstrap.estimate(float(calibration_error(total)), calibration_error(resampled), int(total[:, 0].sum()))
 
 
-def _of_belief(get: Callable[[Belief], float]) -> Callable[[Streams, ClusterBootstrap], Estimate]:
+def _of_belief(get: Callable[[BeliefScore], float]) -> Callable[[Streams, ClusterBootstrap], Estimate]:
     return _share(lambda stream: None if stream.belief is None else (get(stream.belief), stream.belief.n))
 
 
@@ -204,78 +204,82 @@ def _removal_f1(counts: UpdateCounts) -> tuple[float, float]:
 
 
 _TIMES = [
-    Figure(f"{call}_{clock}_{name}_ms", "ms", "lower", _mean(_time(f"{call}_{clock}", f"{name}_ms")), is_time=True)
+    MemoryMetric(
+        f"{call}_{clock}_{name}_ms", "ms", "lower", _mean(_time(f"{call}_{clock}", f"{name}_ms")), is_time=True
+    )
     for call in ("observe", "locate")
     for clock in ("cpu", "wall")
     for name in ("p50", "p95", "p99")
 ]
 _LARGEST = [
-    Figure(f"{call}_{clock}_max_ms", "ms", "lower", _largest(_time(f"{call}_{clock}", "max_ms")), is_time=True)
+    MemoryMetric(f"{call}_{clock}_max_ms", "ms", "lower", _largest(_time(f"{call}_{clock}", "max_ms")), is_time=True)
     for call in ("observe", "locate")
     for clock in ("cpu", "wall")
 ]
 _SLOPES = [
-    Figure(name, "ms", "lower", _mean(_speed(name)), is_time=True)
+    MemoryMetric(name, "ms", "lower", _mean(_speed(name)), is_time=True)
     for name in ("slope_per_100_entries_ms", "slope_per_1000_frames_ms")
 ]
 _SIZES = [
-    Figure("bytes_per_entry", "B", "lower", _mean(_size("bytes_per_entry"))),
-    Figure("rss_growth_mb_per_minute", "MB/min", "lower", _mean(_size("rss_growth_mb_per_minute")), is_time=True),
-    Figure("peak_rss_mb", "MB", "lower", _largest(_size("peak_rss_mb")), is_time=True),
+    MemoryMetric("bytes_per_entry", "B", "lower", _mean(_size("bytes_per_entry"))),
+    MemoryMetric("rss_growth_mb_per_minute", "MB/min", "lower", _mean(_size("rss_growth_mb_per_minute")), is_time=True),
+    MemoryMetric("peak_rss_mb", "MB", "lower", _largest(_size("peak_rss_mb")), is_time=True),
 ]
 _UPDATES = [
-    Figure(
+    MemoryMetric(
         "removal_precision",
         "",
         "higher",
         _of_counts(lambda counts: (counts.removals_done, counts.removals_done + counts.false_forgets)),
     ),
-    Figure("removal_recall", "", "higher", _of_counts(lambda counts: (counts.removals_done, counts.removals))),
-    Figure("removal_f1", "", "higher", _of_counts(_removal_f1)),
-    Figure("addition_recall", "", "higher", _of_counts(lambda counts: (counts.additions_done, counts.additions))),
-    Figure("move_recall", "", "higher", _of_counts(lambda counts: (counts.moves_done, counts.moves))),
-    Figure("false_forgets", "%", "lower", _of_counts(lambda counts: (counts.false_forgets, counts.standing), 100.0)),
-    Figure(
+    MemoryMetric("removal_recall", "", "higher", _of_counts(lambda counts: (counts.removals_done, counts.removals))),
+    MemoryMetric("removal_f1", "", "higher", _of_counts(_removal_f1)),
+    MemoryMetric("addition_recall", "", "higher", _of_counts(lambda counts: (counts.additions_done, counts.additions))),
+    MemoryMetric("move_recall", "", "higher", _of_counts(lambda counts: (counts.moves_done, counts.moves))),
+    MemoryMetric(
+        "false_forgets", "%", "lower", _of_counts(lambda counts: (counts.false_forgets, counts.standing), 100.0)
+    ),
+    MemoryMetric(
         "false_forgets_at_end",
         "%",
         "lower",
         _of_counts(lambda counts: (counts.false_forgets_at_end, counts.standing), 100.0),
     ),
-    Figure("duplicates", "%", "lower", _of_counts(lambda counts: (counts.duplicates, counts.remembered), 100.0)),
-    Figure("precision", "", "higher", _of_counts(lambda counts: (counts.right_entries, counts.entries))),
-    Figure("recall", "", "higher", _of_counts(lambda counts: (counts.seen_remembered, counts.seen))),
-    Figure("change_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone, counts.come))),
-    Figure("disappeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone))),
-    Figure("appeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.come))),
+    MemoryMetric("duplicates", "%", "lower", _of_counts(lambda counts: (counts.duplicates, counts.remembered), 100.0)),
+    MemoryMetric("precision", "", "higher", _of_counts(lambda counts: (counts.right_entries, counts.entries))),
+    MemoryMetric("recall", "", "higher", _of_counts(lambda counts: (counts.seen_remembered, counts.seen))),
+    MemoryMetric("change_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone, counts.come))),
+    MemoryMetric("disappeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone))),
+    MemoryMetric("appeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.come))),
 ]
 _STALENESS = [
-    Figure("half_life_frames", "frames", "lower", _half_life("evident", "frames")),
-    Figure("half_life_evidence_frames", "frames", "lower", _half_life("evident", "evidence_frames")),
-    Figure("half_life_s", "s", "lower", _half_life("evident", "seconds")),
-    Figure("half_life_m", "m", "lower", _half_life("evident", "metres")),
-    Figure("half_life_unseen_frames", "frames", "lower", _half_life("unseen", "frames")),
-    Figure("half_life_to_find_frames", "frames", "lower", _half_life("appeared", "frames")),
-    Figure("never_cleared", "%", "lower", _not_over("evident")),
-    Figure("never_found", "%", "lower", _not_over("appeared")),
+    MemoryMetric("half_life_frames", "frames", "lower", _half_life("evident", "frames")),
+    MemoryMetric("half_life_evidence_frames", "frames", "lower", _half_life("evident", "evidence_frames")),
+    MemoryMetric("half_life_s", "s", "lower", _half_life("evident", "seconds")),
+    MemoryMetric("half_life_m", "m", "lower", _half_life("evident", "metres")),
+    MemoryMetric("half_life_unseen_frames", "frames", "lower", _half_life("unseen", "frames")),
+    MemoryMetric("half_life_to_find_frames", "frames", "lower", _half_life("appeared", "frames")),
+    MemoryMetric("never_cleared", "%", "lower", _not_over("evident")),
+    MemoryMetric("never_found", "%", "lower", _not_over("appeared")),
 ]
 _BELIEFS = [
-    Figure("brier", "", "lower", _of_belief(lambda belief: belief.squared_error)),
-    Figure("nll", "nats", "lower", _of_belief(lambda belief: belief.log_loss)),
-    Figure("ece", "", "lower", _ece),
+    MemoryMetric("brier", "", "lower", _of_belief(lambda belief: belief.squared_error)),
+    MemoryMetric("nll", "nats", "lower", _of_belief(lambda belief: belief.log_loss)),
+    MemoryMetric("ece", "", "lower", _ece),
 ]
 _STATES: tuple[QueryState, ...] = ("before", "after", "after_evidence")
 _QUERIES = [
     figure
     for state in _STATES
     for figure in (
-        Figure(f"hit_at_1_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_1)),
-        Figure(f"hit_at_5_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_5)),
-        Figure(f"mrr_{state}", "%", "higher", _of_queries(state, lambda counts: counts.reciprocal_ranks)),
+        MemoryMetric(f"hit_at_1_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_1)),
+        MemoryMetric(f"hit_at_5_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_5)),
+        MemoryMetric(f"mrr_{state}", "%", "higher", _of_queries(state, lambda counts: counts.reciprocal_ranks)),
     )
 ]
-_REAL_TIME = Figure("real_time_factor", "", "higher", _mean(_speed("real_time_factor")), is_time=True)
+_REAL_TIME = MemoryMetric("real_time_factor", "", "higher", _mean(_speed("real_time_factor")), is_time=True)
 
-FIGURES: tuple[Figure, ...] = (
+METRICS: tuple[MemoryMetric, ...] = (
     *_TIMES,
     *_LARGEST,
     *_SLOPES,

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.evaluation.episode.staleness import STALE_MARGIN_M
-from evonav.memory_benchmark.answers import Entries
+from evonav.memory_benchmark.answers import CheckedEntries
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.metrics.belief import BeliefSums
-from evonav.memory_benchmark.metrics.change_f1 import PlaceKey, Snapshot, change_counts
-from evonav.memory_benchmark.metrics.matching import NONE, Boxes
+from evonav.memory_benchmark.metrics.change_f1 import BeliefSnapshot, PlaceKey, change_counts
+from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
 from evonav.memory_benchmark.metrics.retrieval import Queries
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.metrics.tracked_change import TrackedChange, tracked
 from evonav.memory_benchmark.metrics.update import EVIDENCE_PX, UpdateCounts
 from evonav.memory_benchmark.protocol import Place
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import SceneObject
 
@@ -33,7 +33,7 @@ class _Scene:
     """The bodies of the house, and what the memory has of them. All arrays are over the bodies of `boxes`."""
 
     objects: Sequence[SceneObject]
-    boxes: Boxes
+    boxes: BodyBoxes
     keys: list[PlaceKey]
     index_of: dict[str, int]
     is_object: NDArray[np.bool_]
@@ -51,7 +51,7 @@ class _Scene:
 class _Answer:
     """The last answer of a visit. Doors and windows are not counted."""
 
-    entries: Entries
+    entries: CheckedEntries
     num_believed: int
     num_right: int
 
@@ -61,18 +61,18 @@ class Judge:
     """Takes frames with their truth, and the memory's answers to them."""
 
     info: StreamInfo
-    changes: Sequence[Change]
+    changes: Sequence[TrueChange]
     counts: UpdateCounts = field(default_factory=UpdateCounts)
     belief: BeliefSums = field(default_factory=BeliefSums)
     queries: Queries = field(default_factory=Queries)
-    snapshots: list[Snapshot] = field(default_factory=list)
+    snapshots: list[BeliefSnapshot] = field(default_factory=list)
     tracked: list[TrackedChange] = field(default_factory=list)
     seen: set[PlaceKey] = field(default_factory=set)
     clocks: Clocks = field(default_factory=lambda: Clocks(0, 0.0, 0.0))
     num_changes_of: Counter[str] = field(default_factory=Counter)
     _scene: _Scene | None = None
     _frame: MemoryFrame | None = None
-    _stale: Boxes = field(default_factory=lambda: Boxes(()))
+    _stale: BodyBoxes = field(default_factory=lambda: BodyBoxes(()))
     _stale_changes: list[TrackedChange] = field(default_factory=list)
     _believed_old: frozenset[PlaceKey] = frozenset()
     _answer: _Answer | None = None
@@ -93,7 +93,7 @@ class Judge:
             if one.is_current and one.new_key and one.change.object_id in seen_ids:
                 one.found.look(self.clocks)
 
-    def believe(self, entries: Entries) -> None:
+    def believe(self, entries: CheckedEntries) -> None:
         """Take the memory's entries after the last frame."""
         scene = self._scene
         assert scene is not None, "a frame comes first"
@@ -139,7 +139,7 @@ class Judge:
     def _take_snapshot(self, scene: _Scene) -> None:
         covered = {key for key, is_covered in zip(scene.keys, scene.is_covered.tolist(), strict=True) if is_covered}
         self.snapshots.append(
-            Snapshot(
+            BeliefSnapshot(
                 believed=frozenset(covered) | self._believed_old,
                 present=frozenset(scene.keys),
                 seen=frozenset(self.seen),
@@ -186,7 +186,7 @@ class Judge:
         """Digest of all answers so far: equal for equal bits."""
         return self._digest.hexdigest()
 
-    def _take_belief(self, entries: Entries) -> None:
+    def _take_belief(self, entries: CheckedEntries) -> None:
         scene, p = self._scene, entries.p_present
         assert scene is not None
         given = [
@@ -215,7 +215,7 @@ class Judge:
             self._take_snapshot(before)
         new = [one for one in enumerate(self.changes) if one[1].frame <= frame][len(self.tracked) :]
         remembered = {} if before is None else dict(zip(before.keys, before.num_matched.tolist(), strict=True))
-        boxes = Boxes(objects)
+        boxes = BodyBoxes(objects)
         for index, change in new:
             for earlier in self.tracked:
                 if earlier.change.object_id == change.object_id and earlier.is_current:
@@ -232,11 +232,11 @@ class Judge:
                 self._judge_removal(one)
                 one.is_open = False
         self._stale_changes = [one for one in self.tracked if one.is_open]
-        self._stale = Boxes([one.change.before for one in self._stale_changes if one.change.before is not None])
+        self._stale = BodyBoxes([one.change.before for one in self._stale_changes if one.change.before is not None])
         self._believed_old = frozenset()
         self._scene = self._remapped(before, objects, boxes)
 
-    def _remapped(self, before: _Scene | None, objects: Sequence[SceneObject], boxes: Boxes) -> _Scene:
+    def _remapped(self, before: _Scene | None, objects: Sequence[SceneObject], boxes: BodyBoxes) -> _Scene:
         keys = [(body.id, self.num_changes_of[body.id]) for body in boxes.bodies]
         size = len(boxes)
         scene = _Scene(
@@ -272,7 +272,7 @@ class Judge:
         counts.false_forgets += int(is_lost.sum())
         counts.false_forgets_at_end += int((is_lost & ~scene.is_covered).sum())
 
-    def _believe_changes(self, entries: Entries, unmatched: NDArray[np.intp]) -> None:
+    def _believe_changes(self, entries: CheckedEntries, unmatched: NDArray[np.intp]) -> None:
         """Note which left places have an entry, and which new places have one."""
         scene = self._scene
         assert scene is not None
@@ -321,6 +321,6 @@ class Judge:
             self.counts.moves_done += num_matched == 1 and one.empty.done is not None
 
 
-def _is_uncovered(body: SceneObject, boxes: Boxes) -> bool:
+def _is_uncovered(body: SceneObject, boxes: BodyBoxes) -> bool:
     """Return whether an entry at the centre of a body would be stale."""
     return bool(boxes.match([body.category], np.array([body.centre_m], np.float64))[0][0] == NONE)

@@ -8,12 +8,12 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_confi
 from pydantic.dataclasses import dataclass
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.answers import MAX_SHOWN, Entries, Hosting, MemoryFailedError, read_entries
+from evonav.memory_benchmark.answers import MAX_SHOWN, CheckedEntries, Hosting, MemoryFailedError, read_entries
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
 from evonav.memory_benchmark.protocol import MemoryEntry, Place
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import Settings, judge_memories
+from evonav.memory_benchmark.run import MeasureSettings, judge_memories
 from evonav.memory_benchmark.truth import Stream
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -21,7 +21,7 @@ with_config(_STRICT)(MemoryEntry)
 
 
 @dataclass(frozen=True, config=_STRICT)
-class Answer:
+class FrameAnswer:
     """The answer of a system after one frame: a line of its file, as JSON."""
 
     frame: Annotated[int, Field(ge=0)]
@@ -34,7 +34,7 @@ class Answer:
     """Size of its memory."""
 
 
-_ANSWER = TypeAdapter(Answer)
+_ANSWER = TypeAdapter(FrameAnswer)
 
 
 def score(stream: Stream, entries_file: Path) -> StreamResult:
@@ -49,7 +49,7 @@ def score(stream: Stream, entries_file: Path) -> StreamResult:
     Raises:
         StoreError: The file cannot be read, or a line is wrong; the message has file, line, field and value.
     """
-    return judge_memories([lambda: _Answers(entries_file)], stream, Settings())[0]
+    return judge_memories([lambda: _Answers(entries_file)], stream, MeasureSettings())[0]
 
 
 class _Answers:
@@ -94,7 +94,7 @@ class _Answers:
         self._next = next(self._lines, None)
         return None if answer.seconds is None else Cost(None, answer.seconds)
 
-    def entries(self) -> Entries:
+    def entries(self) -> CheckedEntries:
         """Return the entries of the last line."""
         return self._entries
 
@@ -114,7 +114,7 @@ class _Answers:
         self._lines.close()
 
 
-def _read_lines(path: Path) -> Generator[tuple[int, Answer]]:
+def _read_lines(path: Path) -> Generator[tuple[int, FrameAnswer]]:
     """Yield the lines of a file with their numbers; empty ones are left out."""
     try:
         with path.open("rb") as file:
@@ -125,7 +125,7 @@ def _read_lines(path: Path) -> Generator[tuple[int, Answer]]:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _read(path: Path, number: int, line: bytes) -> Answer:
+def _read(path: Path, number: int, line: bytes) -> FrameAnswer:
     try:
         return _ANSWER.validate_json(line, strict=True)
     except ValidationError as error:

@@ -18,13 +18,13 @@ SCHEMA_VERSION: Literal[1] = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
 
 
-class _Record(BaseModel):
+class _MemoryRecord(BaseModel):
     """A frozen record that rejects unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
-class Failure(_Record):
+class MemoryFailure(_MemoryRecord):
     """The end of a memory in a stream."""
 
     kind: FailureKind
@@ -34,7 +34,7 @@ class Failure(_Record):
     """Index of the last frame that it was given; `None` before the first."""
 
 
-class Speed(_Record):
+class Speed(_MemoryRecord):
     """Times of one stream, after the warm-up."""
 
     observe_cpu: Percentiles | None
@@ -50,7 +50,7 @@ class Speed(_Record):
     """Time over frames and entries, thinned, for plots."""
 
 
-class Belief(_Record):
+class BeliefScore(_MemoryRecord):
     """Sums over entries with a `p_present`, see `metrics.belief.BeliefSums`."""
 
     n: int
@@ -59,7 +59,7 @@ class Belief(_Record):
     bins: tuple[tuple[float, float, float], ...]
 
 
-class StreamResult(_Record):
+class StreamResult(_MemoryRecord):
     """The result of one memory in one stream. A part is `None` if the memory failed or has nothing to show in it."""
 
     stream: str
@@ -70,14 +70,14 @@ class StreamResult(_Record):
     """Frames that it was given."""
     num_visits: int
     num_changes: int
-    failure: Failure | None = None
+    failure: MemoryFailure | None = None
     notes: tuple[str, ...] = ()
     """Sentences about what looks wrong, and proves nothing."""
     speed: Speed | None = None
     size: Size | None = None
     update: UpdateCounts | None = None
     spells: tuple[Spell, ...] = ()
-    belief: Belief | None = None
+    belief: BeliefScore | None = None
     queries: dict[QueryState, QueryCounts] | None = None
     digest: str | None = None
     """SHA-256 of all entries in their order: equal for equal bits."""
@@ -85,7 +85,7 @@ class StreamResult(_Record):
     """Whether a second run gave the same bits; `None` if there was none."""
 
 
-class MemoryResult(_Record):
+class MemoryResult(_MemoryRecord):
     """The results of one memory in all streams."""
 
     memory: str
@@ -101,7 +101,7 @@ class MemoryResult(_Record):
         return tuple(one for one in self.streams if one.failure is None and kind in (None, one.kind))
 
 
-class BenchmarkResult(_Record):
+class BenchmarkResult(_MemoryRecord):
     """All memories of one run of the benchmark."""
 
     schema_version: Literal[1] = SCHEMA_VERSION

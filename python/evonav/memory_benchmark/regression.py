@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from evonav.memory_benchmark.figures import BASELINE, FIGURES, bootstrap_of, paired, ratios
+from evonav.memory_benchmark.figures import BASELINE, METRICS, bootstrap_of, paired, ratios
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult
 from evonav.statistics import Estimate, Interval
 
@@ -64,7 +64,7 @@ def _figures(now: MemoryResult, before: MemoryResult) -> Iterator[Difference]:
     if not ours:
         return
     bootstrap = bootstrap_of(ours)
-    for figure in FIGURES:
+    for figure in METRICS:
         if figure.is_time:
             continue
         new, old = figure.estimate(ours, bootstrap), figure.estimate(theirs, bootstrap)
@@ -78,7 +78,7 @@ def _times(
     ours, theirs = paired(now.streams, before.streams)
     new_ratios = ratios(now.model_copy(update={"streams": tuple(ours)}), base_now)
     old_ratios = ratios(before.model_copy(update={"streams": tuple(theirs)}), base_before)
-    for figure in FIGURES:
+    for figure in METRICS:
         if not figure.is_time or figure.name not in new_ratios or figure.name not in old_ratios:
             continue
         new, old = new_ratios[figure.name], old_ratios[figure.name]

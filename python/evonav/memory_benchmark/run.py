@@ -11,7 +11,7 @@ import numpy as np
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.memory_benchmark.answers import Entries, Hosting, MemoryFailedError
+from evonav.memory_benchmark.answers import CheckedEntries, Hosting, MemoryFailedError
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost, LocalMemory
 from evonav.memory_benchmark.hosting.process import RemoteMemory
@@ -19,7 +19,7 @@ from evonav.memory_benchmark.judge import Judge
 from evonav.memory_benchmark.metrics import size, speed
 from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
 from evonav.memory_benchmark.protocol import Memory, Place
-from evonav.memory_benchmark.records import Belief, Failure, Speed, StreamResult
+from evonav.memory_benchmark.records import BeliefScore, MemoryFailure, Speed, StreamResult
 from evonav.memory_benchmark.truth import FrameTruth, Stream
 
 NUM_WARM_UP = 20
@@ -36,7 +36,7 @@ MemorySource = str | Component[Memory] | Callable[[], Memory]
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class MeasureSettings:
     """Settings of runs; they decide where a memory runs and how often it is asked."""
 
     own_process: bool | None = None
@@ -86,7 +86,7 @@ class HostedMemory(Protocol):
     def observe(self, frame: MemoryFrame) -> Cost | None:
         """Hand over a frame; return what it cost, if that is known."""
 
-    def entries(self) -> Entries:
+    def entries(self) -> CheckedEntries:
         """Return the entries."""
 
     def num_bytes(self, num_entries: int) -> int | None:
@@ -99,7 +99,7 @@ class HostedMemory(Protocol):
         """Let go of the memory."""
 
 
-def measure(memory: MemorySource, stream: Stream, settings: Settings | None = None) -> StreamResult:
+def measure(memory: MemorySource, stream: Stream, settings: MeasureSettings | None = None) -> StreamResult:
     """Run a memory through a stream and judge it; see `measure_all`."""
     return measure_all([memory], stream, settings)[0]
 
@@ -107,7 +107,7 @@ def measure(memory: MemorySource, stream: Stream, settings: Settings | None = No
 def measure_all(
     memories: Sequence[MemorySource],
     stream: Stream,
-    settings: Settings | None = None,
+    settings: MeasureSettings | None = None,
     *,
     alive: Callable[[], None] = lambda: None,
 ) -> list[StreamResult]:
@@ -128,7 +128,7 @@ def measure_all(
     Raises:
         InvalidArgumentError: A function was to run in its own process.
     """
-    chosen = settings or Settings()
+    chosen = settings or MeasureSettings()
     hosted = [partial(host, memory, chosen) for memory in memories]
     results = judge_memories(hosted, stream, chosen, alive)
     if not chosen.runs_twice:
@@ -143,7 +143,7 @@ def measure_all(
 def judge_memories(
     new_memories: Sequence[Callable[[], HostedMemory]],
     stream: Stream,
-    settings: Settings,
+    settings: MeasureSettings,
     alive: Callable[[], None] = lambda: None,
 ) -> list[StreamResult]:
     """Run hosted memories through a stream side by side and judge them.
@@ -154,7 +154,7 @@ def judge_memories(
         alive: Called after every frame of every memory.
     """
     with ExitStack() as stack:
-        runs = [stack.enter_context(closing(_Run(stream, settings, new_memory))) for new_memory in new_memories]
+        runs = [stack.enter_context(closing(_StreamRun(stream, settings, new_memory))) for new_memory in new_memories]
         for frame, truth in stream.frames():
             if all(run.has_failed for run in runs):
                 break
@@ -164,7 +164,7 @@ def judge_memories(
         return [run.result() for run in runs]
 
 
-def host(memory: MemorySource, settings: Settings) -> LocalMemory | RemoteMemory:
+def host(memory: MemorySource, settings: MeasureSettings) -> LocalMemory | RemoteMemory:
     """Make a memory, in this process or in its own.
 
     Raises:
@@ -196,10 +196,10 @@ class _Times:
     rss_mb: list[float] = field(default_factory=list)
 
 
-class _Run:
+class _StreamRun:
     """One run of one memory through one stream. After its first failure, it does nothing more."""
 
-    def __init__(self, stream: Stream, settings: Settings, new_memory: Callable[[], HostedMemory]) -> None:
+    def __init__(self, stream: Stream, settings: MeasureSettings, new_memory: Callable[[], HostedMemory]) -> None:
         self._stream, self._settings = stream, settings
         self._every = settings.every or (1 if stream.changes else EVERY_STATIC)
         self._judge = Judge(stream.info, stream.changes)
@@ -210,7 +210,7 @@ class _Run:
         self._is_answer_due = False
         self._num_entries = 0
         self._memory: HostedMemory | None = None
-        self._failure: Failure | None = None
+        self._failure: MemoryFailure | None = None
         with self._failing():
             self._memory = new_memory()
             self._memory.reset(stream.info)
@@ -265,7 +265,7 @@ class _Run:
             yield
         except MemoryFailedError as error:
             frame = None if self._frame is None else self._frame.index
-            self._failure = Failure(kind=error.kind, message=str(error), frame=frame)
+            self._failure = MemoryFailure(kind=error.kind, message=str(error), frame=frame)
 
     def _ask(self, memory: HostedMemory) -> None:
         entries = memory.entries()
@@ -303,7 +303,7 @@ class _Run:
         if not self._stream.has_truth:
             return self._record(**fixed)
         bins = [(float(n), float(p), float(right)) for n, p, right in sums.bins.tolist()]
-        belief = Belief(n=sums.n, squared_error=sums.squared_error, log_loss=sums.log_loss, bins=tuple(bins))
+        belief = BeliefScore(n=sums.n, squared_error=sums.squared_error, log_loss=sums.log_loss, bins=tuple(bins))
         return self._record(
             **fixed,
             update=update,

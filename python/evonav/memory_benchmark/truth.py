@@ -15,7 +15,7 @@ ChangeKind = Literal["moved", "removed", "added"]
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class TrueChange:
     """One object that moved, vanished or appeared."""
 
     object_id: str
@@ -66,7 +66,7 @@ class Stream(Protocol):
         """The public facts, which a memory is told."""
 
     @property
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[TrueChange]:
         """All changes, in the order of time."""
 
     @property

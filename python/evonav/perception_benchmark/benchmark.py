@@ -79,7 +79,7 @@ class TourConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredTasks:
     """Result of a command."""
 
     tasks: tuple[str, ...]
@@ -97,7 +97,7 @@ def measure(
     simulator: Component[Simulator] = EMBEDDED,
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
-) -> Measured:
+) -> MeasuredTasks:
     """Tour the houses with every perception; called again on the same folder, tour what is missing.
 
     Args:
@@ -148,7 +148,7 @@ def measure(
                         failures.append((spec.word, task.task_id, last))
                     num_done += 1
                     on_progress(num_done, num_all, f"{spec.word} {task.task_id}")
-        return Measured(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
+        return MeasuredTasks(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
 
 
 def _begun(

@@ -17,7 +17,7 @@ COSINES = ("same_object", "same_category", "other", "text_own", "text_other")
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class ScoreGroup:
     """Objects and detections of one kind."""
 
     name: str
@@ -49,14 +49,14 @@ def calibration(
     return {"ece": houses.estimate(value, resampled, num)}, rows
 
 
-def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[Group]:
+def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[ScoreGroup]:
     """Depth errors over all pixels, then by their true depth."""
     num, lost, relative, square = (
         np.array([getattr(record.depth, name) for record in records], np.float64).reshape(len(records), -1)
         for name in ("num", "num_lost", "relative", "square_m2")
     )
 
-    def group(name: str, columns: Sequence[int]) -> Group:
+    def group(name: str, columns: Sequence[int]) -> ScoreGroup:
         all_px, lost_px, relatives, squares = (
             houses.sums(table[:, columns].sum(axis=1)) for table in (num, lost, relative, square)
         )
@@ -66,7 +66,7 @@ def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> lis
             "depth_rmse_m": houses.ratio(squares, with_depth, int(with_depth.sum()), np.sqrt),
             "depth_lost": houses.ratio(lost_px, all_px, int(all_px.sum())),
         }
-        return Group(name, measures)
+        return ScoreGroup(name, measures)
 
     every = list(range(len(DISTANCES)))
     return [group("all", every), *(group(name, [i]) for i, name in enumerate(DISTANCES))]

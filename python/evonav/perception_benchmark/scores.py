@@ -12,7 +12,7 @@ from evonav.errors import StoreError
 from evonav.perception_benchmark import other_scores as other
 from evonav.perception_benchmark.average_precision import interpolated, resampled
 from evonav.perception_benchmark.matching import IGNORED, IOU_LIMIT, NONE
-from evonav.perception_benchmark.other_scores import Group
+from evonav.perception_benchmark.other_scores import ScoreGroup
 from evonav.perception_benchmark.records import DISTANCE_BINS_M, TaskRecord
 from evonav.statistics import ClusterBootstrap, Estimate
 
@@ -32,7 +32,7 @@ COMPARED_MEMORY = ("memory_precision", "memory_recall")
 
 
 @dataclass(frozen=True, slots=True)
-class Confusion:
+class LabelConfusion:
     """Objects of a category that were detected with another label."""
 
     category: str
@@ -51,9 +51,9 @@ class Scores:
     num_houses: int
     num_views: int
     overall: Mapping[str, Estimate]
-    groups: Mapping[str, Sequence[Group]]
+    groups: Mapping[str, Sequence[ScoreGroup]]
     """Groups by `category`, `distance`, `size` and `outline`."""
-    confusions: Sequence[Confusion]
+    confusions: Sequence[LabelConfusion]
     """The most frequent first."""
     unexplained: Sequence[tuple[str, int]]
     """Labels of detections where no object is, the most frequent first."""
@@ -61,7 +61,7 @@ class Scores:
     """Mean over categories of the interpolated precision at recalls 0, 0.01, .. 1."""
     calibration: Sequence[tuple[float, Estimate]]
     """Mean confidence and precision of detections, by tenths of confidence; empty ones are left out."""
-    depth: Sequence[Group]
+    depth: Sequence[ScoreGroup]
     cosines: Mapping[str, Sequence[int]]
     """Counts in bins of -1..1; none without features."""
     memory: Mapping[str, Estimate]
@@ -83,7 +83,7 @@ def scores(records: Mapping[str, Sequence[TaskRecord]]) -> list[Scores]:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class PerceptionDifference:
     """One perception less another, over the same views."""
 
     word: str
@@ -91,10 +91,10 @@ class Difference:
     measures: Mapping[str, Estimate]
 
 
-def differences(found: Sequence[Scores]) -> list[Difference]:
+def differences(found: Sequence[Scores]) -> list[PerceptionDifference]:
     """Return the differences of every two perceptions, in the metrics that detectors are usually compared by."""
     return [
-        Difference(
+        PerceptionDifference(
             b.word,
             a.word,
             {
@@ -151,7 +151,7 @@ class _Scorer:
         for by, names in (("distance", DISTANCES), ("size", SIZES), ("outline", OUTLINES)):
             found = self.group.get(by)
             groups[by] = [
-                Group(name, self._measures(self.truth_group[by] == i, None if found is None else found == i))
+                ScoreGroup(name, self._measures(self.truth_group[by] == i, None if found is None else found == i))
                 for i, name in enumerate(names)
             ]
         counted = self.partner != IGNORED
@@ -209,10 +209,10 @@ class _Scorer:
         measures["iou"] = houses.ratio(ious, num_placed, int(num_placed.sum()))
         return measures
 
-    def _categories(self, precisions: Mapping[str, Mapping[str, Estimate]]) -> list[Group]:
+    def _categories(self, precisions: Mapping[str, Mapping[str, Estimate]]) -> list[ScoreGroup]:
         counts = Counter(self.truth_category.tolist())
         return [
-            Group(name, {**self._measures(self.truth_category == name, self.label == name), **precisions[name]})
+            ScoreGroup(name, {**self._measures(self.truth_category == name, self.label == name), **precisions[name]})
             for name in sorted(counts, key=lambda name: (-counts[name], name))
         ]
 
@@ -261,7 +261,7 @@ class _Scorer:
         ranked = (self.confidence[counted], ((partner >= 0) & is_pair)[counted])
         return interpolated(*ranked, int(wanted.sum())), resampled(*ranked, self.house[counted], wanted, draws)
 
-    def _confusions(self) -> list[Confusion]:
+    def _confusions(self) -> list[LabelConfusion]:
         """Count objects at whose place there is a detection with another label."""
         wrong = (self.place >= 0) & (self.place_category != self.label)
         pairs = Counter(zip(self.place_category[wrong].tolist(), self.label[wrong].tolist(), strict=True))
@@ -271,7 +271,7 @@ class _Scorer:
             there = self.truth_category == category
             tops, bottoms = self.houses.sums(mine, self.house), self.houses.sums(there, self.truth_house)
             share = self.houses.ratio(tops, bottoms, int(there.sum()))
-            found.append(Confusion(category, label, num, share))
+            found.append(LabelConfusion(category, label, num, share))
         return found
 
 

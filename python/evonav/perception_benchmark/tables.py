@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from evonav.counted import counted
-from evonav.perception_benchmark.other_scores import Group
+from evonav.perception_benchmark.other_scores import ScoreGroup
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, estimate_text
@@ -235,7 +235,7 @@ def perception_csv(found: Sequence[Scores]) -> str:
         write(one.word, "memory", "", one.memory)
         for share, measures in one.memory_curve:
             write(one.word, "memory by share of the tour", f"{share:g}", measures)
-        groups: dict[str, Sequence[Group]] = {**one.groups, "depth": one.depth}
+        groups: dict[str, Sequence[ScoreGroup]] = {**one.groups, "depth": one.depth}
         for by, parts in groups.items():
             for group in parts:
                 write(one.word, by, group.name, group.measures)

@@ -8,7 +8,7 @@ import numpy as np
 
 from evonav.component import optional_module
 from evonav.speed_benchmark.timing import INSTALL, Sampling
-from evonav.speed_benchmark.views import HouseView, Images
+from evonav.speed_benchmark.views import Images, RenderedView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SimulatorConfig
 
@@ -26,7 +26,7 @@ class ImagePeer(Protocol):
 def image_peers(
     sampling: Sampling,
     simulators: Sequence[EmbeddedSimulator],
-    views: Sequence[HouseView],
+    views: Sequence[RenderedView],
     config: SimulatorConfig,
     *,
     rgb: bool,
@@ -56,7 +56,7 @@ class Embree:
     """Embree's closest hits, one ray a pixel."""
 
     def __init__(
-        self, simulators: Sequence[EmbeddedSimulator], views: Sequence[HouseView], config: SimulatorConfig
+        self, simulators: Sequence[EmbeddedSimulator], views: Sequence[RenderedView], config: SimulatorConfig
     ) -> None:
         rtcore_scene = optional_module("embreex.rtcore_scene", "the peer embreex needs its library", INSTALL)
         meshes = optional_module("embreex.mesh_construction", "the peer embreex needs its library", INSTALL)
@@ -107,7 +107,12 @@ class OpenGL:
         void main() { depth = f_depth; body = f_body; %s }"""
 
     def __init__(
-        self, simulators: Sequence[EmbeddedSimulator], views: Sequence[HouseView], config: SimulatorConfig, *, rgb: bool
+        self,
+        simulators: Sequence[EmbeddedSimulator],
+        views: Sequence[RenderedView],
+        config: SimulatorConfig,
+        *,
+        rgb: bool,
     ) -> None:
         os.environ["LP_NUM_THREADS"] = "0"  # llvmpipe draws in the calling thread
         moderngl = optional_module("moderngl", "the peer moderngl needs its library", INSTALL)

@@ -31,7 +31,7 @@ PEERS = ("octomap", "open3d")
 
 
 @dataclass(frozen=True)
-class MapView:
+class MappedView:
     """A view to integrate."""
 
     house: str
@@ -78,7 +78,7 @@ class Volume(Protocol):
 
     TITLE: str
 
-    def __init__(self, views: list[MapView]) -> None: ...
+    def __init__(self, views: list[MappedView]) -> None: ...
 
     def prepare(self, number: int) -> None:
         """Prepare what is not timed of a view, and begin anew in a new house."""
@@ -92,7 +92,7 @@ class Octree:
 
     TITLE = "OctoMap, volume"
 
-    def __init__(self, views: list[MapView]) -> None:
+    def __init__(self, views: list[MappedView]) -> None:
         """Begin without a tree.
 
         Raises:
@@ -120,7 +120,7 @@ class Tsdf:
 
     TITLE = "Open3D, TSDF"
 
-    def __init__(self, views: list[MapView]) -> None:
+    def __init__(self, views: list[MappedView]) -> None:
         """Begin without a volume.
 
         Raises:
@@ -157,9 +157,9 @@ class Tsdf:
 _VOLUMES: dict[str, type[Volume]] = {"octomap": Octree, "open3d": Tsdf}
 
 
-def _views(num_houses: int) -> list[MapView]:
+def _views(num_houses: int) -> list[MappedView]:
     random = np.random.default_rng(0)
-    views: list[MapView] = []
+    views: list[MappedView] = []
     for number, house in enumerate(bundled_houses(num_houses)):
         simulator = EmbeddedSimulator()
         simulator.reset(house.to_json(), name=house.name)
@@ -170,6 +170,6 @@ def _views(num_houses: int) -> list[MapView]:
                 name = house.name or str(number)
                 is_first = not views or views[-1].house != name
                 views.append(
-                    MapView(name, is_first, frame.pose, frame.depth_m, frame.intrinsics, simulator.occupancy())
+                    MappedView(name, is_first, frame.pose, frame.depth_m, frame.intrinsics, simulator.occupancy())
                 )
     return views

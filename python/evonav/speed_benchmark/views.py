@@ -22,7 +22,7 @@ Renderer = Callable[[int], Images]
 
 
 @dataclass(frozen=True)
-class HouseView:
+class RenderedView:
     """One image to make."""
 
     house: int
@@ -35,7 +35,7 @@ class HouseView:
     position_m: NDArray[np.float64]
 
 
-def views_of_houses(config: SimulatorConfig, num_houses: int) -> tuple[list[EmbeddedSimulator], list[HouseView]]:
+def views_of_houses(config: SimulatorConfig, num_houses: int) -> tuple[list[EmbeddedSimulator], list[RenderedView]]:
     """Return a simulator a house, and 20 views in each from reachable positions, always the same."""
     random = np.random.default_rng(0)
     simulators, views = [], []
@@ -65,11 +65,11 @@ def views_of_houses(config: SimulatorConfig, num_houses: int) -> tuple[list[Embe
                 config.far_m,
             )
             position_m = np.array(camera.pose.position_m)
-            views.append(HouseView(number, house.name or str(number), camera, axes, position_m))
+            views.append(RenderedView(number, house.name or str(number), camera, axes, position_m))
     return simulators, views
 
 
-def our_renderer(simulators: Sequence[EmbeddedSimulator], views: Sequence[HouseView], *, rgb: bool) -> Renderer:
+def our_renderer(simulators: Sequence[EmbeddedSimulator], views: Sequence[RenderedView], *, rgb: bool) -> Renderer:
     """Return what draws a view with evonav's rasteriser."""
 
     def call(number: int) -> Images:

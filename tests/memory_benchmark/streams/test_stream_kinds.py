@@ -13,7 +13,7 @@ from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M
 from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.streams import StreamSpec, digest, make_stream
 from evonav.memory_benchmark.streams.glances import MAX_GLANCES
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import Frame, SceneObject
 
@@ -229,7 +229,7 @@ def test_a_memory_cannot_reach_the_truth(perception):
         for root in (frame, stream.info):
             found = reachable(root)
             assert isinstance(root, MemoryFrame | StreamInfo)
-            assert not [one for one in found if isinstance(one, SceneObject | Change | FrameTruth | Frame)]
+            assert not [one for one in found if isinstance(one, SceneObject | TrueChange | FrameTruth | Frame)]
             assert not ids & {one for one in found if isinstance(one, str)}
             instances = [one for one in found if isinstance(one, np.ndarray) and one.dtype == np.int32 and one.size > 9]
             assert all(image.max() < len(frame.view.detections.labels) for image in instances)

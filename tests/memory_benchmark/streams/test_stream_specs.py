@@ -9,7 +9,7 @@ import evonav
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.memory_benchmark.streams import KINDS, StreamSpec, make_stream, reference_specs
 from evonav.memory_benchmark.streams.make import make_plan, plan_of
-from evonav.memory_benchmark.streams.plan import Plan, cached_plan, plan_folder
+from evonav.memory_benchmark.streams.plan import StreamPlan, cached_plan, plan_folder
 from evonav.memory_benchmark.streams.spec import read_house
 
 SMALL = StreamSpec("S1", "bundled:4", frames_a_visit=12)
@@ -77,7 +77,7 @@ def test_a_wide_image_is_as_wide_as_a_square_one():
     assert wide.intrinsics.focal_px == pytest.approx(320.0)
 
 
-def equal(one: Plan, other: Plan) -> bool:
+def equal(one: StreamPlan, other: StreamPlan) -> bool:
     arrays = ("frame_scenes", "visits", "times_s", "poses")
     return (one.scenes, one.checkpoints) == (other.scenes, other.checkpoints) and all(
         np.array_equal(getattr(one, name), getattr(other, name)) for name in arrays

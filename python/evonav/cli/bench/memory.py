@@ -128,7 +128,7 @@ def memory(
     from evonav.memory_benchmark.benchmark import benchmark
     from evonav.memory_benchmark.memories import named_memories
     from evonav.memory_benchmark.records import read_result
-    from evonav.memory_benchmark.run import Settings
+    from evonav.memory_benchmark.run import MeasureSettings
     from evonav.parallel.local import num_cores
 
     earlier = None if against is None else read_result(against)
@@ -137,7 +137,7 @@ def memory(
     if streams or not recordings:
         specs += chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     own_process = None if in_process is None else not in_process
-    settings = Settings(own_process=own_process, timeout_s=timeout, every=every, runs_twice=twice)
+    settings = MeasureSettings(own_process=own_process, timeout_s=timeout, every=every, runs_twice=twice)
     with interruptible(out), progress_bar("streams") as on_progress:
         measured = benchmark(
             chosen,

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from evonav.agents.hosting.error_text import describe
 from evonav.memory_benchmark.answers import (
-    Entries,
+    CheckedEntries,
     Hosting,
     MemoryFailedError,
     read_entries,
@@ -72,7 +72,7 @@ class LocalMemory:
         """Hand over a frame."""
         return self._timed("observe", lambda: self._memory.observe(frame))[1]
 
-    def entries(self) -> Entries:
+    def entries(self) -> CheckedEntries:
         """Return the entries."""
         return read_entries(self._timed("entries", self._memory.entries)[0])
 

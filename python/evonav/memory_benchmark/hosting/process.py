@@ -17,7 +17,7 @@ from evonav.evaluation.records.schema import ErrorKind
 from evonav.memory_benchmark.answers import (
     MAX_ENTRIES,
     NUM_COLUMNS,
-    Entries,
+    CheckedEntries,
     FailureKind,
     Hosting,
     MemoryFailedError,
@@ -79,13 +79,13 @@ class RemoteMemory:
         """Hand over a frame."""
         return self._call("observe", frame)
 
-    def entries(self) -> Entries:
+    def entries(self) -> CheckedEntries:
         """Return the entries."""
         parts = self._ask("entries")["entries"]
         try:
             ids = np.frombuffer(base64.b64decode(parts["ids"]), np.int64)
             numbers = np.frombuffer(base64.b64decode(parts["numbers"]), np.float64).reshape(-1, NUM_COLUMNS)
-            entries = Entries(ids, tuple(map(str, parts["labels"])), numbers)
+            entries = CheckedEntries(ids, tuple(map(str, parts["labels"])), numbers)
         except (KeyError, TypeError, ValueError) as error:
             raise MemoryFailedError("died", f"malformed response: entries: {error}") from None
         if not len(ids) == len(numbers) == len(entries.labels):

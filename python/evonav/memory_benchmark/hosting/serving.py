@@ -20,10 +20,10 @@ from evonav.memory_benchmark.protocol import Memory
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
     """Serve requests on the inherited descriptors; see `evonav.agents.hosting.serving.main`."""
-    serving.main(socket_fd, life_fd, block_fd, _Server)
+    serving.main(socket_fd, life_fd, block_fd, _MemoryServer)
 
 
-class _Server:
+class _MemoryServer:
     """Makes a memory and calls it; an answer is a set of named parts, each already JSON."""
 
     def __init__(self) -> None:

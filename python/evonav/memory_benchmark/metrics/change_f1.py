@@ -16,7 +16,7 @@ PlaceKey = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class BeliefSnapshot:
     """The state at the end of a visit, or before a change in the middle of one."""
 
     believed: frozenset[PlaceKey]
@@ -40,7 +40,7 @@ class ChangeCounts:
     misses: int = 0
 
 
-def change_counts(snapshots: Sequence[Snapshot]) -> tuple[ChangeCounts, ChangeCounts]:
+def change_counts(snapshots: Sequence[BeliefSnapshot]) -> tuple[ChangeCounts, ChangeCounts]:
     """Count changes that a memory claims truly, falsely and not at all, over all pairs of query time < robot time.
 
     A claim is a place that the memory believed in at one of the two times only. A change that was not claimed is

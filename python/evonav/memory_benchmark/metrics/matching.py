@@ -19,7 +19,7 @@ _BLOCK = 20_000
 """Entries that are matched at a time: a memory may answer a hundred thousand."""
 
 
-class Boxes:
+class BodyBoxes:
     """The boxes of some bodies, by label."""
 
     def __init__(self, bodies: Sequence[SceneObject]) -> None:

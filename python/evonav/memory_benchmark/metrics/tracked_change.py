@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from evonav.evaluation.episode.staleness import STALE_MARGIN_M, distance_to_box_m
 from evonav.memory_benchmark.metrics.change_f1 import PlaceKey
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
-from evonav.memory_benchmark.truth import Change
+from evonav.memory_benchmark.truth import TrueChange
 
 
 @dataclass(slots=True)
@@ -38,7 +38,7 @@ class TrackedChange:
 
     index: int
     """Index in the stream."""
-    change: Change
+    change: TrueChange
     began: Clocks
     old_key: PlaceKey | None
     """The place that the object left; `None` if it was added."""
@@ -92,7 +92,7 @@ def _until(end: Clocks, start: Clocks) -> Clocks:
     return replace(end, evidence_frames=0).since(start)
 
 
-def tracked(index: int, change: Change, began: Clocks, num_before: int, *, is_remembered: bool) -> TrackedChange:
+def tracked(index: int, change: TrueChange, began: Clocks, num_before: int, *, is_remembered: bool) -> TrackedChange:
     """Begin to follow a change.
 
     Args:
@@ -112,7 +112,7 @@ def tracked(index: int, change: Change, began: Clocks, num_before: int, *, is_re
     )
 
 
-def _is_elsewhere(change: Change) -> bool:
+def _is_elsewhere(change: TrueChange) -> bool:
     """Return whether the object stands somewhere now where an entry of its old place is not right."""
     if change.after is None:
         return False

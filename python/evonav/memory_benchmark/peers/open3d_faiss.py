@@ -45,7 +45,7 @@ class Cloud:
 
 
 @dataclass
-class _Entry:
+class _CloudEntry:
     """A remembered object."""
 
     entry_id: int
@@ -117,7 +117,7 @@ class Open3DFaissMemory:
         self._start()
 
     def _start(self) -> None:
-        self._entries: list[_Entry] = []
+        self._entries: list[_CloudEntry] = []
         self._num_views = self._next_id = 0
         self.entry_ids: list[int | None] = []
         """Entry of each detection of the last frame; `None` where it was filtered out."""
@@ -140,7 +140,7 @@ class Open3DFaissMemory:
                 continue
             if match is None:
                 labels = Counter([detection.label])
-                self._entries.append(_Entry(self._next_id, detection, labels, frame.time_s, frame.time_s))
+                self._entries.append(_CloudEntry(self._next_id, detection, labels, frame.time_s, frame.time_s))
                 self._next_id += 1
                 self.entry_ids.append(self._entries[-1].entry_id)
                 continue
@@ -176,7 +176,7 @@ class Open3DFaissMemory:
                     break
         self._entries = [entry for number, entry in enumerate(remaining) if number not in gone]
 
-    def _absorb(self, entry: _Entry, other: _Entry) -> None:
+    def _absorb(self, entry: _CloudEntry, other: _CloudEntry) -> None:
         entry.cloud = merged(entry.cloud, other.cloud, self.config)
         entry.labels += other.labels
         entry.num += other.num

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M
-from evonav.memory_benchmark.truth import Change, ChangeKind
+from evonav.memory_benchmark.truth import ChangeKind, TrueChange
 from evonav.perception.ground_truth import DETECTED_KINDS
 from evonav.sensors.observation import Detections
 from evonav.world.camera import camera_axes, project
@@ -37,7 +37,7 @@ def objects_of(bodies: Bodies) -> tuple[SceneObject, ...]:
 
 def changes_between(
     before: Bodies, after: Bodies, positions_m: Sequence[Mapping[str, tuple[float, float, float]]], frame: int
-) -> list[Change]:
+) -> list[TrueChange]:
     """Return what moved, vanished and appeared from one arrangement to the next, in the order of the objects.
 
     Opening a fridge changes its box, too, and is no change: what counts is the position in the house's file.
@@ -58,7 +58,7 @@ def changes_between(
             kind = "removed" if new is None else "added"
         body = new or old
         assert body is not None
-        found.append(Change(object_id, body.category, kind, frame, old, new))
+        found.append(TrueChange(object_id, body.category, kind, frame, old, new))
     return found
 
 

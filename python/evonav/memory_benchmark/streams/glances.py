@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evonav._core import House
 from evonav.memory_benchmark.streams.evidence import num_looks_through
-from evonav.memory_benchmark.streams.plan import Plan
+from evonav.memory_benchmark.streams.plan import StreamPlan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
 from evonav.memory_benchmark.streams.spec import StreamSpec
 from evonav.memory_benchmark.streams.visits import visits
@@ -41,7 +41,7 @@ class _Look:
     """Whether it shows at least `EVIDENT_PX` pixels of the place."""
 
 
-def glances(spec: StreamSpec, house: House) -> Plan:
+def glances(spec: StreamSpec, house: House) -> StreamPlan:
     """Plan visits as `visits`, and leave out frames so that no changed place is in more than `MAX_GLANCES` of a visit.
 
     A changed place is the old box of an object that has gone, until it is taken, and an object that has moved or is

@@ -6,7 +6,7 @@ from itertools import cycle, islice
 from evonav._core import House
 from evonav.house.files import stream_houses
 from evonav.memory_benchmark.streams.evidence import visible_px
-from evonav.memory_benchmark.streams.plan import Plan, Scene
+from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import MIN_ROOMS, StreamSpec, source_of
 from evonav.memory_benchmark.streams.visits import Frames, walk_in
 from evonav.memory_benchmark.streams.walk import generator_of
@@ -35,12 +35,12 @@ def growth_houses(spec: StreamSpec, first: House) -> list[House]:
     return [first, *(others[index] for index in order)]
 
 
-def growth(spec: StreamSpec, houses: list[House]) -> Plan:
+def growth(spec: StreamSpec, houses: list[House]) -> StreamPlan:
     """Plan one long visit that goes from house to house, from the first again after the last.
 
     An object is seen at the first frame in which ground-truth perception reports it in the range of evidence.
     """
-    frames, scenes, seen = Frames(), list[Scene](), set[str]()
+    frames, scenes, seen = Frames(), list[PlannedScene](), set[str]()
     goals = sorted({goal for goal in CHECKPOINTS if goal < spec.max_objects} | {spec.max_objects})
     checkpoints: list[tuple[int, int]] = []
     right_m = 0.0
@@ -49,7 +49,7 @@ def growth(spec: StreamSpec, houses: list[House]) -> Plan:
         house_json = house.to_json()
         simulator.reset(house_json)
         left_m, end_m = _extent_m(simulator.objects)
-        scenes.append(Scene(house_json, (right_m - left_m, 0.0), f"{number}/"))
+        scenes.append(PlannedScene(house_json, (right_m - left_m, 0.0), f"{number}/"))
         right_m += end_m - left_m + GAP_M
         for pose in islice(walk_in(spec, house_json, None, f"house {number}"), spec.frames_a_visit):
             frames.add(number, 1, [pose])

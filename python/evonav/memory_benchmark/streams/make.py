@@ -7,7 +7,7 @@ from evonav._core import House
 from evonav.memory_benchmark.streams.glances import glances
 from evonav.memory_benchmark.streams.growth import growth, growth_houses
 from evonav.memory_benchmark.streams.live import live
-from evonav.memory_benchmark.streams.plan import Plan, cached_plan
+from evonav.memory_benchmark.streams.plan import StreamPlan, cached_plan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
 from evonav.memory_benchmark.streams.spec import StreamSpec, read_house
 from evonav.memory_benchmark.streams.visits import visits
@@ -26,7 +26,7 @@ def make_stream(spec: StreamSpec, *, rgb: bool = False) -> RenderedStream:
     return RenderedStream(spec, plan_of(spec), rgb=rgb)
 
 
-def plan_of(spec: StreamSpec) -> Plan:
+def plan_of(spec: StreamSpec) -> StreamPlan:
     """Return a stream's plan, from the cache folder if it is there.
 
     Raises:
@@ -40,7 +40,7 @@ def plan_of(spec: StreamSpec) -> Plan:
     return cached_plan({"spec": decides, "houses": digests}, lambda: make_plan(spec, house))
 
 
-def make_plan(spec: StreamSpec, house: House) -> Plan:
+def make_plan(spec: StreamSpec, house: House) -> StreamPlan:
     """Make the plan of a stream that begins in a house, without the cache.
 
     Raises:

@@ -26,7 +26,7 @@ PLAN_VERSION = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class PlannedScene:
     """A house as it is for a part of the stream."""
 
     house_json: str
@@ -37,10 +37,10 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class StreamPlan:
     """All frames of a stream, not rendered yet."""
 
-    scenes: tuple[Scene, ...]
+    scenes: tuple[PlannedScene, ...]
     frame_scenes: NDArray[np.int64]
     """`(F,)` index of the scene of each frame."""
     visits: NDArray[np.int64]
@@ -67,7 +67,7 @@ class Plan:
         return lzma.compress(json.dumps(values).encode(), preset=1)
 
     @staticmethod
-    def from_bytes(data: bytes) -> "Plan":
+    def from_bytes(data: bytes) -> "StreamPlan":
         """Read what `to_bytes` wrote.
 
         Raises:
@@ -76,10 +76,10 @@ class Plan:
         try:
             values = json.loads(lzma.decompress(data))
             scenes = tuple(
-                Scene(one["house_json"], (one["offset_m"][0], one["offset_m"][1]), one["prefix"])
+                PlannedScene(one["house_json"], (one["offset_m"][0], one["offset_m"][1]), one["prefix"])
                 for one in values["scenes"]
             )
-            return Plan(
+            return StreamPlan(
                 scenes,
                 np.array(values["frame_scenes"], np.int64),
                 np.array(values["visits"], np.int64),
@@ -96,7 +96,7 @@ def plan_folder() -> Path:
     return cache_folder() / "streams"
 
 
-def cached_plan(decides: Mapping[str, Any], make: Callable[[], Plan]) -> Plan:
+def cached_plan(decides: Mapping[str, Any], make: Callable[[], StreamPlan]) -> StreamPlan:
     """Return the plan with this hash from the cache folder, or make it and store it there.
 
     A cache folder that cannot be written, and a damaged file, only cost time.
@@ -107,7 +107,7 @@ def cached_plan(decides: Mapping[str, Any], make: Callable[[], Plan]) -> Plan:
     text = json.dumps({"plan": PLAN_VERSION, "evonav": __version__, **decides}, sort_keys=True)
     path = plan_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.json.xz"
     with suppress(OSError, ValueError):
-        return Plan.from_bytes(path.read_bytes())
+        return StreamPlan.from_bytes(path.read_bytes())
     plan = make()
     with suppress(OSError, EvonavError):
         write_atomically(path, plan.to_bytes())

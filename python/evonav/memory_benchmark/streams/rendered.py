@@ -16,9 +16,9 @@ from evonav.memory_benchmark.streams.evidence import (
     objects_of,
     visible_px,
 )
-from evonav.memory_benchmark.streams.plan import Plan, Scene
+from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import RATE_HZ, StreamSpec
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.perception import Perception, StageScene
 from evonav.perception.shorthand import read_word
 from evonav.sensors.observation import View, VisibleOccupancy
@@ -50,7 +50,7 @@ class RenderedStream:
     has_truth = True
     """Always true; streams in files may lack their truth."""
 
-    def __init__(self, spec: StreamSpec, plan: Plan, *, rgb: bool = False) -> None:
+    def __init__(self, spec: StreamSpec, plan: StreamPlan, *, rgb: bool = False) -> None:
         """Make a stream; nothing is rendered yet.
 
         Args:
@@ -91,12 +91,12 @@ class RenderedStream:
         return self.plan.checkpoints
 
     @property
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[TrueChange]:
         """All changes, in the order of time."""
         return self._world[1]
 
     @cached_property
-    def _world(self) -> tuple[list[_Bodies], tuple[Change, ...]]:
+    def _world(self) -> tuple[list[_Bodies], tuple[TrueChange, ...]]:
         """Bodies of every scene, and all changes; computed once."""
         simulator, scenes = self._simulator(), self.plan.scenes
         bodies = []
@@ -110,7 +110,7 @@ class RenderedStream:
         positions_m = [
             {item.id: item.position_m for item in House(scene.house_json, name=self.name).objects} for scene in scenes
         ]
-        changes: list[Change] = []
+        changes: list[TrueChange] = []
         vacated: list[list[tuple[int, SceneObject]]] = [[] for _ in scenes]
         for number in range(1, len(scenes)):
             first = int(np.searchsorted(self.plan.frame_scenes, number))
@@ -182,7 +182,7 @@ class RenderedStream:
         return StageScene(task_id, goal, "fu", self.spec.seed, bodies)
 
 
-def placed(body: SceneObject, scene: Scene) -> SceneObject:
+def placed(body: SceneObject, scene: PlannedScene) -> SceneObject:
     """Return a body of a scene's house where it stands in the stream's world, with its id there."""
     (x_m, y_m, z_m), (by_x_m, by_z_m) = body.centre_m, scene.offset_m
     if not scene.prefix and scene.offset_m == (0.0, 0.0):
@@ -190,7 +190,7 @@ def placed(body: SceneObject, scene: Scene) -> SceneObject:
     return replace(body, id=scene.prefix + body.id, centre_m=(x_m + by_x_m, y_m, z_m + by_z_m))
 
 
-def moved(frame: Frame, scene: Scene) -> Frame:
+def moved(frame: Frame, scene: PlannedScene) -> Frame:
     """Return a frame of a scene's house with its pose in the stream's world."""
     if scene.offset_m == (0.0, 0.0):
         return frame

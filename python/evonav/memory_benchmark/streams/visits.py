@@ -8,7 +8,7 @@ import numpy as np
 
 from evonav._core import House
 from evonav.memory_benchmark.streams.evolution import HOURS_BETWEEN_VISITS, houses_of_visits
-from evonav.memory_benchmark.streams.plan import Plan, Scene
+from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import RATE_HZ, Kind, StreamSpec
 from evonav.memory_benchmark.streams.walk import generator_of, walk
 from evonav.world.embedded import EmbeddedSimulator
@@ -38,9 +38,9 @@ class Frames:
             self.times_s.append(time_s)
             self.poses.append((pose.x_m, pose.z_m, pose.yaw_rad, pose.horizon_rad))
 
-    def plan(self, scenes: Iterable[Scene], checkpoints: tuple[tuple[int, int], ...] = ()) -> Plan:
+    def plan(self, scenes: Iterable[PlannedScene], checkpoints: tuple[tuple[int, int], ...] = ()) -> StreamPlan:
         """Return the plan of these frames."""
-        return Plan(
+        return StreamPlan(
             tuple(scenes),
             np.array(self.scenes, np.int64),
             np.array(self.visits, np.int64),
@@ -50,7 +50,7 @@ class Frames:
         )
 
 
-def visits(spec: StreamSpec, house: House) -> Plan:
+def visits(spec: StreamSpec, house: House) -> StreamPlan:
     """Plan one visit of each arrangement of the house; each begins where the last one ended, or near it."""
     kind: Kind = "S2" if spec.kind == "S8" else spec.kind
     houses = houses_of_visits(kind, house, spec.seed, allow_unknown_assets=spec.allow_unknown_assets)
@@ -59,7 +59,7 @@ def visits(spec: StreamSpec, house: House) -> Plan:
         poses = list(islice(walk_in(spec, house_json, at, f"visit {number + 1}"), spec.frames_a_visit))
         frames.add(number, number + 1, poses)
         at = poses[-1]
-    return frames.plan(Scene(house_json) for house_json in houses)
+    return frames.plan(PlannedScene(house_json) for house_json in houses)
 
 
 def walk_in(spec: StreamSpec, house_json: str, at: Pose | None, name: str) -> Iterator[Pose]:

@@ -42,7 +42,7 @@ _EPSILON = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Boxes:
+class CocoBoxes:
     """Boxes that the network finds in one image, the most confident first."""
 
     boxes_px: Array
@@ -92,7 +92,7 @@ class YoloV4Tiny:
 
     def detect(
         self, rgb: NDArray[np.uint8], *, side_px: int = 608, min_confidence: float = 0.1, max_iou: float = 0.45
-    ) -> Boxes:
+    ) -> CocoBoxes:
         """Detect objects.
 
         Args:
@@ -111,7 +111,7 @@ class YoloV4Tiny:
         remaining = _without_doubles(boxes, classes, confidences, max_iou)
         size_px = np.array([rgb.shape[1], rgb.shape[0]] * 2, np.float32)
         inside = np.clip(boxes[remaining], 0.0, 1.0) * size_px
-        return Boxes(inside.astype(np.float32), classes[remaining], confidences[remaining])
+        return CocoBoxes(inside.astype(np.float32), classes[remaining], confidences[remaining])
 
     def _outputs(self, image: Array) -> tuple[Array, Array]:
         """Return what the two heads say: `(255, H, W)` at a 32nd and at a 16th of the image's size."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
-from evonav.memory_benchmark.truth import Change
+from evonav.memory_benchmark.truth import TrueChange
 from evonav.tasks.records import Record
 from evonav.world.simulator import SceneObject
 
@@ -19,7 +19,7 @@ WORLD = "right-handed, metres, z up: X = x, Y = z, Z = y of evonav; OpenCV's cam
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class FileLayout:
     """The names of a layout's files, and its unit of depth."""
 
     rgb: str
@@ -33,9 +33,9 @@ class Layout:
         return tuple(dict.fromkeys(str(Path(name).parent) for name in (self.rgb, self.depth, MASKS)))
 
 
-LAYOUTS: dict[LayoutName, Layout] = {
-    "tum": Layout("rgb/{:06d}.png", "depth/{:06d}.png", 5000.0),
-    "replica": Layout("results/frame{:06d}.jpg", "results/depth{:06d}.png", 6553.5),
+LAYOUTS: dict[LayoutName, FileLayout] = {
+    "tum": FileLayout("rgb/{:06d}.png", "depth/{:06d}.png", 5000.0),
+    "replica": FileLayout("results/frame{:06d}.jpg", "results/depth{:06d}.png", 6553.5),
 }
 """TUM RGB-D's layout and unit; those of the rendered Replica that NICE-SLAM, ConceptGraphs and HOV-SG read."""
 MASKS = "masks/{:06d}.png"
@@ -44,7 +44,7 @@ FEATURES = "features/{:06d}.npy"
 Vector = tuple[float, float, float]
 
 
-class Camera(Record):
+class LayoutCamera(Record):
     """A pinhole camera: (0, 0) is the centre of the first pixel, as OpenCV counts."""
 
     w: PositiveInt
@@ -70,7 +70,7 @@ class StreamFile(Record):
     has_rgb: bool
     rate_hz: PositiveFloat
     depth_scale: PositiveFloat
-    camera: Camera
+    camera: LayoutCamera
     world: str = WORLD
     labels: tuple[str, ...]
 
@@ -121,7 +121,7 @@ class ChangeLine(Record):
     after: ObjectLine | None
 
     @staticmethod
-    def of(change: Change) -> "ChangeLine":
+    def of(change: TrueChange) -> "ChangeLine":
         """Return the line of a change."""
         return ChangeLine(
             object_id=change.object_id,
@@ -132,11 +132,11 @@ class ChangeLine(Record):
             after=None if change.after is None else ObjectLine.of(change.after),
         )
 
-    def change(self) -> Change:
+    def change(self) -> TrueChange:
         """Return the change."""
         before = None if self.before is None else self.before.object()
         after = None if self.after is None else self.after.object()
-        return Change(self.object_id, self.label, self.kind, self.frame, before, after)
+        return TrueChange(self.object_id, self.label, self.kind, self.frame, before, after)
 
 
 class OracleHead(Record):

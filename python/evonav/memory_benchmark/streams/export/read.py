@@ -22,7 +22,7 @@ from evonav.memory_benchmark.streams.export.layouts import (
     TruthLine,
 )
 from evonav.memory_benchmark.streams.rendered import NO_OCCUPANCY
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.sensors.observation import Detections, View
 from evonav.tasks.records import Record
 from evonav.world.pose import Pose
@@ -96,7 +96,7 @@ class ExportedStream:
         return _record(OracleHead, self._oracle, next(_oracle_lines(self._oracle), ""))
 
     @property
-    def changes(self) -> Sequence[Change]:
+    def changes(self) -> Sequence[TrueChange]:
         """All changes, in the order of time; none without the truth."""
         return () if self._head is None else tuple(one.change() for one in self._head.changes)
 

@@ -21,7 +21,7 @@ from evonav.memory_benchmark.streams.export.conversion import UpAxis, pose_of, r
 from evonav.memory_benchmark.streams.export.layouts import FRAMES_FILE, LAYOUTS, FrameLine
 from evonav.memory_benchmark.streams.export.read import no_truth, read_detections, read_frame_lines
 from evonav.memory_benchmark.streams.rendered import NO_OCCUPANCY
-from evonav.memory_benchmark.truth import Change, FrameTruth
+from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.sensors.observation import Detections, View
 from evonav.tasks.records import Record
 from evonav.world.pose import Pose
@@ -97,7 +97,7 @@ class Recording:
 
     kind = "recording"
     has_truth = False
-    changes: Sequence[Change] = ()
+    changes: Sequence[TrueChange] = ()
 
     def __init__(self, folder: Path, up: UpAxis = "z") -> None:
         """Read all but the images; see `read_recording`."""

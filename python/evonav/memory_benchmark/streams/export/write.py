@@ -18,10 +18,10 @@ from evonav.memory_benchmark.streams.export.layouts import (
     MASKS,
     ORACLE_FILE,
     STREAM_FILE,
-    Camera,
     ChangeLine,
+    FileLayout,
     FrameLine,
-    Layout,
+    LayoutCamera,
     LayoutName,
     ObjectLine,
     OracleHead,
@@ -68,7 +68,7 @@ class _Writer:
     def __init__(self, stream: Stream, folder: Path, layout: LayoutName, oracle: Path) -> None:
         self.stream, self.folder, self.oracle = stream, folder, oracle
         self.layout_name: LayoutName = layout
-        self.layout: Layout = LAYOUTS[layout]
+        self.layout: FileLayout = LAYOUTS[layout]
         self.lines: list[FrameLine] = []
         self.truths: list[TruthLine] = []
         self.matrices: list[np.ndarray] = []
@@ -96,7 +96,7 @@ class _Writer:
             has_rgb=bool(self.lines) and self.lines[0].rgb is not None,
             rate_hz=info.rate_hz,
             depth_scale=self.layout.depth_scale,
-            camera=Camera.model_validate(camera),
+            camera=LayoutCamera.model_validate(camera),
             labels=info.labels,
         )
         changes = tuple(map(ChangeLine.of, self.stream.changes))
