@@ -8,8 +8,7 @@ A memory has these four methods. It may also have `locate(text, k)` and `num_byt
 import math
 from dataclasses import replace
 
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import MemoryEntry
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, StreamInfo
 from evonav.world.camera import unproject
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import MemoryEntry
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose

@@ -7,12 +7,11 @@ import pytest
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.benchmark import NamedMemory, benchmark, record_path
-from evonav.memory_benchmark.memories import MEMORIES, PEERS, named_memories
-from evonav.memory_benchmark.results.page import write_memory_report
-from evonav.memory_benchmark.results.tables import memory_tables, scores, text_of
+from evonav.memory_benchmark.benchmark import MEMORIES, PEERS, NamedMemory, benchmark, named_memories, record_path
+from evonav.memory_benchmark.report import write_memory_report
 from evonav.memory_benchmark.run import MeasureSettings
 from evonav.memory_benchmark.streams import StreamSpec
+from evonav.memory_benchmark.tables import memory_tables, scores, text_of
 from evonav.statistics import Estimate
 
 SPECS = [StreamSpec("S1", f"bundled:{number}", 0, 64, 48, frames_a_visit=30) for number in (4, 9)]

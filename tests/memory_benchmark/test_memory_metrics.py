@@ -10,12 +10,10 @@ from hypothesis import strategies as st
 
 from evonav.evaluation.episode.staleness import matched_object
 from evonav.memory_benchmark.metrics.belief import BeliefSums, calibration_error
-from evonav.memory_benchmark.metrics.change_f1 import BeliefSnapshot, ChangeCounts, change_counts
-from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
-from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
-from evonav.memory_benchmark.metrics.size import byte_note, growth_per_minute
-from evonav.memory_benchmark.metrics.speed import (
+from evonav.memory_benchmark.metrics.costs import (
     Sample,
+    byte_note,
+    growth_per_minute,
     percentiles,
     real_time_factor,
     slope_per_100_entries,
@@ -23,7 +21,10 @@ from evonav.memory_benchmark.metrics.speed import (
     theil_sen,
     thinned,
 )
+from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
+from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
 from evonav.memory_benchmark.metrics.staleness import kaplan_meier
+from evonav.memory_benchmark.metrics.updates import BeliefSnapshot, ChangeCounts, change_counts
 from evonav.memory_benchmark.protocol import Place
 from evonav.world.simulator import SceneObject
 

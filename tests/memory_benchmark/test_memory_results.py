@@ -8,13 +8,11 @@ from pathlib import Path
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.figures import METRICS, estimates, ratios
-from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
+from evonav.memory_benchmark.aggregate import METRICS, estimates, ratios
+from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts
-from evonav.memory_benchmark.metrics.size import Size
-from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
-from evonav.memory_benchmark.metrics.update import UpdateCounts
+from evonav.memory_benchmark.metrics.updates import ChangeCounts, UpdateCounts
 from evonav.memory_benchmark.records import (
     BeliefScore,
     BenchmarkResult,
@@ -26,7 +24,8 @@ from evonav.memory_benchmark.records import (
     read_result,
     write_result,
 )
-from evonav.memory_benchmark.regression import Difference, against
+from evonav.memory_benchmark.regression import against
+from evonav.statistics import BeforeAfter
 
 HOUSES = ("a", "b", "c", "d", "e", "f")
 COUNTS = UpdateCounts(
@@ -180,12 +179,12 @@ def test_files_that_are_no_results(tmp_path: Path) -> None:
         write_result(result(), tmp_path / "missing" / "result.json")
 
 
-def compared(now: list[StreamResult], before: list[StreamResult], scale: float = 1.0) -> dict[str, Difference]:
+def compared(now: list[StreamResult], before: list[StreamResult], scale: float = 1.0) -> dict[str, BeforeAfter]:
     """Compare two results; the machine of the new one is `scale` times slower."""
     never = memory("never", [stream(house) for house in HOUSES])
     slower = memory("never", [stream(house, ms=scale) for house in HOUSES])
     differences = against(result(slower, memory("mine", now)), result(never, memory("mine", before)))
-    return {one.figure: one for one in differences if one.memory == "mine"}
+    return {one.name.removeprefix("mine: "): one for one in differences if one.name.startswith("mine: ")}
 
 
 def test_nothing_is_worse_than_itself() -> None:

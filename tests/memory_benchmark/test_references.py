@@ -8,8 +8,8 @@ import pytest
 
 import evonav
 from evonav.errors import InvalidArgumentError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.memories import MEMORIES
+from evonav.memory_benchmark.benchmark import MEMORIES
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.references import NumpyList, ObjectMapMemory
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose

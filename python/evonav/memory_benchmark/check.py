@@ -9,8 +9,8 @@ import numpy as np
 from evonav.counted import counted
 from evonav.evaluation.contract.points import Check
 from evonav.memory_benchmark.answers import MemoryFailedError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import LocalMemory
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import HostedMemory, MeasureSettings, MemorySource, host, measure
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange

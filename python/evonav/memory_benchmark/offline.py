@@ -9,9 +9,8 @@ from pydantic.dataclasses import dataclass
 
 from evonav.errors import StoreError
 from evonav.memory_benchmark.answers import MAX_SHOWN, CheckedEntries, Hosting, MemoryFailedError, read_entries
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
-from evonav.memory_benchmark.protocol import MemoryEntry, Place
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, judge_memories
 from evonav.memory_benchmark.truth import Stream

@@ -8,11 +8,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.answers import FailureKind, Hosting
+from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
-from evonav.memory_benchmark.metrics.size import Size
-from evonav.memory_benchmark.metrics.speed import Percentiles, Sample
 from evonav.memory_benchmark.metrics.staleness import Spell
-from evonav.memory_benchmark.metrics.update import UpdateCounts
+from evonav.memory_benchmark.metrics.updates import UpdateCounts
 
 SCHEMA_VERSION: Literal[1] = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""

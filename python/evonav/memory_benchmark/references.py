@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from evonav.memory import forgetting
 from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import MemoryEntry, Place, Point3
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, Point3, StreamInfo
 from evonav.world.camera import unproject
 
 SEEN_BYTES = 150

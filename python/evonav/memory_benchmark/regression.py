@@ -1,33 +1,17 @@
 """Compare two results: which figures are worse than before, beyond what the houses explain."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from evonav.memory_benchmark.figures import BASELINE, METRICS, bootstrap_of, paired, ratios
+from evonav.memory_benchmark.aggregate import BASELINE, METRICS, bootstrap_of, paired, ratios
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult
-from evonav.statistics import Estimate, Interval
+from evonav.statistics import BeforeAfter, Estimate
 
 TIME_TOLERANCE = 1.25
 """Factor up to which a time is not worse: machines and days differ by so much, also relative to the baseline."""
 _EPSILON = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """One figure of one memory, before and now, over the streams of both results."""
-
-    memory: str
-    figure: str
-    """Name of the figure; times and sizes that depend on the machine are divided by the baseline's in the same run."""
-    before: float
-    now: float
-    ci95: Interval | None
-    """Interval of the difference over houses; `None` where they all agree, or there are fewer than two."""
-    is_worse: bool
-    is_better: bool
-
-
-def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASELINE) -> list[Difference]:
+def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASELINE) -> list[BeforeAfter]:
     """Compare a result with an earlier one, memory by memory.
 
     A figure is worse if the interval of its difference lies on the bad side of zero. A time counts only relative to the
@@ -41,62 +25,62 @@ def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASEL
     """
     earlier = {result.memory: result for result in before.memories}
     bases = [next((one for one in result.memories if one.memory == baseline), None) for result in (now, before)]
-    differences: list[Difference] = []
+    found: list[BeforeAfter] = []
     for result in now.memories:
         if (old := earlier.get(result.memory)) is None:
             continue
-        differences += _failures(result, old)
-        differences += _figures(result, old)
+        found += _failures(result, old)
+        found += _figures(result, old)
         if bases[0] is not None and bases[1] is not None and result.memory != baseline:
-            differences += _times(result, old, bases[0], bases[1])
-    return differences
+            found += _times(result, old, bases[0], bases[1])
+    return found
 
 
-def _failures(now: MemoryResult, before: MemoryResult) -> Iterator[Difference]:
+def _failures(now: MemoryResult, before: MemoryResult) -> Iterator[BeforeAfter]:
     names = {stream.stream for stream in now.streams} & {stream.stream for stream in before.streams}
     counts = [sum(stream.stream in names for stream in result.failures) for result in (before, now)]
     old, new = counts
-    yield Difference(now.memory, "failed_streams", old, new, None, is_worse=new > old, is_better=new < old)
+    yield BeforeAfter(f"{now.memory}: failed_streams", old, new, new > old, new < old)
 
 
-def _figures(now: MemoryResult, before: MemoryResult) -> Iterator[Difference]:
+def _figures(now: MemoryResult, before: MemoryResult) -> Iterator[BeforeAfter]:
     ours, theirs = paired(now.streams, before.streams)
     if not ours:
         return
     bootstrap = bootstrap_of(ours)
-    for figure in METRICS:
-        if figure.is_time:
+    for metric in METRICS:
+        if metric.is_time:
             continue
-        new, old = figure.estimate(ours, bootstrap), figure.estimate(theirs, bootstrap)
+        new, old = metric.estimate(ours, bootstrap), metric.estimate(theirs, bootstrap)
         if new.value is not None and old.value is not None:
-            yield _difference(now.memory, figure.name, new, old, is_lower_better=figure.better == "lower")
+            yield _difference(now.memory, metric.name, new, old, is_lower_better=metric.better == "lower")
 
 
 def _times(
     now: MemoryResult, before: MemoryResult, base_now: MemoryResult, base_before: MemoryResult
-) -> Iterator[Difference]:
+) -> Iterator[BeforeAfter]:
     ours, theirs = paired(now.streams, before.streams)
     new_ratios = ratios(now.model_copy(update={"streams": tuple(ours)}), base_now)
     old_ratios = ratios(before.model_copy(update={"streams": tuple(theirs)}), base_before)
-    for figure in METRICS:
-        if not figure.is_time or figure.name not in new_ratios or figure.name not in old_ratios:
+    for metric in METRICS:
+        if not metric.is_time or metric.name not in new_ratios or metric.name not in old_ratios:
             continue
-        new, old = new_ratios[figure.name], old_ratios[figure.name]
+        new, old = new_ratios[metric.name], old_ratios[metric.name]
         assert new.value is not None
         assert old.value is not None
         is_large = max(new.value, old.value) > TIME_TOLERANCE * min(new.value, old.value)
-        yield _difference(now.memory, figure.name, new, old, is_lower_better=True, is_large=is_large)
+        yield _difference(now.memory, metric.name, new, old, is_lower_better=True, is_large=is_large)
 
 
 def _difference(
     memory: str, name: str, new: Estimate, old: Estimate, *, is_lower_better: bool, is_large: bool = True
-) -> Difference:
+) -> BeforeAfter:
     assert new.value is not None
     assert old.value is not None
     if new.value == old.value:  # also of two infinite ones
-        return Difference(memory, name, old.value, new.value, None, is_worse=False, is_better=False)
+        return BeforeAfter(f"{memory}: {name}", old.value, new.value, is_worse=False)
     ci95 = new.minus(old).ci95
     low, high = ci95 if ci95 is not None else (new.value - old.value,) * 2
     is_up, is_down = is_large and low > _EPSILON, is_large and high < -_EPSILON
     is_worse, is_better = (is_up, is_down) if is_lower_better else (is_down, is_up)
-    return Difference(memory, name, old.value, new.value, ci95, is_worse=is_worse, is_better=is_better)
+    return BeforeAfter(f"{memory}: {name}", old.value, new.value, is_worse, is_better, ci95)

@@ -12,14 +12,13 @@ import numpy as np
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import CheckedEntries, Hosting, MemoryFailedError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost, LocalMemory
 from evonav.memory_benchmark.hosting.process import RemoteMemory
-from evonav.memory_benchmark.judge import Judge
-from evonav.memory_benchmark.metrics import size, speed
+from evonav.memory_benchmark.metrics import costs
 from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
-from evonav.memory_benchmark.protocol import Memory, Place
+from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
 from evonav.memory_benchmark.records import BeliefScore, MemoryFailure, Speed, StreamResult
+from evonav.memory_benchmark.scoring import Judge
 from evonav.memory_benchmark.truth import FrameTruth, Stream
 
 NUM_WARM_UP = 20
@@ -242,7 +241,7 @@ class _StreamRun:
                 self._times.frames.append(self._num_frames)
                 self._times.num_entries.append(self._num_entries)
                 if memory.rss_bytes is not None:
-                    self._times.rss_mb.append(memory.rss_bytes / size.MB)
+                    self._times.rss_mb.append(memory.rss_bytes / costs.MB)
 
     def result(self) -> StreamResult:
         """End the stream."""
@@ -292,7 +291,7 @@ class _StreamRun:
         update, spells = self._judge.end()
         sums, queries = self._judge.belief, self._judge.queries.of_state
         its_size = self._size(num_bytes, memory)
-        notes = [size.byte_note(num_bytes, its_size.rss_growth_mb)]
+        notes = [costs.byte_note(num_bytes, its_size.rss_growth_mb)]
         notes += [] if self._stream.has_truth or self._detected else [NO_DETECTIONS]
         fixed = {
             "notes": tuple(note for note in notes if note is not None),
@@ -314,38 +313,38 @@ class _StreamRun:
 
     def _speed(self) -> Speed | None:
         times = self._times
-        wall = speed.percentiles([cost.wall_s for cost in times.observe])
+        wall = costs.percentiles([cost.wall_s for cost in times.observe])
         if wall is None:
             return None
         cpu_s = _known(cost.cpu_s for cost in times.observe)
         seconds = cpu_s or [cost.wall_s for cost in times.observe]
         times_ms = np.array(seconds) * 1e3
-        samples = speed.thinned(times.frames, times.num_entries, times_ms)
+        samples = costs.thinned(times.frames, times.num_entries, times_ms)
         return Speed(
-            observe_cpu=speed.percentiles(cpu_s),
+            observe_cpu=costs.percentiles(cpu_s),
             observe_wall=wall,
-            locate_cpu=speed.percentiles(_known(cost.cpu_s for cost in times.locate)),
-            locate_wall=speed.percentiles([cost.wall_s for cost in times.locate]),
+            locate_cpu=costs.percentiles(_known(cost.cpu_s for cost in times.locate)),
+            locate_wall=costs.percentiles([cost.wall_s for cost in times.locate]),
             visit_wall_max_ms=max((cost.wall_s * 1e3 for cost in times.visit if cost is not None), default=None),
-            real_time_factor=speed.real_time_factor(wall.mean_ms / 1e3, self._stream.info.rate_hz),
-            slope_per_100_entries_ms=speed.slope_per_100_entries(samples),
-            slope_per_1000_frames_ms=speed.slope_per_1000_frames(samples),
-            samples=tuple(speed.thinned(times.frames, times.num_entries, times_ms, speed.NUM_STORED)),
+            real_time_factor=costs.real_time_factor(wall.mean_ms / 1e3, self._stream.info.rate_hz),
+            slope_per_100_entries_ms=costs.slope_per_100_entries(samples),
+            slope_per_1000_frames_ms=costs.slope_per_1000_frames(samples),
+            samples=tuple(costs.thinned(times.frames, times.num_entries, times_ms, costs.NUM_STORED)),
         )
 
-    def _size(self, num_bytes: int | None, memory: HostedMemory) -> size.Size:
+    def _size(self, num_bytes: int | None, memory: HostedMemory) -> costs.Size:
         rss_mb, growth = self._times.rss_mb, None
         if rss_mb:
             minutes = np.array(self._times.frames) / (60.0 * self._stream.info.rate_hz)
-            growth = size.growth_per_minute(minutes, np.array(rss_mb))
+            growth = costs.growth_per_minute(minutes, np.array(rss_mb))
         peak = memory.peak_rss_bytes
-        return size.Size(
+        return costs.Size(
             num_entries=self._num_entries,
             num_bytes=num_bytes,
             bytes_per_entry=num_bytes / self._num_entries if num_bytes is not None and self._num_entries else None,
             rss_growth_mb_per_minute=growth,
             rss_growth_mb=rss_mb[-1] - rss_mb[0] if rss_mb else None,
-            peak_rss_mb=None if peak is None else peak / size.MB,
+            peak_rss_mb=None if peak is None else peak / costs.MB,
         )
 
     def _record(self, **parts: object) -> StreamResult:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.world.simulator import SceneObject
 
 Point3 = tuple[float, float, float]

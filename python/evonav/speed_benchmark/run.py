@@ -1,7 +1,10 @@
 """Run a section and show its figures: as a table, as Markdown, and beside those of an earlier run."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
+
+import numpy as np
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
@@ -9,9 +12,12 @@ from evonav.report.machine import machine_name
 from evonav.report.tables.numbers import NONE
 from evonav.report.tables.table import Table
 from evonav.speed_benchmark.records import Row, Speeds
-from evonav.speed_benchmark.regression import Change, Figure, changes
 from evonav.speed_benchmark.timing import Sampling
-from evonav.statistics import Interval
+from evonav.statistics import BeforeAfter, ClusterBootstrap, Interval
+
+FACTOR = 1.25
+"""Growth of a time from which on it counts as worse."""
+NUM_RESAMPLES = 2000
 
 
 class Section(Protocol):
@@ -24,6 +30,15 @@ class Section(Protocol):
     """Description of the measurement, in Markdown."""
     measure: Callable[..., Iterator[Row]]
     """Takes a `Sampling` and the section's own options."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """One time of a run, or its ratio to a peer's."""
+
+    value: float
+    by_house: Mapping[str, float] = field(default_factory=dict)
+    """The same number of each house alone, where it is known."""
 
 
 def run_section(
@@ -92,7 +107,7 @@ def markdown_of(speeds: Speeds) -> str:
     return f"# {speeds.title}\n{speeds.notes.strip()}\n\n{table_of(speeds).markdown()}"
 
 
-def against(before: Speeds, now: Speeds) -> list[Change]:
+def against(before: Speeds, now: Speeds) -> list[BeforeAfter]:
     """Compare a run with an earlier one, row by row.
 
     On another machine, times are compared as multiples of the peers', and rows without a peer are left out.
@@ -106,13 +121,13 @@ def against(before: Speeds, now: Speeds) -> list[Change]:
     return changes(_figures(before, is_same=is_same), _figures(now, is_same=is_same))
 
 
-def _figures(speeds: Speeds, *, is_same: bool) -> dict[str, Figure]:
+def _figures(speeds: Speeds, *, is_same: bool) -> dict[str, Timing]:
     found = {}
     for row in speeds.rows:
         if is_same:
-            found[f"{row.operation}, ms"] = Figure(row.ms, row.ms_by_house)
+            found[f"{row.operation}, ms"] = Timing(row.ms, row.ms_by_house)
         elif row.ratio:
-            found[f"{row.operation}, over {row.peer}"] = Figure(1 / row.ratio)
+            found[f"{row.operation}, over {row.peer}"] = Timing(1 / row.ratio)
     return found
 
 
@@ -122,3 +137,33 @@ def _number(value: float | None) -> str:
 
 def _interval(ends: Interval | None) -> str:
     return NONE if ends is None else f"{_number(ends[0])}-{_number(ends[1])}"
+
+
+def changes(before: Mapping[str, Timing], now: Mapping[str, Timing]) -> list[BeforeAfter]:
+    """Compare the figures that both runs have.
+
+    A figure is worse if it has grown by more than a quarter. Where both runs know at least two of the same houses, it
+    must have grown within houses by the whole of the 95% interval, too.
+
+    Returns:
+        In the order of `now`; figures that only one run has are left out.
+    """
+    return [
+        BeforeAfter(name, before[name].value, timing.value, _is_worse(before[name], timing))
+        for name, timing in now.items()
+        if name in before
+    ]
+
+
+def _is_worse(before: Timing, now: Timing) -> bool:
+    interval = _growth_ci95(before, now)
+    return now.value > FACTOR * before.value and (interval is None or interval[0] > 0)
+
+
+def _growth_ci95(before: Timing, now: Timing) -> Interval | None:
+    """Return the interval of the mean growth within houses, as a logarithm."""
+    houses = [house for house, value in now.by_house.items() if value > 0 and before.by_house.get(house, 0.0) > 0]
+    if len(houses) < 2:
+        return None
+    growth = np.log([now.by_house[house] / before.by_house[house] for house in houses])
+    return ClusterBootstrap(houses, num_resamples=NUM_RESAMPLES).column_means(growth[:, None])[0].ci95

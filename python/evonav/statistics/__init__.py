@@ -1,5 +1,6 @@
 """Intervals, differences and verdicts, all by house (docs/statistics.md)."""
 
+from evonav.statistics.before_after import BeforeAfter
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate
 from evonav.statistics.counts import ChiSquare, chi_square, mcnemar
 from evonav.statistics.distributions import student_quantile
@@ -25,6 +26,7 @@ __all__ = [
     "MIN_CLUSTERS",
     "NUM_RESAMPLES",
     "Z_95",
+    "BeforeAfter",
     "ChiSquare",
     "ClusterBootstrap",
     "Estimate",

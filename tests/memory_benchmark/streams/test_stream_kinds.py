@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.streams import StreamSpec, digest, make_stream
-from evonav.memory_benchmark.streams.glances import MAX_GLANCES
+from evonav.memory_benchmark.streams.kinds.glances import MAX_GLANCES
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import Frame, SceneObject

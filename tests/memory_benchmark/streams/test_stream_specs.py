@@ -8,7 +8,7 @@ import pytest
 import evonav
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.memory_benchmark.streams import KINDS, StreamSpec, make_stream, reference_specs
-from evonav.memory_benchmark.streams.make import make_plan, plan_of
+from evonav.memory_benchmark.streams.kinds import make_plan, plan_of
 from evonav.memory_benchmark.streams.plan import StreamPlan, cached_plan, plan_folder
 from evonav.memory_benchmark.streams.spec import read_house
 

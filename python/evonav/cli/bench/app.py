@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from evonav.cli.bench.memory import memory_app
+from evonav.cli.bench.memory import memory_app, tell_worse
 from evonav.cli.display import EXIT_INTERRUPTED, progress_bar, show_tables
 from evonav.cli.group import Command, new_app
 from evonav.cli.options.shared import HOUSES, Against, Agents, Limit, listed, numbers_of
@@ -15,9 +15,6 @@ from evonav.cli.options.shared import HOUSES, Against, Agents, Limit, listed, nu
 if TYPE_CHECKING:  # the command must start fast
     from evonav.speed_benchmark.records import Row
     from evonav.speed_benchmark.run import Section
-
-EXIT_WORSE = 1
-"""Exit code where `--against` finds something worse."""
 
 bench_app = new_app(help="Measure scene memories, and evonav's speed on this machine.")
 bench_app.add_typer(memory_app, name="memory")
@@ -71,19 +68,7 @@ def _run(
     if out is not None:
         typer.echo(f"written: {', '.join(map(str, write_speeds(speeds, out, markdown_of(speeds))))}")
     if earlier is not None and before is not None:
-        tell_changes(before, against(earlier, speeds), earlier.machine if earlier.machine != speeds.machine else None)
-
-
-def tell_changes(before: Path, found: "Sequence[Any]", other_machine: str | None) -> None:
-    """Print what became worse than before, and exit with 1 if anything did."""
-    if other_machine is not None:
-        typer.echo(f"{before} is of another machine ({other_machine}): ratios are compared, times are not")
-    worse = [change for change in found if change.is_worse]
-    for change in worse:
-        typer.echo(f"worse: {change}")
-    typer.echo(f"{len(worse)} of {len(found)} figures are worse than in {before}")
-    if worse:
-        raise typer.Exit(EXIT_WORSE)
+        tell_worse(before, against(earlier, speeds), earlier.machine if earlier.machine != speeds.machine else None)
 
 
 @bench_app.command(cls=Command)

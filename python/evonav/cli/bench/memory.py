@@ -16,8 +16,10 @@ if TYPE_CHECKING:  # the command must start fast
     from evonav.memory_benchmark.records import BenchmarkResult
     from evonav.memory_benchmark.streams import StreamSpec
     from evonav.memory_benchmark.streams.export.recording import RecordingSpec
+    from evonav.statistics import BeforeAfter
 
 EXIT_WORSE = 1
+"""Exit code where `--against` finds something worse."""
 SEVERAL = "Repeat the option for more, or separate them by commas."
 
 memory_app = new_app(help="Measure how fast scene memories update, and what they still believe.")
@@ -125,9 +127,9 @@ def memory(
     """
     if context.invoked_subcommand is not None:
         return
-    from evonav.memory_benchmark.benchmark import benchmark
-    from evonav.memory_benchmark.memories import named_memories
+    from evonav.memory_benchmark.benchmark import benchmark, named_memories
     from evonav.memory_benchmark.records import read_result
+    from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.run import MeasureSettings
     from evonav.parallel.local import num_cores
 
@@ -157,7 +159,7 @@ def memory(
         typer.echo("incomplete: run the same command again to resume", err=True)
         raise typer.Exit(EXIT_INCOMPLETE)
     if earlier is not None and against is not None:
-        _tell_changes(against, earlier, measured.result)
+        tell_worse(against, compare(measured.result, earlier))
 
 
 @memory_app.command(cls=Command)
@@ -214,6 +216,7 @@ def score(
     from evonav.errors import StoreError
     from evonav.memory_benchmark.offline import score as score_stream
     from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, read_result
+    from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.streams.export import read_exported
     from evonav.report.machine import machine_name
 
@@ -235,7 +238,7 @@ def score(
     result = BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=scored)
     _show(result, out, 0)
     if earlier is not None and against is not None:
-        _tell_changes(against, earlier, result)
+        tell_worse(against, compare(result, earlier))
 
 
 def chosen_streams(
@@ -296,8 +299,8 @@ def folder_of(stream: str) -> str:
 
 
 def _show(result: "BenchmarkResult", out: Path, num_missing: int) -> None:
-    from evonav.memory_benchmark.results.page import write_memory_report
-    from evonav.memory_benchmark.results.tables import FAILURES, REMARKS, memory_tables
+    from evonav.memory_benchmark.report import write_memory_report
+    from evonav.memory_benchmark.tables import FAILURES, REMARKS, memory_tables
 
     if not result.memories:
         return
@@ -307,14 +310,13 @@ def _show(result: "BenchmarkResult", out: Path, num_missing: int) -> None:
     typer.echo(f"page: {page}; figures: {out / 'result.json'}, {out / 'summary.md'}")
 
 
-def _tell_changes(file: Path, before: "BenchmarkResult", now: "BenchmarkResult") -> None:
-    """Print the figures that are worse than in an earlier result, and exit with 1 if there are any."""
-    from evonav.memory_benchmark.regression import against
-
-    found = against(now, before)
+def tell_worse(file: Path, found: "Sequence[BeforeAfter]", other_machine: str | None = None) -> None:
+    """Print what became worse than in an earlier file, and exit with 1 if anything did."""
+    if other_machine is not None:
+        typer.echo(f"{file} is of another machine ({other_machine}): ratios are compared, times are not")
     worse = [one for one in found if one.is_worse]
     for one in worse:
-        typer.echo(f"worse: {one.memory}: {one.figure}: {one.before:.4g} -> {one.now:.4g}")
+        typer.echo(f"worse: {one}")
     typer.echo(f"{len(worse)} of {len(found)} figures are worse than in {file}")
     if worse:
         raise typer.Exit(EXIT_WORSE)

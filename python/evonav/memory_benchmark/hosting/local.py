@@ -17,8 +17,7 @@ from evonav.memory_benchmark.answers import (
     read_num_bytes,
     read_places,
 )
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import Memory, Place
+from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
 
 PACKAGE = "evonav.memory_benchmark"
 T = TypeVar("T")

@@ -23,9 +23,8 @@ from evonav.memory_benchmark.answers import (
     MemoryFailedError,
     checked,
 )
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.hosting.local import Cost
-from evonav.memory_benchmark.protocol import Memory, Place
+from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
 
 _KINDS: dict[ErrorKind, FailureKind] = {ErrorKind.TIMEOUT: "hung", ErrorKind.CRASH: "died"}
 

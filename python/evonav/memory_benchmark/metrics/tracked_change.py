@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 from evonav.evaluation.episode.staleness import STALE_MARGIN_M, distance_to_box_m
-from evonav.memory_benchmark.metrics.change_f1 import PlaceKey
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
+from evonav.memory_benchmark.metrics.updates import PlaceKey
 from evonav.memory_benchmark.truth import TrueChange
 
 

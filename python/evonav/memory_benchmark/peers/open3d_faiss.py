@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from evonav.component import optional_module
 from evonav.memory import ObjectMapConfig
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
-from evonav.memory_benchmark.protocol import MemoryEntry, Place, Point3
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, Point3, StreamInfo
 from evonav.sensors.observation import View
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose

@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 
-from evonav.memory_benchmark.frames import MemoryFrame
+from evonav.memory_benchmark.protocol import MemoryFrame
 from evonav.memory_benchmark.truth import FrameTruth, Stream
 
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from evonav._core import House
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.evidence import (
     changes_between,
     detected_ids,

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.layouts import (
     FRAMES_FILE,

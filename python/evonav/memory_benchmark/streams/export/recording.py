@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import PositiveFloat, ValidationError
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo, read_only
+from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo, read_only
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.conversion import UpAxis, pose_of, rotation_of
 from evonav.memory_benchmark.streams.export.layouts import FRAMES_FILE, LAYOUTS, FrameLine

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.memory_benchmark.frames import MemoryFrame
+from evonav.memory_benchmark.protocol import MemoryFrame
 from evonav.memory_benchmark.streams.digest import Digest
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.conversion import opencv_camera, quaternion_of, world_from_camera

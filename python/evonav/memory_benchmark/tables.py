@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from evonav.memory_benchmark.figures import BASELINE, estimates, ratios
+from evonav.memory_benchmark.aggregate import BASELINE, estimates, ratios
 from evonav.memory_benchmark.records import BenchmarkResult, kinds_of
 from evonav.memory_benchmark.streams.spec import TITLES
 from evonav.report.tables.numbers import NONE

@@ -7,11 +7,10 @@ from typing import Literal
 import numpy as np
 
 from evonav.memory_benchmark.metrics.belief import NUM_BINS, calibration_error
-from evonav.memory_benchmark.metrics.change_f1 import ChangeCounts
+from evonav.memory_benchmark.metrics.costs import Percentiles
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
-from evonav.memory_benchmark.metrics.speed import Percentiles
 from evonav.memory_benchmark.metrics.staleness import Clock, SpellKind, durations_of, risk_table, survival
-from evonav.memory_benchmark.metrics.update import UpdateCounts
+from evonav.memory_benchmark.metrics.updates import ChangeCounts, UpdateCounts
 from evonav.memory_benchmark.records import BeliefScore, MemoryResult, StreamResult
 from evonav.statistics import ClusterBootstrap, Estimate
 

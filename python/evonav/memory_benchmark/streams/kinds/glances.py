@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from evonav._core import House
 from evonav.memory_benchmark.streams.evidence import num_looks_through
+from evonav.memory_benchmark.streams.kinds.visits import visits
 from evonav.memory_benchmark.streams.plan import StreamPlan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
 from evonav.memory_benchmark.streams.spec import StreamSpec
-from evonav.memory_benchmark.streams.visits import visits
 from evonav.world.simulator import Frame, SceneObject
 
 MAX_GLANCES = 5

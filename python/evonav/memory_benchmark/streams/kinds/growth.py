@@ -6,10 +6,9 @@ from itertools import cycle, islice
 from evonav._core import House
 from evonav.house.files import stream_houses
 from evonav.memory_benchmark.streams.evidence import visible_px
+from evonav.memory_benchmark.streams.kinds.visits import Frames, generator_of, walk_in
 from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import MIN_ROOMS, StreamSpec, source_of
-from evonav.memory_benchmark.streams.visits import Frames, walk_in
-from evonav.memory_benchmark.streams.walk import generator_of
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

@@ -1,16 +1,16 @@
-"""Make streams: from a description to the plan that its frames are rendered from."""
+"""Make streams: the plan of each kind (visits, glances, growth, a change during a visit), and what renders it."""
 
 import json
 from dataclasses import asdict, replace
 
 from evonav._core import House
-from evonav.memory_benchmark.streams.glances import glances
-from evonav.memory_benchmark.streams.growth import growth, growth_houses
-from evonav.memory_benchmark.streams.live import live
+from evonav.memory_benchmark.streams.kinds.during_visit import during_visit
+from evonav.memory_benchmark.streams.kinds.glances import glances
+from evonav.memory_benchmark.streams.kinds.growth import growth, growth_houses
+from evonav.memory_benchmark.streams.kinds.visits import visits
 from evonav.memory_benchmark.streams.plan import StreamPlan, cached_plan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
 from evonav.memory_benchmark.streams.spec import StreamSpec, read_house
-from evonav.memory_benchmark.streams.visits import visits
 from evonav.tasks.records import sha256_of
 
 
@@ -51,5 +51,5 @@ def make_plan(spec: StreamSpec, house: House) -> StreamPlan:
     if spec.kind == "S7":
         return growth(spec, growth_houses(spec, house))
     if spec.kind == "S9":
-        return live(spec, house)
+        return during_visit(spec, house)
     return visits(spec, house)

@@ -9,9 +9,9 @@ from evonav import _core
 from evonav._core import House
 from evonav.memory_benchmark.streams.evidence import MOVED_MIN_M
 from evonav.memory_benchmark.streams.evolution import houses_of_visits
+from evonav.memory_benchmark.streams.kinds.visits import Frames, walk_in
 from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import StreamSpec
-from evonav.memory_benchmark.streams.visits import Frames, walk_in
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 
@@ -19,7 +19,7 @@ EARLIEST, LATEST = 0.4, 0.6
 """Part of the visit in which the change happens."""
 
 
-def live(spec: StreamSpec, house: House) -> StreamPlan:
+def during_visit(spec: StreamSpec, house: House) -> StreamPlan:
     """Plan one visit of twice the usual length, with one change near its middle; the walk goes on from where it is.
 
     With an even seed, the change happens at the frame that shows most of it, and with an odd one where least of it is

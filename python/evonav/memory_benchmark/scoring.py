@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from evonav.evaluation.episode.staleness import STALE_MARGIN_M
 from evonav.memory_benchmark.answers import CheckedEntries
-from evonav.memory_benchmark.frames import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.metrics.belief import BeliefSums
-from evonav.memory_benchmark.metrics.change_f1 import BeliefSnapshot, PlaceKey, change_counts
 from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
 from evonav.memory_benchmark.metrics.retrieval import Queries
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.metrics.tracked_change import TrackedChange, tracked
-from evonav.memory_benchmark.metrics.update import EVIDENCE_PX, UpdateCounts
-from evonav.memory_benchmark.protocol import Place
+from evonav.memory_benchmark.metrics.updates import EVIDENCE_PX, BeliefSnapshot, PlaceKey, UpdateCounts, change_counts
+from evonav.memory_benchmark.protocol import MemoryFrame, Place, StreamInfo
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import SceneObject

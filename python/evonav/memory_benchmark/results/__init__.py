@@ -1,1 +1,0 @@
-"""Summarise and show the records of the memory benchmark."""
