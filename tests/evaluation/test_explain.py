@@ -95,6 +95,6 @@ def test_the_command_shows_and_writes_the_tables(run_dir, tmp_path_factory):
     from evonav.cli import app
 
     out = tmp_path_factory.mktemp("out") / "measures.md"
-    done = CliRunner().invoke(app, ["report", str(run_dir), "--text", "--agent", "fu", "--md", str(out)])
+    done = CliRunner().invoke(app, ["report", str(run_dir), "--text", "--agent", "fu", "--out", str(out)])
     assert done.exit_code == 0, done.output
     assert "| precision at the end, % | 87.5 [50.0, 100.0] |" in out.read_text()

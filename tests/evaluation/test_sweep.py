@@ -158,7 +158,7 @@ def test_the_summary_is_of_the_records(whole):
 
 def test_cells_are_ordinary_runs(whole):
     """What takes a run takes a cell, and of a sweep says which there are."""
-    assert run("export", whole / "runs" / CELLS[0], "--csv", whole / "stages.csv").exit_code == 0
+    assert run("export", whole / "runs" / CELLS[0], "--out", whole / "stages.csv").exit_code == 0
     told = run("paper", whole)
     assert told.exit_code != 0
     assert f"{whole / 'runs' / CELLS[0]}" in str(told.exception)

@@ -113,7 +113,7 @@ def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
 
 def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Path) -> None:
     md, tex, table = tmp_path / "b.md", tmp_path / "b.tex", tmp_path / "b.csv"
-    asked = ["breakdown", str(run), "--md", str(md), "--latex", str(tex), "--csv", str(table)]
+    asked = ["breakdown", str(run), "--out", str(md), "--out", str(tex), "--out", str(table)]
     result = CliRunner().invoke(app, asked)
     assert result.exit_code == 0, result.output
     assert "SR by success radius" in result.output

@@ -131,7 +131,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     (run / VIEW_DIR).mkdir()
     (run / VIEW_DIR / page_name("task-00", "fu")).write_text("page")
     files = {name: tmp_path / "out" / f"c.{name}" for name in ("md", "tex", "csv", "html", "svg")}
-    options = [f"--{ {'tex': 'latex', 'svg': 'plot'}.get(name, name) }={path}" for name, path in files.items()]
+    options = [f"--out={path}" for path in files.values()]
     result = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", *options])
     assert result.exit_code == 0, result.output
     assert "ftu is ahead of fu: ftu minus fu is +37.5" in " ".join(result.output.split())
@@ -145,7 +145,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     assert effect.ci95 is not None
     assert float(rows["all", "success"]["low"]) == effect.ci95[0]
     assert float(rows["relocated", "success"]["difference"]) == 0.75
-    again = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", "--json", "--csv", str(files["csv"])])
+    again = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", "--json", "--out", str(files["csv"])])
     told = json.loads(again.stdout)  # nothing else is on standard output
     assert told == json.loads(json.dumps(comparison_json([found])))
     assert told["comparisons"][0]["parts"][0]["effects"]["success"]["verdict"] == "b"

@@ -18,7 +18,7 @@ def test_a_row_a_stage_with_every_measure(tmp_path: Path) -> None:
     run = lettered_run(tmp_path / "run", {"fu": "sfse", "=ftu": "sf"})
     files = {suffix: tmp_path / "out" / f"s.{suffix}" for suffix in ("csv", "jsonl", "parquet")}
     pytest.importorskip("pyarrow")
-    result = CliRunner().invoke(app, ["export", str(run), *(f"--{key}={path}" for key, path in files.items())])
+    result = CliRunner().invoke(app, ["export", str(run), *(f"--out={path}" for path in files.values())])
     assert result.exit_code == 0, result.output
     names = [field.name for field in fields(StageMetrics)]
     rows = stage_table(run)
@@ -89,4 +89,4 @@ def test_what_cannot_be_written_is_said_and_leaves_nothing(tmp_path: Path) -> No
         write_table(broken, stage_columns(), tmp_path / "s.csv")
     assert not list(tmp_path.glob("s.*"))
     assert CliRunner().invoke(app, ["export", str(run)]).exit_code == 2
-    assert CliRunner().invoke(app, ["export", str(run), "--csv", str(tmp_path / "a.txt")]).exit_code == 2
+    assert CliRunner().invoke(app, ["export", str(run), "--out", str(tmp_path / "a.txt")]).exit_code == 2

@@ -24,7 +24,7 @@ rerun_chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed"
 @pytest.fixture(scope="module")
 def recording(viewed_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rerun") / "x.rrd"
-    result = CliRunner().invoke(app, ["rerun", str(viewed_run), "--agent", "fu", "--out", str(path)])
+    result = CliRunner().invoke(app, ["video", str(viewed_run), "--agent", "fu", "--out", str(path)])
     assert result.exit_code == 0, result.output
     assert [item.name for item in path.parent.iterdir()] == ["x.rrd"]
     return path

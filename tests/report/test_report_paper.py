@@ -218,7 +218,7 @@ def latex_of(write_run: WriteRun, tmp_path: Path) -> str:
     ]
     run = record_run(tmp_path / "r_1", records, {f"task-{i}": 2 for i in range(6)}, ["fu", "ftu", "my_agent & co"])
     out = tmp_path / "tables.tex"
-    asked = ["paper", str(run), "--latex", str(out), "--prediction", str(write_run())]
+    asked = ["paper", str(run), "--out", str(out), "--prediction", str(write_run())]
     result = CliRunner().invoke(app, asked, env={"COLUMNS": "200"})
     assert result.exit_code == 0, result.output
     return out.read_text(encoding="utf-8")

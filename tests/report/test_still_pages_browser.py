@@ -32,7 +32,7 @@ def pages_of(folder: Path, write_run: WriteRun) -> list[Path]:
         shutil.copytree(one, folder / "tasks" / one.name)
     command("tasks", "show", folder / "tasks", "--out", folder / "gallery")
     command("tasks", "stats", folder / "tasks", "--out", folder / "statistics")
-    command("compare", write_run(), "--html", folder / "compare.html")
+    command("compare", write_run(), "--out", folder / "compare.html")
     write_analysis(folder / "pairs", "pairs", ARMS, PAIRS)
     report = write_controlled_report(folder / "pairs")
     gallery = sorted((folder / "gallery").glob("*.html"))

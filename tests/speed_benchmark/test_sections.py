@@ -23,7 +23,7 @@ COMMANDS = {
 
 
 def bench(*words):
-    return CliRunner().invoke(app, ["bench", *map(str, words)], env={"COLUMNS": "200"})
+    return CliRunner().invoke(app, ["bench", "speed", *map(str, words)], env={"COLUMNS": "200"})
 
 
 @pytest.mark.parametrize("name", COMMANDS)

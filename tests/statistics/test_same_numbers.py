@@ -88,7 +88,7 @@ def test_unrounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, 
     by = [part for field in ("is_baseline", "stratum", "radius") for part in ("--by", field)]
     found = {}
     for measure in ("success", "spl"):
-        command("breakdown", run, *by, "--measure", measure, "--csv", tmp_path / "b.csv")
+        command("breakdown", run, *by, "--measure", measure, "--out", tmp_path / "b.csv")
         for row in rows_of(tmp_path / "b.csv"):
             name = "all" if row["by"] == "is_baseline" or row["group"] == "2 m" else GROUPS.get(row["group"])
             measured = numbers(row["value"], row["low"], row["high"])
@@ -106,8 +106,8 @@ def test_unrounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, 
 
 
 def test_rounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, Any], tmp_path: Path) -> None:
-    command("report", run, "--text", "--md", tmp_path / "measures.md")
-    command("paper", run, "--out", tmp_path / "paper.md", "--latex", tmp_path / "paper.tex")
+    command("report", run, "--text", "--out", tmp_path / "measures.md")
+    command("paper", run, "--out", tmp_path / "paper.md", "--out", tmp_path / "paper.tex")
     measures = {row[0]: row[1:] for row in table_rows((tmp_path / "measures.md").read_text())}
     heads = next(row for row in table_rows((tmp_path / "measures.md").read_text()) if row[0] == "Measure")[1:]
     tables = (run / "table.md").read_text()
@@ -129,7 +129,7 @@ def test_rounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, An
 
 
 def test_rows_for_other_programs_give_the_same_intervals(run: Path, summary: dict[str, Any], tmp_path: Path) -> None:
-    command("export", run, "--csv", tmp_path / "stages.csv")
+    command("export", run, "--out", tmp_path / "stages.csv")
     rows = rows_of(tmp_path / "stages.csv")
     for agent in AGENTS:
         mine = [row for row in rows if row["agent"] == agent]

@@ -19,7 +19,7 @@ from evonav.cli.results.paper import paper
 from evonav.cli.results.perception import perception
 from evonav.cli.results.report import report
 from evonav.cli.results.submission import pack, verify
-from evonav.cli.results.video import rerun, video
+from evonav.cli.results.video import video
 from evonav.cli.results.view import view
 from evonav.cli.run.agents import agents
 from evonav.cli.run.check_agent import check_agent
@@ -41,7 +41,7 @@ PANELS = {
     "Data": (houses_app, tasks_app),
     "Study": (paper, controlled_app, perception, bench_app),
     "Submit": (pack, verify, leaderboard),
-    "Tools": (video, rerun),
+    "Tools": (video,),
 }
 """Commands and groups of commands under their headings in the help."""
 GROUP_NAMES = {houses_app: "houses", tasks_app: "tasks", controlled_app: "controlled", bench_app: "bench"}

@@ -15,7 +15,7 @@ LINE_EVERY_S = 60.0
 """Seconds between two lines of progress where there is no terminal."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from rich.table import Table as RichTable
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from evonav.evaluation.run.run import Progress
     from evonav.generation.dataset import GenerationProgress
     from evonav.house.making import MakingProgress
+    from evonav.report.plots.specs import Plot
     from evonav.report.tables.table import Table
 
 
@@ -89,15 +90,30 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
     return parts
 
 
-def write_texts(
-    *texts: "tuple[Path | None, Callable[[], str]]", label: str = "written", is_error: bool = False
+def write_files(
+    files: "Sequence[Path] | None",
+    texts: "Mapping[str, Callable[[Path], str]]",
+    plots: "Callable[[], Sequence[Plot]] | None" = None,
+    *,
+    is_error: bool = False,
 ) -> None:
-    """Write the files whose paths are given, and print the paths after a label; to standard error if `is_error`."""
-    from evonav.parallel.folders import write_atomically
+    """Write files in the formats that their names end with, and print their paths.
 
-    for path, text in texts:
-        if path is not None:
-            typer.echo(f"{label}: {write_atomically(path, text())}", err=is_error)
+    Args:
+        texts: Content by the end of the name; a function takes the path.
+        plots: What all other files show.
+        is_error: Print to standard error.
+    """
+    from evonav.parallel.folders import write_atomically
+    from evonav.report.plots.render import write_plots
+
+    for path in files or ():
+        if path.suffix in texts:
+            written = write_atomically(path, texts[path.suffix](path))
+        else:
+            assert plots is not None, "the option takes no other name"
+            written = write_plots(plots(), path)
+        typer.echo(f"written: {written}", err=is_error)
 
 
 def print_table(summaries: "list[AgentSummary]") -> None:

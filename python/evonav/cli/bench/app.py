@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from evonav.cli.bench.memory import memory_app, tell_worse
 from evonav.cli.display import EXIT_INTERRUPTED, progress_bar, show_tables
 from evonav.cli.group import Command, new_app
-from evonav.cli.options.shared import HOUSES, Against, Agents, Limit, listed, numbers_of
+from evonav.cli.options.shared import BUNDLED, HOUSES, Against, Limit, did_you_mean, listed, numbers_of
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.speed_benchmark.records import Row
@@ -19,17 +20,15 @@ if TYPE_CHECKING:  # the command must start fast
 bench_app = new_app(help="Measure scene memories, and evonav's speed on this machine.")
 bench_app.add_typer(memory_app, name="memory")
 
-Repeats = Annotated[int, typer.Option(min=1, metavar="N", help="Number of times that everything is measured.")]
-Peers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--peer",
-        metavar="NAME",
-        help="Peer to run beside evonav, or none. Repeat the option for more, or separate them by commas. Default: all "
-        "that are installed; the extra `bench` installs them.",
-    ),
-]
-BenchOut = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder to write JSON and Markdown to.")]
+SECTIONS = {
+    "render": "rendering",
+    "navigation": "navigation",
+    "mapping": "mapping",
+    "gym": "gym",
+    "agents": "agents",
+    "generation": "generation",
+}
+"""What `evonav bench speed` measures, and the modules of `evonav.speed_benchmark` that do."""
 
 
 def _run(
@@ -72,101 +71,61 @@ def _run(
 
 
 @bench_app.command(cls=Command)
-def render(
-    limit: Limit = None, repeats: Repeats = 1, peer: Peers = None, out: BenchOut = None, against: Against = None
-) -> None:
-    """Measure the time of an image.
-
-    Peers: embreex, moderngl.
-    """
-    from evonav.speed_benchmark import rendering
-
-    _run(rendering, limit, repeats, peer, out, against)
-
-
-@bench_app.command(cls=Command)
-def navigation(
-    limit: Limit = None, repeats: Repeats = 1, peer: Peers = None, out: BenchOut = None, against: Against = None
-) -> None:
-    """Measure the time of a shortest path.
-
-    Peers: pyastar2d, scikit-image, scipy.
-    """
-    from evonav.speed_benchmark import navigation as section
-
-    _run(section, limit, repeats, peer, out, against)
-
-
-@bench_app.command(cls=Command)
-def mapping(
-    limit: Limit = None, repeats: Repeats = 1, peer: Peers = None, out: BenchOut = None, against: Against = None
-) -> None:
-    """Measure the time of a map's update.
-
-    Peers: octomap, open3d.
-    """
-    from evonav.speed_benchmark import mapping as section
-
-    _run(section, limit, repeats, peer, out, against)
-
-
-@bench_app.command(cls=Command)
-def gym(
-    num_envs: Annotated[
+def speed(
+    section: Annotated[str, typer.Argument(metavar="SECTION", help=f"What to measure: {', '.join(SECTIONS)}.")],
+    limit: Limit = None,
+    repeats: Annotated[int, typer.Option(min=1, metavar="N", help="Number of times that everything is measured.")] = 1,
+    peer: Annotated[
         list[str] | None,
         typer.Option(
-            "--envs",
-            metavar="N",
-            help="Number of environments. Repeat the option for more, or separate them by commas. Default: 1,8,64.",
+            "--peer",
+            metavar="NAME",
+            help="Peer to run beside evonav, or none. Repeat the option for more, or separate them by commas. Default: "
+            "all that are installed; the extra `bench` installs them.",
         ),
     ] = None,
-    num_steps: Annotated[int, typer.Option("--steps", min=1, metavar="N", help="Steps of each of three rounds.")] = 64,
-    limit: Limit = None,
-    repeats: Repeats = 1,
-    peer: Peers = None,
-    out: BenchOut = None,
-    against: Against = None,
-) -> None:
-    """Measure the time of an environment's step.
-
-    Peers: sync and async, which are Gymnasium's own; embreex, moderngl.
-    """
-    from evonav.speed_benchmark import gym as section
-
-    sizes = numbers_of("--envs", num_envs) or section.NUM_ENVS
-    if min(sizes) < 1:
-        raise typer.BadParameter(f"--envs {min(sizes)}: must be at least 1")
-    _run(section, limit, repeats, peer, out, against, is_one_core=False, num_envs=sizes, num_steps=num_steps)
-
-
-@bench_app.command(cls=Command)
-def agents(
-    agent: Agents = None,
+    houses: Annotated[
+        str | None, typer.Option(metavar="HOUSES", help=f"generation: houses: {HOUSES}. Default: bundled.")
+    ] = None,
+    agent: Annotated[
+        list[str] | None, typer.Option("--agent", metavar="NAME", help="agents: some of them. Default: all.")
+    ] = None,
     growth: Annotated[
-        bool, typer.Option(help="Measure also how much memory a long task takes, in a process of its own.")
-    ] = True,
-    repeats: Repeats = 1,
-    out: BenchOut = None,
+        bool | None,
+        typer.Option("--growth/--no-growth", help="agents: measure the memory of a long task. Default: growth."),
+    ] = None,
+    envs: Annotated[
+        list[str] | None,
+        typer.Option(metavar="N", help="gym: numbers of environments. Default: 1,2,4,8,16,32,64."),
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="gym: steps of each of three rounds. Default: 64.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write JSON and Markdown to.")] = None,
     against: Against = None,
 ) -> None:
-    """Measure the time of an agent's decision round, and its memory."""
-    from evonav.speed_benchmark import agents as section
+    """Measure evonav's speed on this machine, beside other libraries.
 
-    _run(section, None, repeats, ["none"], out, against, agents=listed(agent) or None, has_growth=growth)
-
-
-@bench_app.command(cls=Command)
-def generation(
-    houses: Annotated[str, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}.")] = (
-        "bundled"
-    ),
-    limit: Limit = None,
-    repeats: Repeats = 1,
-    out: BenchOut = None,
-    against: Against = None,
-) -> None:
-    """Measure the time of generating a task, with all of its files written."""
-    from evonav.speed_benchmark import generation as section
-
-    title = "bundled, 1-10 rooms" if houses == "bundled" else Path(houses).name
-    _run(section, limit, repeats, ["none"], out, against, houses=houses, title=title)
+    render: an image (peers: embreex, moderngl). navigation: a shortest path (pyastar2d, scikit-image, scipy). mapping:
+    a map's update (octomap, open3d). gym: an environment's step (sync and async, which are Gymnasium's own; embreex,
+    moderngl). agents: an agent's decision round, and its memory. generation: a task, with all of its files written.
+    """
+    if section not in SECTIONS:
+        raise typer.BadParameter(f"{section}: expected {', '.join(SECTIONS)}{did_you_mean(section, SECTIONS)}")
+    own = {"--houses": (houses, "generation"), "--agent": (agent, "agents"), "--no-growth": (growth, "agents")}
+    for option, (value, of) in {**own, "--envs": (envs, "gym"), "--steps": (steps, "gym")}.items():
+        if value is not None and section != of:
+            raise typer.BadParameter(f"{option} is for `evonav bench speed {of}`")
+    options: dict[str, Any] = {}
+    if section == "generation":
+        options = {"houses": houses or BUNDLED, "title": Path(houses).name if houses else "bundled, 1-10 rooms"}
+    elif section == "agents":
+        options = {"agents": listed(agent) or None, "has_growth": growth is not False}
+    elif section == "gym":
+        sizes = numbers_of("--envs", envs)
+        if sizes and min(sizes) < 1:
+            raise typer.BadParameter(f"--envs {min(sizes)}: must be at least 1")
+        options = {**({"num_envs": sizes} if sizes else {}), **({} if steps is None else {"num_steps": steps})}
+    module = import_module(f"evonav.speed_benchmark.{SECTIONS[section]}")
+    peers = ["none"] if section in ("agents", "generation") else peer
+    _run(cast("Section", module), limit, repeats, peers, out, against, is_one_core=section != "gym", **options)

@@ -2,14 +2,14 @@
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from evonav.cli.options import completion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
@@ -66,17 +66,27 @@ ComparedRuns = Annotated[
         autocompletion=completion.runs,
     ),
 ]
-MarkdownFile = Annotated[Path | None, typer.Option("--md", metavar="FILE", help="Write a Markdown file.")]
-LatexFile = Annotated[
-    Path | None, typer.Option("--latex", metavar="FILE", help="Write a LaTeX file (it needs booktabs and graphicx).")
-]
-CsvFile = Annotated[
-    Path | None, typer.Option("--csv", metavar="FILE", help="Write a CSV file, with numbers that are not rounded.")
-]
-PlotFile = Annotated[
-    Path | None,
-    typer.Option("--plot", metavar="FILE", help="Write a plot: .svg, .png or .pdf. It needs the extra `viz`."),
-]
+PLOTS = ("svg", "png", "pdf")
+"""Ends of names of plots, which need the extra `viz`."""
+
+
+def files_option(*formats: str) -> Any:  # noqa: ANN401 - typer's
+    """Return the option `--out` of a command that writes files in these formats, which names of files end with."""
+    return typer.Option(
+        "--out",
+        metavar="FILE",
+        callback=lambda files: _with_formats(files, formats),
+        help=f"File to write; its name ends with .{', .'.join(formats)}. Repeat for more.",
+    )
+
+
+def _with_formats(files: list[Path] | None, formats: tuple[str, ...]) -> list[Path] | None:
+    for path in files or ():
+        if path.suffix.lstrip(".") not in formats:
+            raise typer.BadParameter(f"{path}: expected a name that ends with .{', .'.join(formats)}")
+    return files
+
+
 HOUSES = "a file or folder of ProcTHOR houses, procthor-10k:SPLIT, evonav-10k:SPLIT, endless:SEED, or bundled"
 Houses = Annotated[Path | None, typer.Option(metavar="HOUSES", help=f"Houses to generate tasks from: {HOUSES}.")]
 SomeHouses = Annotated[Path, typer.Option("--houses", metavar="HOUSES", help=f"Houses: {HOUSES}.")]
@@ -175,6 +185,14 @@ def house_options(assets: Path | None, start: str) -> "HouseOptions | None":
 def names_of(agents: "Sequence[str] | None") -> list[str]:
     """Return the agents that the option `--agent` names; the paper's heuristics if it is not given."""
     return listed(agents) or listed([HEURISTICS])
+
+
+def did_you_mean(word: str, known: "Iterable[str]") -> str:
+    """Return the question whether the nearest known word was meant; nothing if none is near."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, list(known), 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def num_workers_of(workers: int | None) -> int:

@@ -5,16 +5,8 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.display import show_tables, write_texts
-from evonav.cli.options.shared import (
-    AsJson,
-    ComparedRuns,
-    CsvFile,
-    LatexFile,
-    MarkdownFile,
-    PlotFile,
-    listed,
-)
+from evonav.cli.display import show_tables, write_files
+from evonav.cli.options.shared import PLOTS, AsJson, ComparedRuns, files_option, listed
 
 
 def compare(
@@ -36,12 +28,8 @@ def compare(
             "--allow-differences", help="Compare runs with different tasks or settings on the stages that they share."
         ),
     ] = False,
-    md: MarkdownFile = None,
-    latex: LatexFile = None,
-    csv: CsvFile = None,
+    out: Annotated[list[Path] | None, files_option("html", "md", "tex", "csv", *PLOTS)] = None,
     as_json: AsJson = False,
-    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write an HTML page with links to replays.")] = None,
-    plot: PlotFile = None,
 ) -> None:
     """Compare agents on the same stages: `RUN A B` is A minus B.
 
@@ -57,7 +45,6 @@ def compare(
     from evonav.report.compare.compare import comparison_json
     from evonav.report.compare.page import comparison_page, comparison_plot
     from evonav.report.compare.selection import read_compared_agents
-    from evonav.report.plots.render import write_plots
 
     found = compare_agents(
         read_compared_agents(runs), measures=listed(measure), baseline=baseline, allow_differences=allow_differences
@@ -71,12 +58,14 @@ def compare(
         for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
             console.print(line, markup=False, highlight=False)
         console.print(wording.METHOD, style="dim", highlight=False)
-    write_texts(
-        (md, lambda: wording.comparison_markdown(found)),
-        (latex, lambda: wording.comparison_latex(found)),
-        (csv, lambda: wording.comparison_csv(found)),
-        (html, lambda: comparison_page(found, None if html is None else html.parent)),
+    write_files(
+        out,
+        {
+            ".md": lambda _: wording.comparison_markdown(found),
+            ".tex": lambda _: wording.comparison_latex(found),
+            ".csv": lambda _: wording.comparison_csv(found),
+            ".html": lambda path: comparison_page(found, path.parent),
+        },
+        lambda: [comparison_plot(found)],
         is_error=as_json,
     )
-    if plot is not None:
-        typer.echo(f"written: {write_plots([comparison_plot(found)], plot)}", err=as_json)

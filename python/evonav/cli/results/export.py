@@ -5,17 +5,13 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options.shared import CsvFile, RunAgents, RunFolder, listed
+from evonav.cli.options.shared import RunAgents, RunFolder, files_option, listed
 
 
 def export(
     run: RunFolder,
     agent: RunAgents = None,
-    csv: CsvFile = None,
-    jsonl: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a file of JSON lines.")] = None,
-    parquet: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a Parquet file. It needs the extra `data`.")
-    ] = None,
+    out: Annotated[list[Path] | None, files_option("csv", "jsonl", "parquet")] = None,
     rounds: Annotated[
         bool, typer.Option("--rounds", help="Write one row per decision round instead of one per stage.")
     ] = False,
@@ -27,14 +23,9 @@ def export(
     from evonav.report import export as made
 
     names = listed(agent) or None
-    files = {".csv": csv, ".jsonl": jsonl, ".parquet": parquet}
-    if not any(files.values()):
-        raise typer.BadParameter("name a file: --csv, --jsonl or --parquet")
-    for suffix, path in files.items():
-        if path is None:
-            continue
-        if path.suffix != suffix:
-            raise typer.BadParameter(f"--{suffix[1:]} {path}: expected a file {suffix}")
+    if not out:
+        raise typer.BadParameter("name a file: --out stages.csv, .jsonl or .parquet")
+    for path in out:
         columns = made.ROUND_COLUMNS if rounds else made.stage_columns()
         rows = made.round_table(run, names) if rounds else made.stage_table(run, names)
         typer.echo(f"written: {made.write_table(rows, columns, path)}")

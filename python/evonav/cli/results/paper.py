@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import show_tables, write_texts
-from evonav.cli.options.shared import MarkdownFile, RunFolder
+from evonav.cli.display import show_tables, write_files
+from evonav.cli.options.shared import RunFolder, files_option
 
 if TYPE_CHECKING:
     from evonav.report.paper.tables import Perception
@@ -26,15 +26,11 @@ def paper(
     perception: Annotated[
         Half, typer.Option(help="Half of the paper's tables to compare with: ground-truth or predicted perception.")
     ] = Half.GT,
-    md: MarkdownFile = None,
-    latex: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a LaTeX file with Tables 1 and 2 in the paper's layout."),
-    ] = None,
+    out: Annotated[list[Path] | None, files_option("md", "tex")] = None,
     prediction: Annotated[
         Path | None,
         typer.Option(
-            metavar="RUN", help="RecordedRun with predicted perception, which fills the lower half of the LaTeX tables."
+            metavar="RUN", help="Run with predicted perception, which fills the lower half of the LaTeX tables."
         ),
     ] = None,
     reweight: Annotated[
@@ -47,7 +43,8 @@ def paper(
 ) -> None:
     """Show a run beside the paper's Tables 1 and 2.
 
-    Also shows the order of the agents in both, and how large a difference the run could detect.
+    Also shows the order of the agents in both, and how large a difference the run could detect. A LaTeX file has the
+    paper's layout.
     """
     from evonav.errors import StoreError
     from evonav.report.paper.latex import paper_latex
@@ -64,7 +61,12 @@ def paper(
         tables.append(reweighted_table([loaded], reweight, perception.value))
     show_tables(tables)
     runs: dict[Perception, RecordedRun] = {perception.value: loaded}
-    if latex is not None and prediction is not None:
+    if prediction is not None:
         runs["prediction"] = load_run(prediction)
-    write_texts((md, lambda: markdown_tables(table for table in tables if table.rows)), label="tables")
-    write_texts((latex, lambda: paper_latex(runs)), label="LaTeX")
+    write_files(
+        out,
+        {
+            ".md": lambda _: markdown_tables(table for table in tables if table.rows),
+            ".tex": lambda _: paper_latex(runs),
+        },
+    )

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_table, show_tables, write_texts
+from evonav.cli.display import print_table, show_tables, write_files
 from evonav.cli.options.shared import (
     Exchanges,
-    MarkdownFile,
     RunAgents,
     RunFolder,
     RunTasks,
@@ -25,12 +24,14 @@ NUM_REPLAYS = 2
 
 def report(
     run: RunFolder,
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write. Default: RUN.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder to write, or a Markdown file of --text. Default: RUN."),
+    ] = None,
     text: Annotated[
         bool, typer.Option("--text", help="Print the report's tables of metrics to the terminal; write no page.")
     ] = False,
     agent: RunAgents = None,
-    md: MarkdownFile = None,
     replays: Annotated[
         str | None,
         typer.Option(
@@ -45,15 +46,15 @@ def report(
 ) -> None:
     """Write an HTML page about a run: tables, plots, maps, replays.
 
-    A sweep gets a page for each run and one for all. With --text, nothing is written, and metrics that explain
+    A sweep gets a page for each run and one for all. With --text, no page is written, and metrics that explain
     rates are printed: other definitions of success, stale entries, memory, costs.
     """
     from evonav.sweeps.layout import SWEEP_NAME
 
-    if not text and (agent is not None or md is not None):
-        raise typer.BadParameter("--agent and --md are for --text; the page shows all agents")
+    if not text and agent is not None:
+        raise typer.BadParameter("--agent is for --text; the page shows all agents")
     if text:
-        _print_metrics(run, listed(agent) or None, md)
+        _print_metrics(run, listed(agent) or None, out)
         return
     if (run / SWEEP_NAME).is_file():
         typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
@@ -102,14 +103,15 @@ def _report_sweep(
     return write_sweep_page(out or sweep, sweep_title(sweep), rows, reports)
 
 
-def _print_metrics(run: Path, agents: "list[str] | None", md: Path | None) -> None:
+def _print_metrics(run: Path, agents: "list[str] | None", out: Path | None) -> None:
     """Print the tables of metrics of a run, and write them to a Markdown file if one is named."""
     from evonav.report.tables.metric_tables import measures_tables
     from evonav.report.tables.table import markdown_tables
 
     tables = [table for table in measures_tables(run, agents) if table.rows]
     show_tables(tables)
-    write_texts((md, lambda: markdown_tables(tables)))
+    if out is not None:
+        write_files([out.with_suffix(".md")], {".md": lambda _: markdown_tables(tables)})
 
 
 def _count(replays: str) -> int | None:

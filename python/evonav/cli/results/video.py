@@ -1,4 +1,4 @@
-"""`evonav video` and `evonav rerun`: write an episode as a video, or as a recording for the rerun viewer."""
+"""`evonav video`: write an episode as a video, or as a recording for the rerun viewer."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,6 +29,8 @@ Agent = Annotated[
 ]
 
 ACTIONS_FPS, ROUNDS_FPS = 12.0, 2.0
+RECORDING = ".rrd"
+"""End of the name of a recording."""
 VIEW_PX = 396
 """Longer edge of the heading views, in pixels."""
 MANY_ROUNDS = 100
@@ -40,7 +42,10 @@ def video(
     task: RunTask = None,
     agent: Agent = None,
     stage: Stages = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN/episode.mp4.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Video (.mp4), or recording for rerun (.rrd). Default: RUN/episode.mp4."),
+    ] = None,
     fps: Annotated[
         float | None,
         typer.Option(
@@ -51,14 +56,17 @@ def video(
     tasks: RunTasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Write an episode as an MP4 video.
+    """Write an episode as a video, or as a recording for rerun.
 
-    It shows the views, the agent's map and memory, and the truth.
+    Both show the views, the agent's map and memory, and the truth.
     """
+    out = out or run / "episode.mp4"
+    if out.suffix == RECORDING:
+        _write_recording(run, task, agent, stage, out, tasks, exchanges)
+        return
     from evonav.replay.video import check_video, write_video
     from evonav.replay.video_frames import episode_frame, stage_frames
 
-    out = out or run / "episode.mp4"
     check_video(out, fps or ROUNDS_FPS, width)
     replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
     maps = {one.record.stage: one.floor_plan for one in stages[0] if one.floor_plan is not None}
@@ -77,22 +85,18 @@ def video(
     typer.echo(f"video: {out} ({agent} in {stages[0][0].record.task_id}, {counted(num, 'picture')})")
 
 
-def rerun(
-    run: RunFolder,
-    task: RunTask = None,
-    agent: Agent = None,
-    stage: Stages = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to write. Default: RUN/episode.rrd.")] = None,
-    tasks: RunTasks = None,
-    exchanges: Exchanges = None,
+def _write_recording(
+    run: Path,
+    task: str | None,
+    agent: str | None,
+    stage: "Sequence[str] | None",
+    out: Path,
+    tasks: Path | None,
+    exchanges: Path | None,
 ) -> None:
-    """Write an episode as a recording for the rerun viewer.
-
-    It shows the views, the agent's map and memory, and the truth.
-    """
+    """Write an episode for the rerun viewer."""
     from evonav.replay.rerun_export import check_recording, write_recording
 
-    out = out or run / "episode.rrd"
     check_recording(out)
     _, agent, (stages, shown), radius_m = _replayed(
         run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.shared import BUNDLED, PlotFile, Workers, num_workers_of, task_folder
+from evonav.cli.options.shared import BUNDLED, PLOTS, Workers, num_workers_of, task_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,7 +23,10 @@ def stats(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Folder to write statistics.json, statistics.html and statistics.svg to."),
+        typer.Option(
+            metavar="PATH",
+            help="Folder to write statistics.json, .html and .svg to, or the plot alone (.svg, .png, .pdf).",
+        ),
     ] = None,
     reweight: Annotated[
         str | None,
@@ -32,7 +35,6 @@ def stats(
             help="Also weight tasks so that their houses have the room counts of a dataset: procthor-10k.",
         ),
     ] = None,
-    plot: PlotFile = None,
     workers: Workers = None,
 ) -> None:
     """Print and plot statistics of tasks beside the paper's."""
@@ -43,6 +45,7 @@ def stats(
     from evonav.report.plots.render import check_plot
     from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
 
+    plot = out if out is not None and out.suffix.lstrip(".") in PLOTS else None
     if plot is not None:
         check_plot(plot)
     with ExitStack() as stack, status("Reading tasks") as tell:
@@ -53,10 +56,10 @@ def stats(
             on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,
         )
     print_statistics(found)
-    if out is not None:
-        typer.echo(f"report: {write_dataset_report(found, out)}")
     if plot is not None:
         typer.echo(f"plot: {write_statistics_plot(found, plot)}")
+    elif out is not None:
+        typer.echo(f"report: {write_dataset_report(found, out)}")
 
 
 def print_statistics(found: "TaskStatistics") -> None:
