@@ -12,9 +12,8 @@ from evonav.cli import app
 from evonav.controlled.analysis import MEASURES, load_analysis, pair_tables, split_of
 from evonav.controlled.claims import claims
 from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
-from evonav.controlled.page import write_controlled_report
+from evonav.controlled.page import controlled_plots, write_controlled_report
 from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
-from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.changes import TransitionRecord

@@ -11,7 +11,7 @@ from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.types import ReplayedRound, ReplayedStage
 from evonav.replay.video_frames import episode_frame, stage_frames
-from evonav.report.maps.moments import during_facts, during_words, moments
+from evonav.report.maps.moments import describe_during, during_facts, moments
 
 PLATE_M = (OLD_TABLE_M[0] + 0.3, 0.8, OLD_TABLE_M[2])
 FRIDGE_M = (0.5, 0.9, 0.8)
@@ -60,7 +60,7 @@ def test_what_stayed_is_drawn_where_it_stood(plan: FloorPlan) -> None:
     _, second = moments(changed(2, "fridge"), {1: plan})
     assert places(second.maps[1]) == {**places(plan), "table": NEW_TABLE_M}
     assert [one.object_id for one in second.record.transition.relocations] == ["table"]
-    assert during_words(second).endswith("1 object moved; 1 object stayed, because the agent was in the way")
+    assert describe_during(second).endswith("1 object moved; 1 object stayed, because the agent was in the way")
 
 
 def test_a_stage_that_ends_before_the_change_has_one_moment(plan: FloorPlan) -> None:

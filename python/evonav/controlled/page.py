@@ -6,35 +6,37 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.controlled.analysis import BASELINE, Analysis, Key, load_analysis, pair_tables
+from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, load_analysis, pair_tables
 from evonav.controlled.claims import claim_table
 from evonav.controlled.paired_maps import (
+    ARM_WORDS,
     REASONS,
     Rollout,
-    arm_words,
+    arm_title,
     change_sentence,
+    describe_split,
     highlighted_pairs,
     load_pair,
     pair_frame,
     pair_svg,
-    split_words,
     walk_and_course,
 )
-from evonav.controlled.plots import controlled_plots
-from evonav.controlled.rates import rate_tables
+from evonav.controlled.rates import by_rate, rate_tables
 from evonav.drawing.files import SUFFIXES
 from evonav.drawing.floor_plan import furniture, ground, labels, moving_ids
 from evonav.drawing.style import map_css
 from evonav.drawing.svg import join, slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.maps.legend import legend
-from evonav.report.maps.stage_map import outcome_words
+from evonav.report.maps.text import describe_outcome
 from evonav.report.maps.trajectory import change
 from evonav.report.pages.task_cards import stage_cell
 from evonav.report.pages.template import page_text, picture_uri, text_of
 from evonav.report.plots.render import has_renderer, plot_elements, write_plots
+from evonav.report.plots.specs import BarPlot, CurvePlot, Line, Plot, Series
 from evonav.report.plots.style import plot_css
 from evonav.report.tables.table import Table, latex_tables, markdown_tables
+from evonav.statistics import ClusterBootstrap
 
 PAGE_NAME = "index.html"
 PLOT_NAMES = {"pairs": "fixed-not-fixed", "rates": "rates"}
@@ -92,6 +94,33 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     return write_atomically(out / PAGE_NAME, page)
 
 
+def controlled_plots(analysis: Analysis) -> list[Plot]:
+    """Return SR and SPL of every agent: in both arms, or over all evolution rates."""
+    if analysis.record.kind == "pairs":
+        return [_arm_plot(analysis, name, measure) for name, measure in MEASURES.items()]
+    return [_rate_plot(analysis, name, measure) for name, measure in MEASURES.items()]
+
+
+def _arm_plot(analysis: Analysis, name: str, measure: Measure) -> BarPlot:
+    """Return means in both arms, over the pairs that each agent has scored."""
+    groups, arm_means = [], []
+    for agent in analysis.paired_agents:
+        keys = analysis.keys(agent)
+        groups.append(f"{agent}\n({len(keys)})")
+        bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
+        arm_means.append(bootstrap.column_means(analysis.values(agent, measure, keys)))
+    series = tuple(Series.of(arm, [found[j] for found in arm_means]) for j, arm in enumerate(ARM_WORDS.values()))
+    note = "in parentheses: pairs; whiskers: 95%, bootstrap by house"
+    return BarPlot(f"{name}, %", tuple(groups), series, notes=(note,), y_top=100.0, has_values=True)
+
+
+def _rate_plot(analysis: Analysis, name: str, measure: Measure) -> CurvePlot:
+    found = {agent: by_rate(analysis, agent, measure) for agent in analysis.agents}
+    lines = [Line.of(agent, by_arm) for agent, by_arm in found.items() if by_arm]
+    x_label = "probability that a transition evolves the house"
+    return CurvePlot(f"{name} by evolution rate", tuple(lines), x_label, f"{name}, %")
+
+
 def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
     """Draw the most instructive pairs, and return their lines of the page."""
     others = [agent for agent in analysis.agents if agent != BASELINE]
@@ -132,7 +161,7 @@ def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
             [
                 ("none", "no score")
                 if (one := analysis.outcomes[arm, agent].get(key)) is None
-                else (one.row.state, f"{arm_words(arm)}: {outcome_words(one.row)}")
+                else (one.row.state, f"{arm_title(arm)}: {describe_outcome(one.row)}")
                 for arm in analysis.arms
             ]
             for agent in analysis.agents
@@ -179,13 +208,13 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
     return {
         "legend": legend(),
         "task_id": key[0],
-        "change": split_words(analysis, agents[0], key),
+        "change": describe_split(analysis, agents[0], key),
         "instruction": first.goal.instruction,
         "image": here[0].reference_image if here else None,
         "defs": Markup(join(defs)),  # noqa: S704 - our own SVG
         "arms": [
             {
-                "words": arm_words(one.arm),
+                "words": arm_title(one.arm),
                 "change": change_sentence(one),
                 "is_static": one.record.transition.kind == "static",
             }

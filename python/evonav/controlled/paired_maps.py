@@ -14,7 +14,8 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
-from evonav.report.maps.stage_map import change_words, house_drawing, success_radius_of, task_frame
+from evonav.report.maps.stage_map import house_drawing, success_radius_of, task_frame
+from evonav.report.maps.text import describe_change
 from evonav.report.maps.trajectory import course
 from evonav.report.tables.causes import sentence
 
@@ -126,21 +127,21 @@ def _panel(rollout: Rollout, frame: Frame, left_px: int) -> str:
         (css, 50, text_lines(change_sentence(rollout), 90, 1)[0]),
     ]
     drawing = house_drawing(record, rollout.maps, frame, on_it=walk_and_course(rollout, frame))
-    return panel(record, drawing, frame, (left_px, HEAD_PX), PANEL_PX, (arm_words(rollout.arm), verdict), captions)
+    return panel(record, drawing, frame, (left_px, HEAD_PX), PANEL_PX, (arm_title(rollout.arm), verdict), captions)
 
 
-def arm_words(arm: str) -> str:
+def arm_title(arm: str) -> str:
     """Return `Fixed`, `Not Fixed`, or the name of another arm."""
     return ARM_WORDS.get(arm, arm)
 
 
 def change_sentence(rollout: Rollout) -> str:
     """Describe what had changed since the guided stages."""
-    text = change_words(rollout.record, rollout.maps)
+    text = describe_change(rollout.record, rollout.maps)
     return f"{text}, the target among them" if rollout.record.target.is_relocated_now else text
 
 
-def split_words(analysis: Analysis, agent: str, key: Key) -> str:
+def describe_split(analysis: Analysis, agent: str, key: Key) -> str:
     """Describe what the pair's change touched."""
     return SPLITS[split_of(analysis.outcomes[analysis.arms[-1], agent][key])]
 

@@ -28,9 +28,8 @@ from evonav.replay.types import (
     ReplayedStage,
     Truth,
 )
-from evonav.report.maps.moments import during_facts, during_words, moments
-from evonav.report.maps.round_words import choice_words, entry_name, reason_words
-from evonav.report.maps.stage_map import change_words, outcome_words
+from evonav.report.maps.moments import describe_during, during_facts, moments
+from evonav.report.maps.text import describe_change, describe_choice, describe_outcome, describe_reason, entry_name
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
@@ -91,12 +90,12 @@ class PageData:
         entry: dict[str, Any] = {
             "k": record.stage,
             "state": record.state.value,
-            "words": outcome_words(record),
+            "words": describe_outcome(record),
             "sentence": sentence(record),
             "goal": record.goal.instruction,
             "noun": noun_of(record.goal.category),
             "reference": None if stage.floor_plan is None else stage.floor_plan.reference_image,
-            "changed": change_words(record, maps) + _target_words(record),
+            "changed": describe_change(record, maps) + _target_words(record),
             "lost": _lost_words(record),
             "facts": _facts(record),
             "budget": budget,
@@ -110,7 +109,7 @@ class PageData:
             "rounds": [rounds.data(step) for step in stage.rounds],
         }
         if (after := moments(record, maps)[1:]) != []:
-            entry["during"] = [after[0].first_round, during_words(after[0])]
+            entry["during"] = [after[0].first_round, describe_during(after[0])]
         self.stages.append(entry)
 
 
@@ -139,7 +138,7 @@ class _Rounds:
         found["kind"] = _kind(record)
         if step.note:
             found["note"] = step.note
-        if (truth := evaluator_words(self._record, step)) != "":
+        if (truth := describe_truth(self._record, step)) != "":
             found["truth"] = truth
         if step.map is not None:
             found |= self._map(step.map)
@@ -159,7 +158,7 @@ class _Rounds:
         """`[kind, outcome, answer, prompt, names, meaning]`: the meaning is the answer's object as the map names it."""
         head, *rest = question.answer.split("\n")
         names = _offered_names(question)
-        answer = "\n".join((head, *map(reason_words, rest)))
+        answer = "\n".join((head, *map(describe_reason, rest)))
         meaning = names.get(head.strip(), "")
         return [question.kind, question.outcome, answer, self._page.prompt(question), _names_text(names), meaning]
 
@@ -168,7 +167,7 @@ class _Rounds:
         verbs = {"navigate_to": "go to", "stop": "stop", "move": (action.action or "").lower().replace("_", " ")}
         found: dict[str, Any] = {
             "action": verbs[action.kind],
-            "choice": choice_words(record),
+            "choice": describe_choice(record),
             "path": polyline(simplified([cm(point) for point in record.path_m])),
             "len": round(sum(math.dist(a, b) for a, b in pairwise(record.path_m)), 3),
             "seen": record.is_target_visible,
@@ -177,7 +176,7 @@ class _Rounds:
         if action.position_m is not None:
             found["to"] = list(cm(action.position_m))
         if action.reason:
-            found["why"] = reason_words(action.reason)
+            found["why"] = describe_reason(action.reason)
         if not record.is_action_success:
             found["failed"] = True
         if record.chosen_entry is not None:
@@ -188,7 +187,7 @@ class _Rounds:
         if record.details:
             found["details"] = _plain(record.details)
             if isinstance(reason := record.details.get("reason"), str):
-                found["details"]["reason"] = reason_words(reason)
+                found["details"]["reason"] = describe_reason(reason)
         counters = {name: count for name, count in record.counters.items() if self._counters.get(name) != count}
         if counters:
             found["counters"] = counters
@@ -316,7 +315,7 @@ def _kind(record: RoundRecord | None) -> str:
     return next((kind for prefix, kind in _KINDS.items() if record.choice.startswith(prefix)), "other")
 
 
-def evaluator_words(stage: StageRecord, step: ReplayedRound) -> str:
+def describe_truth(stage: StageRecord, step: ReplayedRound) -> str:
     """Describe what the evaluator knows of the entry that a round chose."""
     chosen = None if step.record is None else step.record.chosen_entry
     if chosen is None:

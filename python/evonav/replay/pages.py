@@ -20,7 +20,8 @@ from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
 from evonav.report.maps.legend import entries_of, legend
 from evonav.report.maps.moments import Moment, moments
-from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
+from evonav.report.maps.stage_map import page_name, task_frame
+from evonav.report.maps.text import describe_outcome
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
 from evonav.report.pages.template import page_text, text_of
@@ -210,7 +211,7 @@ def _write(
         agent=first.agent,
         task_id=first.task_id,
         href=path.name,
-        stages=[[record.stage, record.state.value, outcome_words(record)] for record in records],
+        stages=[[record.stage, record.state.value, describe_outcome(record)] for record in records],
         differs=any(stage.differences for stage in stages),
         records_sha256=records_sha256,
         code=page_code(),

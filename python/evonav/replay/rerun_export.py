@@ -17,11 +17,10 @@ from evonav.drawing.files import check_suffix
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan
 from evonav.parallel.folders import replacing
-from evonav.replay.page_data import evaluator_words
+from evonav.replay.page_data import describe_truth
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
 from evonav.report.maps.moments import Moment, moments
-from evonav.report.maps.round_words import choice_words
-from evonav.report.maps.stage_map import change_words, outcome_words
+from evonav.report.maps.text import describe_change, describe_choice, describe_outcome
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
@@ -109,7 +108,7 @@ class _Recorder:
                     self._house(moment)
             self._round(replayed)
             step += 1
-        text = f"stage {record.stage}: {outcome_words(record)}. {sentence(record)}"
+        text = f"stage {record.stage}: {describe_outcome(record)}. {sentence(record)}"
         self._stream.log("words", self._rr.TextLog(text, level="INFO"))
         return step
 
@@ -117,7 +116,7 @@ class _Recorder:
         """Write where everything is: as the stage begins, and after a change during it."""
         rr, log, record = self._rr, self._stream.log, moment.record
         if moment.first_round > 0:
-            log("words", rr.TextLog(f"the house changes: {change_words(record, moment.maps)}", level="INFO"))
+            log("words", rr.TextLog(f"the house changes: {describe_change(record, moment.maps)}", level="INFO"))
         x_m, y_m, z_m = record.target.position_m
         log("world/target", rr.Points3D([(x_m, z_m, y_m)], colors=[_GOLD], radii=[0.12], labels=["target"]))
         turns = np.linspace(0, math.tau, 61)
@@ -160,10 +159,10 @@ class _Recorder:
         self._way += path
         log("world/agent/way", rr.LineStrips3D([self._way], colors=[_WAY], radii=[0.02]))
         log("world/agent/step", rr.LineStrips3D([path], colors=[_CHOSEN], radii=[0.03]))
-        log("words", rr.TextLog(choice_words(record), level="INFO"))
+        log("words", rr.TextLog(describe_choice(record), level="INFO"))
         for question in replayed.questions:
             log("words/answers", rr.TextLog(f"{question.kind}, {question.outcome}: {question.answer}", level="DEBUG"))
-        if text := evaluator_words(self._stage.record, replayed):
+        if text := describe_truth(self._stage.record, replayed):
             log("words/evaluator", rr.TextLog(text, level="WARN"))
 
     def _view(self, name: str, view: ReplayedView) -> None:

@@ -12,11 +12,11 @@ from evonav.drawing.style import light_css
 from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
-from evonav.replay.page_data import evaluator_words
+from evonav.replay.page_data import describe_truth
 from evonav.replay.types import ReplayedRound, ReplayedStage
 from evonav.report.maps.moments import Moment, moments
-from evonav.report.maps.round_words import choice_words, reason_words
-from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
+from evonav.report.maps.stage_map import task_frame
+from evonav.report.maps.text import describe_change, describe_choice, describe_outcome, describe_reason
 from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence
 
@@ -80,7 +80,7 @@ class _StageFilm:
         """Return the last round again, with how the stage ended in place of what was chosen."""
         record = self._stage.record
         css = {EndState.SUCCESS: "success", EndState.FAILURE: "failure"}.get(record.state, "other-end")
-        outcome = outcome_words(record)
+        outcome = describe_outcome(record)
         box = f'x="{MARGIN}" y="30" width="{28 + _LETTER * 26 * len(outcome):.0f}" height="44" rx="10"'
         verdict = f'<rect class="{css}" {box}/>{_text("end-text", MARGIN + 14, 61, outcome)}'
         cause = _paragraph("cause", MARGIN, 100, sentence(record), 20, SIZE[0] - 2 * MARGIN, 1)
@@ -121,7 +121,7 @@ def _header(moment: Moment) -> str:
     agent = record.agent[-40:]
     task_left = MARGIN + _LETTER * 26 * len(agent) + 18
     changed = " changed" if record.transition.relocations else ""
-    change = change_words(record, maps) if first_round == 0 else f"now: {change_words(record, maps)}"
+    change = describe_change(record, maps) if first_round == 0 else f"now: {describe_change(record, maps)}"
     truth = change if changed else f"what is true: {change}"
     heads = ("what it sees", "what it knows: map and memory", truth)
     return (
@@ -176,12 +176,12 @@ def _scaled(jpeg: bytes, width: int, height: int) -> Image.Image:
 def _captions(stage: ReplayedStage, step: ReplayedRound) -> str:
     """Return what the round chose and why on the left, and what the evaluator knows of it on the right."""
     record = step.record
-    choice = "error" if record is None else f"chosen: {choice_words(record)}"
+    choice = "error" if record is None else f"chosen: {describe_choice(record)}"
     why = f"why: {reason}" if (reason := _reason(record)) else ""
     if step.questions and step.questions[-1].outcome != "answered":
         last = step.questions[-1]
         why = f"the question “{last.kind}” has no valid answer ({last.outcome}): {last.answer}"
-    known = evaluator_words(stage.record, step)
+    known = describe_truth(stage.record, step)
     seen = "the target is in view" if record is not None and record.is_target_visible else ""
     left, width = LEFTS[2], MAP_PX
     return (
@@ -197,7 +197,7 @@ def _reason(record: RoundRecord | None) -> str:
     if record is None:
         return ""
     reason = record.action.reason or record.details.get("reason")
-    return reason_words(reason) if isinstance(reason, str) else ""
+    return describe_reason(reason) if isinstance(reason, str) else ""
 
 
 def _timeline(stage: ReplayedStage, index: int) -> str:

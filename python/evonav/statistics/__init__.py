@@ -1,7 +1,7 @@
 """Intervals, differences and verdicts, all by house (docs/statistics.md)."""
 
 from evonav.statistics.before_after import BeforeAfter
-from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate
+from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate, effective_size, weighted_quantiles
 from evonav.statistics.counts import ChiSquare, chi_square, mcnemar
 from evonav.statistics.distributions import student_quantile
 from evonav.statistics.interval import Z_95, Interval, newcombe, percentile_interval, widened_tail, wilson
@@ -18,7 +18,6 @@ from evonav.statistics.paired import (
     sign_flip,
     with_holm,
 )
-from evonav.statistics.weighted import effective_size, weighted_quantiles
 
 __all__ = [
     "DETECTABLE_Z",

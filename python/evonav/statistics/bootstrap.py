@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from evonav import _core
 from evonav.statistics.interval import Interval, percentile_interval
-from evonav.statistics.weighted import weighted_quantiles
 
 NUM_RESAMPLES = 10_000
 MAX_RESAMPLE_CELLS = 4_000_000
@@ -236,3 +235,26 @@ def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.ui
             counts[:, indices] = drawn
         blocks.append(counts)
     return tuple(blocks)
+
+
+def weighted_quantiles(
+    values: NDArray[np.float64], weights: NDArray[np.float64], shares: Sequence[float]
+) -> NDArray[np.float64]:
+    """Return the least value that at least each share of the weight does not exceed; the mean of two where it is exact.
+
+    With equal weights and share 0.5 this is the plain median.
+    """
+    order = np.argsort(values, kind="stable")
+    ordered, cumulated = values[order], np.cumsum(weights[order])
+    wanted = np.asarray(shares) * cumulated[-1]
+    slack = 1e-9 * cumulated[-1]
+    low = np.searchsorted(cumulated, wanted - slack)
+    high = np.searchsorted(cumulated, wanted + slack)
+    last = len(ordered) - 1
+    return np.asarray((ordered[np.minimum(low, last)] + ordered[np.minimum(high, last)]) / 2)
+
+
+def effective_size(weights: NDArray[np.float64]) -> float:
+    """Return Kish's number of equally weighted units that tell as much: `(sum w)^2 / sum w^2`."""
+    squares = float(np.square(weights).sum())
+    return float(weights.sum()) ** 2 / squares if squares > 0 else 0.0

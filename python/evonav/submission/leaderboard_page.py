@@ -6,8 +6,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from evonav.parallel.folders import write_atomically
-from evonav.report.pages.rate_bar import rate_bar
-from evonav.report.pages.template import page_text, text_of
+from evonav.report.pages.template import page_text, rate_bar, text_of
 from evonav.report.tables.numbers import percent, rate
 from evonav.report.tables.table import INTERVALS, SPLIT_TITLES
 from evonav.submission.leaderboard import Conditions, Entry, Leaderboard

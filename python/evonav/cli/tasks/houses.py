@@ -82,7 +82,7 @@ def show_house(
     from evonav.generation.house_check import check_house
     from evonav.generation.house_view import house_view
     from evonav.parallel.folders import write_atomically
-    from evonav.report.tasks.house_page import house_page
+    from evonav.report.tasks.pages import house_page
 
     name, text = next(iter(read_houses(house, assets, start)))
     view = house_view(

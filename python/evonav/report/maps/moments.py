@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from evonav.counted import counted
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
-from evonav.report.maps.stage_map import change_words
+from evonav.report.maps.text import describe_change
 
 
 class Moment(NamedTuple):
@@ -48,9 +48,9 @@ def _without(plan: FloorPlan, skipped_ids: tuple[str, ...]) -> FloorPlan:
     )
 
 
-def during_words(moment: Moment) -> str:
+def describe_during(moment: Moment) -> str:
     """Describe the change during a stage that a moment begins with."""
-    during, text = moment.record.during, change_words(moment.record, moment.maps)
+    during, text = moment.record.during, describe_change(moment.record, moment.maps)
     if during is None:
         return text
     target = ", the target among them" if during.is_target_relocated else ""

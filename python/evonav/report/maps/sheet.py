@@ -7,7 +7,7 @@ from evonav.drawing.style import file_css
 from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.report.maps.legend import legend_row
-from evonav.report.maps.stage_map import outcome_words
+from evonav.report.maps.text import describe_outcome
 
 
 def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, *, foot: str = "", foot_px: int) -> str:
@@ -44,7 +44,7 @@ def panel(
         f'<g transform="translate({place_px[0]} {place_px[1]})"><svg width="{width_px}" height="{height_px}" '
         f'viewBox="{frame.view_box}">{drawing}</svg>'
         f'<text class="verdict" y="{height_px + 18}"><tspan class="ink">{escape(name)}</tspan> '
-        f'<tspan class="{css}">{escape(outcome_words(record))}</tspan></text>{lines}</g>'
+        f'<tspan class="{css}">{escape(describe_outcome(record))}</tspan></text>{lines}</g>'
     )
 
 

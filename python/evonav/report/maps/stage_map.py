@@ -1,18 +1,14 @@
-"""Draw the map of a stage, and say in words what happened before it and how it ended."""
+"""Draw the map of a stage."""
 
 from collections.abc import Mapping, Sequence
 
-from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.drawing.style import file_css
 from evonav.drawing.svg import escape, slug
-from evonav.evaluation.metrics.navigation import Stage
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
+from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.report.maps.trajectory import change, course
 from evonav.report.tables.causes import sentence
-from evonav.report.tables.table import mode_words
-from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900
 VIEW_DIR = "view"
@@ -46,29 +42,6 @@ def map_name(record: StageRecord) -> str:
 def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
     """Return the file name of a viewer's page of an episode, or of one stage of it."""
     return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
-
-
-def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
-    """Describe what happened before the stage in a few words."""
-    transition = record.transition
-    if transition.kind == "static":
-        return "first stage" if record.stage == 1 else "nothing changed"
-    rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
-    room = rooms.get(transition.room_id or "", transition.room_id or "a room")
-    moved = f"{counted(len(transition.relocations), 'object')} moved"
-    phrases = [f"{mode_words(transition.mode)} in the {room}: {moved}"] if transition.mode is not None else []
-    if transition.kind == "activities":
-        phrases.append(f"daily activities, most in the {room}: {moved}")
-    counts = {"came": transition.num_added, "went": transition.num_removed, "opened or switched": transition.num_states}
-    phrases.extend(f"{counted(number, 'object')} {what}" for what, number in counts.items() if number)
-    return ", ".join(phrases)
-
-
-def outcome_words(stage: Stage) -> str:
-    """Return `success, SPL 0.83` and the like."""
-    if stage.state == EndState.SUCCESS:
-        return "success" if stage.spl is None else f"success, SPL {stage.spl:.2f}"
-    return EndState(stage.state).value.replace("_", " ")
 
 
 def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:

@@ -9,7 +9,8 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
-from evonav.report.maps.stage_map import change_words, stage_drawing, success_radius_of, task_frame
+from evonav.report.maps.stage_map import stage_drawing, success_radius_of, task_frame
+from evonav.report.maps.text import describe_change
 from evonav.report.pages.highlights import best_highlight
 from evonav.report.run import load_run
 from evonav.report.tables.causes import sentence
@@ -85,7 +86,7 @@ def _head(record: StageRecord, maps: Mapping[int, FloorPlan], left_px: int) -> s
     """Draw the goal of a stage, its reference image, and what had changed."""
     image = reference_image(maps.get(record.stage), PANEL_PX, 10, IMAGE_PX)
     lines = instruction_lines(record.goal.instruction, 38 if image else 54, 3)
-    changed = text_lines(change_words(record, maps), 56, 1)[0]
+    changed = text_lines(describe_change(record, maps), 56, 1)[0]
     css = "quiet" if record.transition.kind == "static" else "change-words"
     return (
         f'<g transform="translate({left_px} 0)"><text class="stage" y="27">Stage {record.stage}</text>{lines}{image}'

@@ -16,7 +16,7 @@ from evonav.evaluation.records.schema import (
     StageRecord,
     TargetRecord,
 )
-from evonav.report.maps.round_words import choice_words
+from evonav.report.maps.text import describe_choice
 from evonav.tasks.language import noun_of
 
 NUM_TIMES = 10
@@ -294,7 +294,7 @@ def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visit
 
 
 def _choice(entry: RoundRecord) -> str:
-    return choice_words(entry, has_truth=True)
+    return describe_choice(entry, has_truth=True)
 
 
 def _ground(point_m: Sequence[float]) -> Point:

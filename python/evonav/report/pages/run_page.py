@@ -12,12 +12,12 @@ from evonav.drawing.svg import slug
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
-from evonav.report.maps.stage_map import VIEW_DIR, map_name, outcome_words, stage_svg
+from evonav.report.maps.stage_map import VIEW_DIR, map_name, stage_svg
+from evonav.report.maps.text import describe_outcome
 from evonav.report.pages.highlights import highlights_first
-from evonav.report.pages.rate_bar import rate_bar
 from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import filter_data, task_view
-from evonav.report.pages.template import packed, page_environment, policy, text_of
+from evonav.report.pages.template import packed, page_environment, policy, rate_bar, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import Breakdowns, run_breakdowns, run_plots
 from evonav.report.plots.style import plot_css
@@ -196,7 +196,7 @@ def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
         return ("none", "no record yet")
     row = outcome.row
     why = f": {CAUSE_NAMES[outcome.cause]}" if outcome.cause is not None and row.is_scored else ""
-    return (row.state, f"{outcome.category}, {outcome_words(row)}{why}")
+    return (row.state, f"{outcome.category}, {describe_outcome(row)}{why}")
 
 
 def _bars(summary: AgentSummary) -> list[Markup]:

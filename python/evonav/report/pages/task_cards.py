@@ -9,7 +9,8 @@ from evonav.counted import counted
 from evonav.drawing.floor_plan import furniture, ground, item_labels, labels, moving_ids
 from evonav.drawing.svg import clean, join, slug
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
+from evonav.report.maps.stage_map import task_frame
+from evonav.report.maps.text import describe_change, describe_outcome
 from evonav.report.maps.trajectory import change, course, rounds
 from evonav.report.run import RecordedRun, Task
 from evonav.report.tables.causes import sentence
@@ -57,7 +58,7 @@ def task_view(run: RecordedRun, task: Task, prefix: str, hrefs: Mapping[tuple[st
     for stage in stages:
         recorded = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
         image = task.maps[stage].reference_image if stage in task.maps else None
-        goals.append((stage, recorded, "" if recorded is None else change_words(recorded, task.maps), image))
+        goals.append((stage, recorded, "" if recorded is None else describe_change(recorded, task.maps), image))
     return {
         "anchor": slug(task.task_id),
         "task_id": task.task_id,
@@ -74,7 +75,7 @@ def stage_cell(record: StageRecord, svg: Markup) -> dict[str, Any]:
     """Return a stage of an agent as templates show it, below its map."""
     return {
         "state": record.state.value,
-        "outcome": outcome_words(record),
+        "outcome": describe_outcome(record),
         "sentence": sentence(record),
         "rounds": rounds(record.trace),
         "svg": svg,

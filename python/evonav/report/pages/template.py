@@ -1,4 +1,4 @@
-"""Provide what all pages share: templates that escape, a policy that forbids the network, packed parts."""
+"""Provide what all pages share: escaping templates, a policy that forbids the network, bars of rates, packed parts."""
 
 import base64
 import hashlib
@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from evonav.counted import counted
 from evonav.drawing.svg import clean
+from evonav.statistics import Interval
 
 
 def text_of(name: str) -> Markup:
@@ -72,6 +73,18 @@ def policy(styles: tuple[str, ...] | None, scripts: tuple[str, ...] = ()) -> str
 def picture_uri(svg: str) -> str:
     """Return a picture as the source of an `img`, in the page itself."""
     return f"data:image/svg+xml;base64,{base64.b64encode(clean(svg).encode()).decode()}"
+
+
+def rate_bar(value: float | None, interval: Interval | None) -> Markup:
+    """Draw a rate of 0 to 1 with its interval, on a scale of 0 to 100%; nothing without a rate."""
+    if value is None:
+        return Markup("")
+    low, high = interval or (value, value)
+    return Markup(
+        '<svg class="bar" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">'
+        '<rect class="track" width="100" height="10"/><rect class="value" width="{:.2f}" height="10"/>'
+        '<path class="whisker" d="M{:.2f} 5H{:.2f}M{:.2f} 2V8M{:.2f} 2V8"/></svg>'
+    ).format(100 * value, 100 * low, 100 * high, 100 * low, 100 * high)
 
 
 def packed(text: str) -> Markup:

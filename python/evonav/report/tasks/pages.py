@@ -1,4 +1,4 @@
-"""Write pages of tasks, which show the oracle: every stage before and after its hidden change, and a gallery."""
+"""Write pages of houses and tasks, which show the oracle: every stage before and after its change, and a gallery."""
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -25,7 +25,7 @@ from evonav.report.tasks.floor_plans import (
     task_drawing,
     thumbnail_svg,
 )
-from evonav.report.tasks.wording import change_sentence, move_rows, stage_facts
+from evonav.report.tasks.text import change_sentence, move_rows, stage_facts
 from evonav.tasks import Task
 
 INDEX_NAME = "index.html"
@@ -91,6 +91,30 @@ def write_gallery(
         rooms=sorted({card["num_rooms"] for card in cards}),
     )
     return write_atomically(out_dir / INDEX_NAME, index)
+
+
+def house_page(
+    name: str, *, summary: str, task: str, rooms: Sequence[Sequence[str]], findings: Sequence[str], plan_svg: str | None
+) -> str:
+    """Return a page in one file.
+
+    Args:
+        task: Whether it gives a task, and why not.
+        rooms: Id, type, floor area and number of objects of each room.
+        findings: Its flaws, wrong or odd.
+        plan_svg: Its plan, drawn by evonav; `None` for a house that cannot be read.
+    """
+    return page_text(
+        "house.html.j2",
+        text_of("report.css"),
+        has_drawings=True,
+        name=name,
+        summary=summary,
+        task=task,
+        rooms=rooms,
+        findings=findings,
+        plan=None if plan_svg is None else Markup(plan_svg),  # noqa: S704 - our own drawing
+    )
 
 
 def stage_svg(drawing: TaskDrawing, stage: int) -> str:

@@ -1,8 +1,15 @@
-"""Write in words what an agent chose in a round, and why; entries and frontiers are named as on the map."""
+"""Describe a stage in words: what changed before it, what an agent chose and why, and how it ended.
+
+Entries and frontiers are named as on the map.
+"""
 
 import re
+from collections.abc import Mapping
 
-from evonav.evaluation.records.schema import RoundRecord
+from evonav.counted import counted
+from evonav.evaluation.metrics.navigation import Stage
+from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
+from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 
 _REASONS = (
@@ -21,7 +28,7 @@ def entry_name(label: str, entry_id: int) -> str:
     return f"{noun_of(label)} #{entry_id}"
 
 
-def choice_words(entry: RoundRecord, *, has_truth: bool = False) -> str:
+def describe_choice(entry: RoundRecord, *, has_truth: bool = False) -> str:
     """Describe what a round chose, and with `has_truth` whether the entry was stale and the action failed."""
     kind, _, number = entry.choice.partition(" ")
     text = entry.choice or _action_words(entry)
@@ -42,10 +49,33 @@ def _action_words(entry: RoundRecord) -> str:
     return "stop" if entry.action.kind == "stop" else "go to a point"
 
 
-def reason_words(reason: str) -> str:
+def describe_reason(reason: str) -> str:
     """Return the reason of a rule in plain words; the reason of a model, or of one's own agent, as it is."""
     for pattern, plain in _REASONS:
         if (found := re.fullmatch(pattern, reason)) is not None:
             label, *others = found.groups() or ("",)
             return plain.format(noun_of(label), *others)
     return reason
+
+
+def describe_change(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
+    """Describe what happened before the stage in a few words."""
+    transition = record.transition
+    if transition.kind == "static":
+        return "first stage" if record.stage == 1 else "nothing changed"
+    rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
+    room = rooms.get(transition.room_id or "", transition.room_id or "a room")
+    moved = f"{counted(len(transition.relocations), 'object')} moved"
+    phrases = [f"{mode_words(transition.mode)} in the {room}: {moved}"] if transition.mode is not None else []
+    if transition.kind == "activities":
+        phrases.append(f"daily activities, most in the {room}: {moved}")
+    counts = {"came": transition.num_added, "went": transition.num_removed, "opened or switched": transition.num_states}
+    phrases.extend(f"{counted(number, 'object')} {what}" for what, number in counts.items() if number)
+    return ", ".join(phrases)
+
+
+def describe_outcome(stage: Stage) -> str:
+    """Return `success, SPL 0.83` and the like."""
+    if stage.state == EndState.SUCCESS:
+        return "success" if stage.spl is None else f"success, SPL {stage.spl:.2f}"
+    return EndState(stage.state).value.replace("_", " ")
