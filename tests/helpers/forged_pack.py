@@ -11,7 +11,7 @@ from evonav.evaluation.episode.motion import polyline_length_m
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.submission.pack import packed_summary
-from evonav.submission.verify import Verdict
+from evonav.submission.verify import PackVerdict
 
 
 def line_of(row: dict[str, Any]) -> bytes:
@@ -84,7 +84,7 @@ def rescored(row: dict[str, Any]) -> None:
     }
 
 
-def assert_rejected(verdict: Verdict, check: str, reason: str) -> None:
+def assert_rejected(verdict: PackVerdict, check: str, reason: str) -> None:
     """The first check that a file fails, and why."""
     failed = [(one.name, one.detail) for one in verdict.checks if not one.is_passed]
     assert failed, "accepted"

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.run.run import evaluate
 from evonav.submission.file import About
-from evonav.submission.leaderboard import Leaderboard, TaskSet, Unranked, packed_files, rank
+from evonav.submission.leaderboard import Leaderboard, RankedTasks, Unranked, packed_files, rank
 from evonav.submission.leaderboard_page import write_leaderboard
 from evonav.submission.pack import pack
 from evonav.tasks.bundled import bundled_tasks
@@ -26,13 +26,13 @@ CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
-def tasks() -> Iterator[TaskSet]:
+def tasks() -> Iterator[RankedTasks]:
     with bundled_tasks() as folder:
-        yield TaskSet("one", tuple(task_files(folder, 1)))
+        yield RankedTasks("one", tuple(task_files(folder, 1)))
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, tasks: TaskSet) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory, tasks: RankedTasks) -> Path:
     """A folder with a pack of two agents, one of poor perception, and the runs beside them."""
     root = tmp_path_factory.mktemp("leaderboard")
     evaluate(["fu", "ftu"], list(tasks.tasks), root / "run", num_workers=0)
@@ -46,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, tasks: TaskSet) -> Path:
 
 
 @pytest.fixture(scope="module")
-def board(folder: Path, tasks: TaskSet) -> Leaderboard:
+def board(folder: Path, tasks: RankedTasks) -> Leaderboard:
     return rank(packed_files([folder / "packs"]), [tasks])
 
 
@@ -58,7 +58,9 @@ def changed(path: Path, to: Path, old: bytes, new: bytes) -> Path:
     return to
 
 
-def test_agents_share_a_table_only_under_the_same_conditions(board: Leaderboard, folder: Path, tasks: TaskSet) -> None:
+def test_agents_share_a_table_only_under_the_same_conditions(
+    board: Leaderboard, folder: Path, tasks: RankedTasks
+) -> None:
     assert board.unranked == []
     by_perception = {conditions.perception: entries for conditions, entries in board.tables.items()}
     assert {name: sorted(entry.file for entry in entries) for name, entries in by_perception.items()} == {
@@ -75,7 +77,7 @@ def test_agents_share_a_table_only_under_the_same_conditions(board: Leaderboard,
 
 
 def test_a_file_that_is_altered_repeated_incomplete_or_none_is_not_ranked(
-    folder: Path, tasks: TaskSet, tmp_path: Path
+    folder: Path, tasks: RankedTasks, tmp_path: Path
 ) -> None:
     ours = folder / "packs" / "ours.evonav.jsonl.gz"
     shutil.copy(ours, tmp_path / "1.evonav.jsonl.gz")
@@ -85,7 +87,7 @@ def test_a_file_that_is_altered_repeated_incomplete_or_none_is_not_ranked(
     changed(ours, tmp_path / "5.evonav.jsonl.gz", b'"is_geodesic', b'"is_Geodesic')
     changed(ours, tmp_path / "6.evonav.jsonl.gz", b'"max_views":7', b'"max_views":9')
     with bundled_tasks() as every:
-        two = TaskSet("two", tuple(task_files(every, 2)))
+        two = RankedTasks("two", tuple(task_files(every, 2)))
     found = rank(packed_files([tmp_path]), [tasks], scores_only=True)
     assert [(one.file, one.status) for one in found.unranked] == [
         ("2.evonav.jsonl.gz", "repeated"),
@@ -100,11 +102,13 @@ def test_a_file_that_is_altered_repeated_incomplete_or_none_is_not_ranked(
     incomplete = Unranked("ours.evonav.jsonl.gz", "incomplete", "1 of 2 tasks of two")
     assert rank([ours], [two], scores_only=True).unranked == [incomplete]
     assert rank([ours], [two, tasks], scores_only=True).unranked == [], "it has every task of one of the sets"
-    (unknown,) = rank([ours], [TaskSet("other", two.tasks[1:])], scores_only=True).unranked
+    (unknown,) = rank([ours], [RankedTasks("other", two.tasks[1:])], scores_only=True).unranked
     assert "name their folder with --tasks" in unknown.detail
 
 
-def test_false_actions_are_found_unless_only_scores_are_checked(folder: Path, tasks: TaskSet, tmp_path: Path) -> None:
+def test_false_actions_are_found_unless_only_scores_are_checked(
+    folder: Path, tasks: RankedTasks, tmp_path: Path
+) -> None:
     """No score depends on it, so that only the replay can tell."""
     ours = folder / "packs" / "ours.evonav.jsonl.gz"
     changed(ours, tmp_path / "x.evonav.jsonl.gz", b'"is_action_success":true', b'"is_action_success":false')

@@ -17,7 +17,7 @@ from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedStage, load_run
 from evonav.report.tables.numbers import NONE, points
-from evonav.report.tables.table import Table
+from evonav.report.tables.table import Table, p_words
 from evonav.statistics import PairedEffect, paired_effect
 
 BASELINE = "stage-reset"
@@ -265,8 +265,3 @@ def effect_cells(effect: PairedEffect | None) -> list[str]:
         points(effect),
         p_words(effect.p),
     ]
-
-
-def p_words(p: float) -> str:
-    """Return p to two digits, or the bound that it is below."""
-    return "<0.001" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"

@@ -89,7 +89,7 @@ def generate_controlled(
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
         on_progress(num_before, num_all)
         if num_before < num_all:
-            settings = WorkerSettings(out=str(out), options=options).model_dump_json()
+            settings = ArmWorkerSettings(out=str(out), options=options).model_dump_json()
             with open_pool(
                 WORK,
                 settings,
@@ -113,7 +113,7 @@ def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) ->
     return Job(index, f"{head}\n{house.text}")
 
 
-class WorkerSettings(Record):
+class ArmWorkerSettings(Record):
     """The settings of a worker."""
 
     out: str
@@ -125,12 +125,12 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
     """Return the function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
 
     Args:
-        settings: `WorkerSettings` as JSON.
+        settings: `ArmWorkerSettings` as JSON.
 
     Returns:
         See `worker_of`; a seed heads a house, beside the name.
     """
-    given = WorkerSettings.model_validate_json(settings)
+    given = ArmWorkerSettings.model_validate_json(settings)
     options, out = given.options, Path(given.out)
 
     def arms(house: House, seed: int) -> dict[Path, Task]:

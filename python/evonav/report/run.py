@@ -58,7 +58,7 @@ class RecordedStage:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class RecordedTask:
     """The records of all agents in one task."""
 
     task_id: str
@@ -163,7 +163,7 @@ class RecordedRun:
             counts[agent][outcome.cause] += 1
         return counts
 
-    def tasks(self) -> Iterator[Task]:
+    def tasks(self) -> Iterator[RecordedTask]:
         """Yield every task with whole records and maps, one at a time: a run's traces may not fit in memory.
 
         Raises:
@@ -175,7 +175,7 @@ class RecordedRun:
                     (agent, record.stage): record for agent in self.agents for record in store.records(agent, task_id)
                 }
                 maps = {floor_plan.stage: floor_plan for floor_plan in store.floor_plans(task_id)}
-                yield Task(task_id, num_stages, records, maps)
+                yield RecordedTask(task_id, num_stages, records, maps)
 
 
 def load_run(run_dir: Path) -> RecordedRun:

@@ -9,12 +9,12 @@ from typing import Any
 from evonav.errors import InvalidArgumentError
 from evonav.submission.file import SUFFIX, Submission, SubmissionError, read_header
 from evonav.submission.packed_setup import PackedSetup, packed_setup
-from evonav.submission.verify import Verdict, verify
+from evonav.submission.verify import PackVerdict, verify
 from evonav.tasks.listing import TaskFile
 
 
 @dataclass(frozen=True, slots=True)
-class TaskSet:
+class RankedTasks:
     """Tasks that an entry of a leaderboard has to contain, all of them."""
 
     name: str
@@ -47,7 +47,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RankedAgent:
     """An agent of a file that was verified."""
 
     file: str
@@ -74,9 +74,9 @@ class Unranked:
 class Leaderboard:
     """Packed runs, by the conditions under which they are comparable."""
 
-    tables: dict[Conditions, list[Entry]] = field(default_factory=dict)
+    tables: dict[Conditions, list[RankedAgent]] = field(default_factory=dict)
     """Entries under the same conditions, the largest SR first."""
-    task_sets: dict[str, TaskSet] = field(default_factory=dict)
+    task_sets: dict[str, RankedTasks] = field(default_factory=dict)
     """The task sets by their SHA-256."""
     unranked: list[Unranked] = field(default_factory=list)
     is_rescored: bool = True
@@ -99,7 +99,7 @@ def packed_files(paths: Iterable[Path]) -> list[Path]:
 
 def rank(
     files: Sequence[Path],
-    task_sets: Sequence[TaskSet],
+    task_sets: Sequence[RankedTasks],
     *,
     scores_only: bool = False,
     num_workers: int = 0,
@@ -137,7 +137,7 @@ def rank(
                 board.unranked.append(Unranked(path.name, "repeated", f"{agent} has the same records as in {first}"))
                 continue
             assert verdict.summary is not None  # every check is passed
-            entry = Entry(path.name, agent, verdict.summary["agents"][agent], sha256, header, setup)
+            entry = RankedAgent(path.name, agent, verdict.summary["agents"][agent], sha256, header, setup)
             board.tables.setdefault(conditions, []).append(entry)
     for entries in board.tables.values():
         entries.sort(key=lambda entry: (-(entry.rates["sr"] or 0), -(entry.rates["spl"] or 0), entry.file))
@@ -145,7 +145,7 @@ def rank(
     return board
 
 
-def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
+def _task_set(header: Submission, task_sets: Sequence[RankedTasks]) -> RankedTasks:
     """Return the set with the most tasks of a file."""
     packed = {(task.task_id, task.digest) for task in header.tasks}
     common = [len(packed & {(task.task_id, task.digest) for task in one.tasks}) for one in task_sets]
@@ -157,7 +157,7 @@ def _task_set(header: Submission, task_sets: Sequence[TaskSet]) -> TaskSet:
     )
 
 
-def _refusal(path: Path, verdict: Verdict, header: Submission, tasks: TaskSet) -> Unranked | None:
+def _refusal(path: Path, verdict: PackVerdict, header: Submission, tasks: RankedTasks) -> Unranked | None:
     failed = next((check for check in verdict.checks if not check.is_passed), None)
     if failed is not None:
         status = "incomplete" if failed.name == "complete" else "rejected"

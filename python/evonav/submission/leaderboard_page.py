@@ -9,7 +9,7 @@ from evonav.parallel.folders import write_atomically
 from evonav.report.pages.template import page_text, rate_bar, text_of
 from evonav.report.tables.numbers import percent, rate
 from evonav.report.tables.table import INTERVALS, SPLIT_TITLES
-from evonav.submission.leaderboard import Conditions, Entry, Leaderboard
+from evonav.submission.leaderboard import Conditions, Leaderboard, RankedAgent
 
 MAX_SHOWN = 200
 """Largest number of characters of a submitter's text that the page shows."""
@@ -54,7 +54,7 @@ def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
     return write_atomically(path, text)
 
 
-def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> dict[str, object]:
+def _table(board: Leaderboard, conditions: Conditions, entries: list[RankedAgent]) -> dict[str, object]:
     tasks = board.task_sets[conditions.task_set]
     perception = _PERCEPTIONS.get(conditions.perception.partition(":")[0].partition(",")[0], "a perception of its own")
     decision = _DECISIONS.get(conditions.decision.partition(",")[0], conditions.decision)
@@ -71,7 +71,7 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[Entry]) -> 
     }
 
 
-def _row(entry: Entry) -> dict[str, object]:
+def _row(entry: RankedAgent) -> dict[str, object]:
     about, setup, rates = entry.header.about, entry.setup, entry.rates
     url = about.url if _is_web(about.url) else None
     facts = (

@@ -38,7 +38,7 @@ _OUR_SIMULATORS = ("embedded_simulator", "lenient_simulator")
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class PackCheck:
     """Result of one check."""
 
     name: str
@@ -48,10 +48,10 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class PackVerdict:
     """Result of verifying a file."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[PackCheck, ...]
     submission: Submission | None
     """The header; `None` if it is not readable."""
     is_rescored: bool
@@ -83,10 +83,10 @@ class _Findings:
             if len(self.shown) < MAX_WORDS:
                 self.shown.append(_shown(f"{where}: {finding}" if where else finding))
 
-    def check(self, name: str, if_none: str) -> Check:
+    def check(self, name: str, if_none: str) -> PackCheck:
         """Return the check that is passed without findings."""
         more = f"; and {self.num - MAX_WORDS} more" if self.num > MAX_WORDS else ""
-        return Check(name, self.num == 0, "; ".join(self.shown) + more if self.num else if_none)
+        return PackCheck(name, self.num == 0, "; ".join(self.shown) + more if self.num else if_none)
 
 
 class _Records:
@@ -175,7 +175,7 @@ def verify(
     scores_only: bool = False,
     num_workers: int = 0,
     on_progress: Callable[[int, int], None] = lambda _done, _all: None,
-) -> Verdict:
+) -> PackVerdict:
     """Verify a submission.
 
     Args:
@@ -190,7 +190,9 @@ def verify(
     try:
         return _verdict(path, known, required, None if scores_only else (num_workers, on_progress))
     except SubmissionError as error:
-        return Verdict((Check("file", False, _shown(str(error), len(str(path)) + 2 * MAX_FINDING)),), None, False)
+        return PackVerdict(
+            (PackCheck("file", False, _shown(str(error), len(str(path)) + 2 * MAX_FINDING)),), None, False
+        )
 
 
 def _verdict(
@@ -198,7 +200,7 @@ def _verdict(
     known: Mapping[str, TaskFile],
     required: Sequence[str],
     replay: tuple[int, Callable[[int, int], None]] | None,
-) -> Verdict:
+) -> PackVerdict:
     header = read_header(path)
     agents = ", ".join(header.agents)
     checks = [
@@ -206,14 +208,14 @@ def _verdict(
         _check("tasks", _task_findings(header, known, required), f"{len(header.tasks)}, all known"),
     ]
     if not all(check.is_passed for check in checks):
-        unread = Check("file", True, _shown(f"the header; the records of {agents} were not read"))
-        return Verdict((unread, *checks), header, False, len(required))
+        unread = PackCheck("file", True, _shown(f"the header; the records of {agents} were not read"))
+        return PackVerdict((unread, *checks), header, False, len(required))
     records = _Records(path, header, known)
     num_records = sum(map(len, records.brief.values()))
-    checks.insert(0, Check("file", True, _shown(f"records: {num_records}, agents: {agents}")))
+    checks.insert(0, PackCheck("file", True, _shown(f"records: {num_records}, agents: {agents}")))
     checks.append(records.complete.check("complete", "every stage once, and scored"))
     if not all(check.is_passed for check in checks):
-        return Verdict(tuple(checks), header, False, len(required))
+        return PackVerdict(tuple(checks), header, False, len(required))
     checks.append(records.targets.check("targets", "houses, goals, targets and changes are those of the tasks"))
     follows = "lengths, distances, success and SPL follow from the recorded paths"
     checks.append(records.paths.check("paths", follows))
@@ -224,10 +226,10 @@ def _verdict(
     chosen = {agent: [r for r in mine if r.task_id in set(required)] for agent, mine in records.brief.items()}
     num_stages = sum(task.num_stages for task in header.tasks if task.task_id in set(required))
     summary = packed_summary(chosen, num_stages)
-    return Verdict(tuple(checks), header, replay is not None, len(required), summary, records.digests)
+    return PackVerdict(tuple(checks), header, replay is not None, len(required), summary, records.digests)
 
 
-def verdict_json(verdict: Verdict) -> dict[str, Any]:
+def verdict_json(verdict: PackVerdict) -> dict[str, Any]:
     """Return a verdict as JSON values."""
     header = verdict.submission
     return {
@@ -333,7 +335,7 @@ def _rescore(
                 yield f"{agent} {task_id} stage {stage}: {'; '.join(differences)}"
 
 
-def _check(name: str, findings: Iterator[str], if_none: str) -> Check:
+def _check(name: str, findings: Iterator[str], if_none: str) -> PackCheck:
     found = _Findings()
     found.add(findings)
     return found.check(name, if_none)

@@ -41,14 +41,14 @@ def leaderboard(
     Only agents that were evaluated on the same tasks, with the same perception and kind of decision model share a
     table. Files that fail a check or lack tasks are listed below the tables, with the reason.
     """
-    from evonav.submission.leaderboard import TaskSet, packed_files, rank
+    from evonav.submission.leaderboard import RankedTasks, packed_files, rank
     from evonav.submission.leaderboard_page import write_leaderboard
 
     files = packed_files(packs)
     task_sets = []
     for folder in tasks or [Path(BUNDLED)]:
         with chosen_tasks(folder, limit, subset) as found:
-            task_sets.append(TaskSet(_name(folder, found, limit, subset), tuple(found)))
+            task_sets.append(RankedTasks(_name(folder, found, limit, subset), tuple(found)))
     with progress_bar("verifying") as on_progress:
         board = rank(
             files, task_sets, scores_only=scores_only, num_workers=num_workers_of(workers), on_progress=on_progress

@@ -21,7 +21,7 @@ from evonav.cli.options.shared import (
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.submission.verify import Verdict
+    from evonav.submission.verify import PackVerdict
 
 EXIT_REJECTED = 1
 SCORES_ONLY_HELP = "Recompute the scores from the recorded paths, without replaying the actions: faster, proves less."
@@ -98,7 +98,7 @@ def verify(
         raise typer.Exit(EXIT_REJECTED)
 
 
-def _print(file: Path, verdict: "Verdict") -> None:
+def _print(file: Path, verdict: "PackVerdict") -> None:
     from rich.table import Table
     from rich.text import Text
 

@@ -21,7 +21,7 @@ from evonav.report.pages.template import packed, page_environment, policy, rate_
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import Breakdowns, run_breakdowns, run_plots
 from evonav.report.plots.style import plot_css
-from evonav.report.run import RecordedRun, RecordedStage, Task, load_run
+from evonav.report.run import RecordedRun, RecordedStage, RecordedTask, load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
@@ -125,7 +125,7 @@ def _tasks(
         yield view, packed(section) if is_packed else section, is_packed
 
 
-def _write_maps(run: RecordedRun, task: Task, map_dir: Path) -> None:
+def _write_maps(run: RecordedRun, task: RecordedTask, map_dir: Path) -> None:
     for record in task.records.values():
         drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
         write_atomically(map_dir / map_name(record), drawn)

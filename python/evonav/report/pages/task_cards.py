@@ -12,11 +12,13 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.maps.stage_map import task_frame
 from evonav.report.maps.text import describe_change, describe_outcome
 from evonav.report.maps.trajectory import change, course, rounds
-from evonav.report.run import RecordedRun, Task
+from evonav.report.run import RecordedRun, RecordedTask
 from evonav.report.tables.causes import sentence
 
 
-def task_view(run: RecordedRun, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
+def task_view(
+    run: RecordedRun, task: RecordedTask, prefix: str, hrefs: Mapping[tuple[str, str, int], str]
+) -> dict[str, Any]:
     """Draw a task: the house once, what moves once a stage, every agent's stages over them.
 
     Returns the values of the template: its `goals` are stage, a record that states the goal, what changed before and
