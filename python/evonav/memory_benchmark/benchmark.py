@@ -6,8 +6,7 @@ rendered once. Records do not depend on other jobs or memories; times do, where 
 
 import hashlib
 import json
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,17 +14,17 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.component import Component
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.drawing.svg import slug
+from evonav.errors import InvalidArgumentError
 from evonav.memory.forgetting import RULES
 from evonav.memory_benchmark.protocol import Memory
-from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, StreamResult
+from evonav.memory_benchmark.records import BenchmarkResult, Header, MemoryResult, StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, MemorySource, measure_all
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.memory_benchmark.streams.export.recording import RecordingSpec
 from evonav.parallel.folders import check_same_run, write_atomically, writing
-from evonav.parallel.pool import Job, answers, open_pool
-from evonav.parallel.worker import Workforce
 from evonav.report.machine import machine_name
+from evonav.report.measurements import finished, read_model
 
 WORK = "evonav.memory_benchmark.benchmark:make_worker"
 SILENCE_S = 600.0
@@ -114,29 +113,26 @@ def benchmark(
         num_done = num_all - sum(len(left) for _, left in jobs)
         failures: list[tuple[str, str, str]] = []
         on_progress(num_done, num_all, "")
-        if jobs:
-            work_force = Workforce(min(num_workers, len(jobs)))
-            with open_pool(WORK, json.dumps(asdict(settings)), work_force, timeout_s=SILENCE_S) as pool:
-                texts = (
-                    Job(key, json.dumps({"stream": asdict(stream), "memories": list(map(asdict, left))}))
-                    for key, (stream, left) in enumerate(jobs)
-                )
-                for answer in answers(pool, texts):
-                    stream, left = jobs[answer.key]
-                    if answer.failure is None:
-                        for memory, record in zip(left, json.loads(answer.text), strict=True):
-                            write_atomically(record_path(out, memory.name, stream.name), record + "\n")
-                    else:
-                        last = (answer.detail.strip().splitlines() or [answer.failure])[-1]
-                        failures.extend((memory.name, stream.name, last) for memory in left)
-                    num_done += len(left)
-                    on_progress(num_done, num_all, stream.name)
+
+        def text_of(job: tuple[AnySpec, list[NamedMemory]]) -> str:
+            return json.dumps({"stream": asdict(job[0]), "memories": list(map(asdict, job[1]))})
+
+        config = json.dumps(asdict(settings))
+        ended = finished(WORK, config, jobs, text_of, num_workers=num_workers, timeout_s=SILENCE_S)
+        for (stream, left), text, why in ended:
+            if text is None:
+                failures.extend((memory.name, stream.name, why) for memory in left)
+            else:
+                for memory, record in zip(left, json.loads(text), strict=True):
+                    write_atomically(record_path(out, memory.name, stream.name), record + "\n")
+            num_done += len(left)
+            on_progress(num_done, num_all, stream.name)
         return MeasuredMemories(read_folder(out, known, streams), tuple(sorted(failures)))
 
 
 def record_path(folder: Path, memory: str, stream: str) -> Path:
     """Return the path of the record of a memory in a stream."""
-    return folder / RECORD_DIR / _slug(memory) / f"{stream.replace('/', '_')}.json"
+    return folder / RECORD_DIR / slug(memory) / f"{stream.replace('/', '_')}.json"
 
 
 def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnySpec]) -> BenchmarkResult:
@@ -148,7 +144,9 @@ def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnySpec
     results = []
     for memory in memories:
         paths = [record_path(folder, memory, stream.name) for stream in streams]
-        records = tuple(_read_record(path) for path in paths if path.exists())
+        records = tuple(
+            read_model(StreamResult, path, "delete it to measure it again") for path in paths if path.exists()
+        )
         if records:
             results.append(MemoryResult(memory=memory, streams=records))
     return BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=tuple(results))
@@ -173,41 +171,19 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
 def _begun(memories: Sequence[NamedMemory], out: Path, settings: MeasureSettings) -> list[str]:
     """Claim the folder, delete the records of memories that have changed, and return the names of all memories."""
     identity = {"evonav": __version__, "settings": asdict(settings)}
-    there = _read_header(out / HEADER_NAME)
-    known: dict[str, Any] = {} if there is None else dict(there["memories"])
-    if there is not None:
-        check_same_run(there["identity"], identity, out)
+    path, known = out / HEADER_NAME, dict[str, Any]()
+    if path.exists():
+        there = read_model(Header, path, "expected a header of `evonav bench memory`")
+        check_same_run(there.identity, identity, out)
+        known.update(there.memories)
     for memory in memories:
         its = {"path": memory.component.path, "options": dict(memory.component.options), "sha256": memory.digest}
         if known.get(memory.name, its) != its:
-            for path in (out / RECORD_DIR / _slug(memory.name)).glob("*.json"):
-                path.unlink(missing_ok=True)
+            for record in (out / RECORD_DIR / slug(memory.name)).glob("*.json"):
+                record.unlink(missing_ok=True)
         known[memory.name] = its
-    write_atomically(out / HEADER_NAME, json.dumps({"identity": identity, "memories": known}, indent=2) + "\n")
+    write_atomically(path, Header(identity=identity, memories=known).model_dump_json(indent=2) + "\n")
     return list(known)
-
-
-def _read_header(path: Path) -> Mapping[str, Any] | None:
-    if not path.exists():
-        return None
-    try:
-        header = json.loads(path.read_bytes())
-        return {"identity": dict(header["identity"]), "memories": dict(header["memories"])}
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise StoreError(f"{path}: no header of `evonav bench memory` ({error})") from error
-
-
-def _read_record(path: Path) -> StreamResult:
-    try:
-        return StreamResult.model_validate_json(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path}: cannot be read; delete it to measure it again ({error})") from error
-
-
-def _slug(name: str) -> str:
-    """Return a name as a folder's: letters, digits and dashes, and a part of its digest if that is not all."""
-    slug = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-")[:60]
-    return slug if slug == name else f"{slug}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 _REFERENCES = "evonav.memory_benchmark.references"

@@ -2,28 +2,21 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import FailureKind, Hosting
 from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
 from evonav.memory_benchmark.metrics.staleness import Spell
 from evonav.memory_benchmark.metrics.updates import UpdateCounts
+from evonav.report.measurements import MeasurementRecord, read_model
 
 SCHEMA_VERSION: Literal[1] = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
 
 
-class _MemoryRecord(BaseModel):
-    """A frozen record that rejects unknown fields."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
-
-
-class MemoryFailure(_MemoryRecord):
+class MemoryFailure(MeasurementRecord):
     """The end of a memory in a stream."""
 
     kind: FailureKind
@@ -33,7 +26,7 @@ class MemoryFailure(_MemoryRecord):
     """Index of the last frame that it was given; `None` before the first."""
 
 
-class Speed(_MemoryRecord):
+class Speed(MeasurementRecord):
     """Times of one stream, after the warm-up."""
 
     observe_cpu: Percentiles | None
@@ -49,7 +42,7 @@ class Speed(_MemoryRecord):
     """Time over frames and entries, thinned, for plots."""
 
 
-class BeliefScore(_MemoryRecord):
+class BeliefScore(MeasurementRecord):
     """Sums over entries with a `p_present`, see `metrics.belief.BeliefSums`."""
 
     n: int
@@ -58,7 +51,7 @@ class BeliefScore(_MemoryRecord):
     bins: tuple[tuple[float, float, float], ...]
 
 
-class StreamResult(_MemoryRecord):
+class StreamResult(MeasurementRecord):
     """The result of one memory in one stream. A part is `None` if the memory failed or has nothing to show in it."""
 
     stream: str
@@ -84,7 +77,7 @@ class StreamResult(_MemoryRecord):
     """Whether a second run gave the same bits; `None` if there was none."""
 
 
-class MemoryResult(_MemoryRecord):
+class MemoryResult(MeasurementRecord):
     """The results of one memory in all streams."""
 
     memory: str
@@ -100,7 +93,7 @@ class MemoryResult(_MemoryRecord):
         return tuple(one for one in self.streams if one.failure is None and kind in (None, one.kind))
 
 
-class BenchmarkResult(_MemoryRecord):
+class BenchmarkResult(MeasurementRecord):
     """All memories of one run of the benchmark."""
 
     schema_version: Literal[1] = SCHEMA_VERSION
@@ -122,16 +115,12 @@ class BenchmarkResult(_MemoryRecord):
         raise InvalidArgumentError(f"memory = {name!r}: the result has {known}")
 
 
-def write_result(result: BenchmarkResult, path: Path) -> None:
-    """Write a result as JSON.
+class Header(MeasurementRecord):
+    """The settings that records of one folder share, and its memories."""
 
-    Raises:
-        StoreError: The file cannot be written.
-    """
-    try:
-        path.write_text(result.model_dump_json() + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror}") from error
+    identity: dict[str, Any]
+    memories: dict[str, dict[str, Any]]
+    """Import path, options and digest of the file, by name."""
 
 
 def read_result(path: Path) -> BenchmarkResult:
@@ -140,15 +129,7 @@ def read_result(path: Path) -> BenchmarkResult:
     Raises:
         StoreError: The file cannot be read, or is no result; the message has the first field that is wrong.
     """
-    try:
-        return BenchmarkResult.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValidationError as error:
-        problem = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(map(str, problem["loc"]))
-        value = repr(problem["input"])[:120]
-        raise StoreError(f"{path}: {place} = {value}: {problem['msg']}") from None
+    return read_model(BenchmarkResult, path, "expected a result.json of `evonav bench memory`")
 
 
 def kinds_of(results: Iterable[MemoryResult]) -> list[str]:

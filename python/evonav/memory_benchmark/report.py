@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from evonav.memory_benchmark.metrics.staleness import durations_of, kaplan_meier
-from evonav.memory_benchmark.records import BenchmarkResult, write_result
+from evonav.memory_benchmark.records import BenchmarkResult
 from evonav.memory_benchmark.tables import HALF_LIFE, P95, Scores, memory_tables, scores
 from evonav.parallel.folders import write_atomically
 from evonav.report.pages.template import page_text, text_of
@@ -32,7 +32,7 @@ def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: i
     """
     found, tables = scores(result), memory_tables(result)
     folder.mkdir(parents=True, exist_ok=True)
-    write_result(result, folder / JSON_NAME)
+    write_atomically(folder / JSON_NAME, result.model_dump_json() + "\n")
     write_atomically(folder / MARKDOWN_NAME, markdown_tables(tables))
     plot = main_plot(found)
     if plot.dots and has_renderer():

@@ -15,8 +15,6 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import EMBEDDED, Backend
 from evonav.parallel.folders import check_same_run, writing
-from evonav.parallel.pool import Job, answers, open_pool
-from evonav.parallel.worker import Workforce
 from evonav.perception import Percept, Perception, StageScene
 from evonav.perception_benchmark.matching import TrueObjects, true_objects
 from evonav.perception_benchmark.memory import JudgedMemory
@@ -34,6 +32,7 @@ from evonav.perception_benchmark.records import (
 )
 from evonav.perception_benchmark.rows import Matched, Rows, scored_percept
 from evonav.perception_benchmark.tour import tour
+from evonav.report.measurements import finished
 from evonav.sensors.observation import Detections
 from evonav.tasks.listing import TaskFile
 from evonav.world.pose import Pose
@@ -133,21 +132,19 @@ def measure(
         num_done, failures = num_all - len(jobs), []
         on_progress(num_done, num_all, "")
         settings = json.dumps({"config": asdict(config), **simulator.identity("simulator")})
-        if jobs:
-            with open_pool(WORK, settings, Workforce(min(num_workers, len(jobs))), timeout_s=TASK_TIMEOUT_S) as pool:
-                texts = (
-                    Job(key, json.dumps([asdict(spec), str(task.path), task.digest, has_picture]))
-                    for key, (spec, task, has_picture) in enumerate(jobs)
-                )
-                for answer in answers(pool, texts):
-                    spec, task, _ = jobs[answer.key]
-                    if answer.failure is None:
-                        write_record(out, spec.word, task.task_id, answer.text)
-                    else:
-                        last = (answer.detail.strip().splitlines() or [answer.failure])[-1]
-                        failures.append((spec.word, task.task_id, last))
-                    num_done += 1
-                    on_progress(num_done, num_all, f"{spec.word} {task.task_id}")
+
+        def text_of(job: tuple[PerceptionSpec, TaskFile, bool]) -> str:
+            spec, task, has_picture = job
+            return json.dumps([asdict(spec), str(task.path), task.digest, has_picture])
+
+        ended = finished(WORK, settings, jobs, text_of, num_workers=num_workers, timeout_s=TASK_TIMEOUT_S)
+        for (spec, task, _), text, why in ended:
+            if text is None:
+                failures.append((spec.word, task.task_id, why))
+            else:
+                write_record(out, spec.word, task.task_id, text)
+            num_done += 1
+            on_progress(num_done, num_all, f"{spec.word} {task.task_id}")
         return MeasuredTasks(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
 
 

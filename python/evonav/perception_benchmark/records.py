@@ -4,17 +4,16 @@ A folder of `evonav perception` holds `perception.json`, the request, and `recor
 """
 
 import gzip
-import hashlib
 import json
-import re
-import zlib
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
+from evonav.drawing.svg import slug
 from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
+from evonav.report.measurements import MeasurementRecord, read_model
 
 HEADER_NAME = "perception.json"
 RECORD_DIR = "records"
@@ -27,11 +26,7 @@ NUM_CHECKPOINTS = 8
 """Number of times in a tour, evenly spaced, at which the memory is judged."""
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", populate_by_name=True)
-
-
-class TrueRows(_Part):
+class TrueRows(MeasurementRecord):
     """Wanted objects, one a view that shows it; all columns are as long."""
 
     stage: list[int] = []
@@ -47,7 +42,7 @@ class TrueRows(_Part):
     """Row of the detection at its place, whatever its label, -1 without."""
 
 
-class DetectionRows(_Part):
+class DetectionRows(MeasurementRecord):
     """Detections; all columns are as long."""
 
     stage: list[int] = []
@@ -66,7 +61,7 @@ class DetectionRows(_Part):
     located_iou: list[float] = []
 
 
-class DepthSums(_Part):
+class DepthSums(MeasurementRecord):
     """Sums over pixels by their true depth, in `DISTANCE_BINS_M`."""
 
     num: list[int] = [0] * len(DISTANCE_BINS_M)
@@ -79,7 +74,7 @@ class DepthSums(_Part):
     """Sum of squared errors."""
 
 
-class PoseRows(_Part):
+class PoseRows(MeasurementRecord):
     """Errors of the believed pose, one a view."""
 
     offset_m: list[float] = []
@@ -88,7 +83,7 @@ class PoseRows(_Part):
     """Errors of the yaw, without their sign."""
 
 
-class FeatureSums(_Part):
+class FeatureSums(MeasurementRecord):
     """Counts of cosines, in `NUM_COSINE_BINS` of -1..1; empty where the perception has no features."""
 
     same_object: list[int] = []
@@ -109,7 +104,7 @@ class FeatureSums(_Part):
     """Detections compared with words."""
 
 
-class MemoryState(_Part):
+class MemoryState(MeasurementRecord):
     """The object map at one time, judged by the house of then (definitions: docs/perception.md)."""
 
     stage: int
@@ -139,7 +134,7 @@ class MemoryState(_Part):
     num_error: int = 0
 
 
-class TaskRecord(_Part):
+class TaskRecord(MeasurementRecord):
     """One perception on one task."""
 
     task_id: str
@@ -164,7 +159,7 @@ class TaskRecord(_Part):
     """JPEG in base64: truth and detections of one view, side by side."""
 
 
-class Header(_Part):
+class Header(MeasurementRecord):
     """Request that a folder was made for."""
 
     identity: dict[str, Any]
@@ -181,15 +176,9 @@ class Header(_Part):
     """Digests by task."""
 
 
-def slug_of(word: str) -> str:
-    """Return a folder's name for a perception; different perceptions have different names."""
-    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", word)[:60]
-    return plain if plain == word else f"{plain}-{hashlib.sha256(word.encode()).hexdigest()[:6]}"
-
-
 def record_path(folder: Path, word: str, task_id: str) -> Path:
     """Return the path of the record of a perception on a task."""
-    return folder / RECORD_DIR / slug_of(word) / f"{task_id}.json.gz"
+    return folder / RECORD_DIR / slug(word) / f"{task_id}.json.gz"
 
 
 def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
@@ -207,14 +196,7 @@ def read_record(path: Path) -> TaskRecord:
     Raises:
         StoreError: It is missing, damaged or of another kind.
     """
-    try:
-        return TaskRecord.model_validate_json(gzip.decompress(path.read_bytes()))
-    except (OSError, EOFError, zlib.error) as error:
-        raise StoreError(f"{path}: cannot be read ({error}); delete it and run the command again") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise StoreError(f"{path}: field `{place}`: {first['msg']}; delete it and run the command again") from error
+    return read_model(TaskRecord, path, "delete it and run the command again")
 
 
 def read_header(folder: Path) -> Header | None:
@@ -224,12 +206,7 @@ def read_header(folder: Path) -> Header | None:
         StoreError: It cannot be read.
     """
     path = folder / HEADER_NAME
-    if not path.exists():
-        return None
-    try:
-        return Header.model_validate_json(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path}: no header of `evonav perception` ({str(error).splitlines()[0]})") from error
+    return read_model(Header, path, "expected a header of `evonav perception`") if path.exists() else None
 
 
 def write_header(folder: Path, header: Header) -> None:

@@ -2,20 +2,18 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
+from evonav.report.measurements import MeasurementRecord, read_model
 from evonav.statistics import Interval
 
 JSON_NAME = "speed.json"
 MARKDOWN_NAME = "speed.md"
 
 
-class Row(BaseModel):
+class Row(MeasurementRecord):
     """One operation, alone or beside one peer."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     operation: str
     ms: float = Field(ge=0, allow_inf_nan=False)
@@ -36,10 +34,8 @@ class Row(BaseModel):
     """Other figures, by their name with its unit."""
 
 
-class Speeds(BaseModel):
+class Speeds(MeasurementRecord):
     """The figures of one section, and where they were measured."""
-
-    model_config = ConfigDict(extra="forbid")
 
     section: str
     title: str
@@ -71,11 +67,4 @@ def read_speeds(path: Path) -> Speeds:
     Raises:
         StoreError: The file cannot be read, or is none.
     """
-    try:
-        return Speeds.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the file"
-        raise StoreError(f"{path}: {where}: {first['msg']}; expected a speed.json of `evonav bench`") from error
+    return read_model(Speeds, path, "expected a speed.json of `evonav bench`")
