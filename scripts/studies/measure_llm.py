@@ -22,7 +22,8 @@ from evonav.decision.backends import text_match, vlm
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, Reply
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.statistics import wilson
 from evonav.tasks.listing import task_files
 

@@ -21,7 +21,8 @@ from evonav.component import Component
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import Progress, RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import Progress, RunConfig
 from evonav.evaluation.run.settings import SimulatorSettings
 from evonav.perception.shorthand import read_word
 from evonav.report.compare.compare import compare

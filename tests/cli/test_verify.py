@@ -5,7 +5,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files

@@ -24,9 +24,10 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
+from evonav.evaluation.run.run_settings import SettingError
 from evonav.evaluation.run.settings import DecisionSettings
-from evonav.evaluation.run.settings_model import SettingError
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
 from evonav.tasks.bundled import bundled_tasks

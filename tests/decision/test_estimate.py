@@ -9,10 +9,11 @@ from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.pacing import Pace
+from evonav.evaluation.cost_estimate import estimate_run, ratio_error
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.cost_estimate import estimate_run, ratio_error
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from vlm_stub import serving

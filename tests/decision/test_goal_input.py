@@ -24,9 +24,10 @@ from evonav.decision.question import Question, Reply
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
+from evonav.evaluation.run.run_settings import SettingError
 from evonav.evaluation.run.settings import DecisionSettings
-from evonav.evaluation.run.settings_model import SettingError
 from evonav.memory.colours import Layout, layouts
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup

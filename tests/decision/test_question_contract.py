@@ -19,7 +19,8 @@ from evonav.decision.vlm.decision import read_json, with_schema
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from vlm_stub import check_strict

@@ -14,7 +14,8 @@ from evonav.decision.text.ranking import rank_by_text, similarity_of_label, text
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 

@@ -25,7 +25,7 @@ from evonav.agents.agent import NavigateTo, Stop
 from evonav.cli import app
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import check_agent_name
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.house import bundled_houses
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.bundled import bundled_tasks

@@ -16,8 +16,8 @@ from test_engine import CONFIG
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run import run as engine
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run import evaluate as engine
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.worker import EpisodeWork
 from evonav.parallel import folders
 from evonav.parallel.local import Program

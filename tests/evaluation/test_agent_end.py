@@ -19,7 +19,8 @@ ENDED = """
 import sys
 from pathlib import Path
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.listing import task_files
 from evonav.component import Component
 from evonav.evaluation.run.components import Backend

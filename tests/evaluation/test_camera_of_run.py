@@ -8,7 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import SimulatorSettings
 from evonav.submission.file import About
 from evonav.submission.pack import pack

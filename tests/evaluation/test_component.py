@@ -7,7 +7,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.worker import CONFIG, WorkerConfig
+from evonav.evaluation.run.worker import SETUPS, WorkerSetup
 
 PARTS = Backend(
     simulator=Component("a.b:make", {"quality": 1}, {"gpu_device": 0}),
@@ -40,8 +40,8 @@ def test_a_header_with_an_unknown_entry_is_refused() -> None:
 
 
 def test_workers_get_host_options_too() -> None:
-    config = WorkerConfig(PARTS, ProtocolConfig(), AgentHosting(), num_retries=1)
-    assert CONFIG.validate_json(CONFIG.dump_json(config)) == config
+    setup = WorkerSetup(PARTS, ProtocolConfig(), AgentHosting(), num_retries=1)
+    assert SETUPS.validate_json(SETUPS.dump_json((setup,))) == (setup,)
 
 
 def test_an_import_error_names_the_path() -> None:

@@ -16,7 +16,7 @@ from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 

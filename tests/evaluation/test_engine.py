@@ -20,7 +20,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.parallel.folders import writing
 from evonav.report.run import load_run
 from evonav.tasks.bundled import bundled_tasks
@@ -267,7 +268,8 @@ def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, mon
 INTERRUPTED = """
 import sys
 from pathlib import Path
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.listing import task_files
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.isolation import AgentHosting

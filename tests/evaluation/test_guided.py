@@ -207,7 +207,7 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
 
     from evonav.cli import app
     from evonav.controlled.generate import ControlledOptions, generate_arms
-    from evonav.evaluation.run.run import evaluate
+    from evonav.evaluation.run.evaluate import evaluate
     from evonav.house import bundled_houses
     from evonav.tasks import write_task
     from evonav.tasks.listing import task_files

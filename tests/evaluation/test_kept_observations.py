@@ -17,7 +17,8 @@ from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.public import Goal, TaskInfo

@@ -32,10 +32,11 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
+from evonav.evaluation.run.evaluate import evaluate, evaluate_all
+from evonav.evaluation.run.run import Evaluation, RunConfig
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
-from evonav.evaluation.run.worker import WorkerConfig, WorkerContext
+from evonav.evaluation.run.worker import WorkerContext, WorkerSetup
 from evonav.parallel.worker import Workforce
 from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import serving
@@ -99,12 +100,12 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
 @pytest.mark.parametrize("isolation", ["process", "none"])
 def test_episodes_share_a_task_unless_their_agents_could_change_it(isolation):
     hosting = AgentHosting(isolation)
-    config = WorkerConfig(Backend(tasks=Component("pathlib:Path")), ProtocolConfig(), hosting)
-    with closing(WorkerContext(config, lambda: None)) as context:
+    setup = WorkerSetup(Backend(tasks=Component("collections:UserString")), ProtocolConfig(), hosting)
+    with closing(WorkerContext(setup, lambda: None)) as context:
         first = context.task("one")
-        assert first.spec == Path("one")
+        assert first == "one"
         assert (context.task("one") is first) is (isolation == "process")
-        assert context.task("two").spec == Path("two")
+        assert context.task("two") == "two"
         assert (context.task("one") is first) is (isolation == "process")
         context.task("two")
         known = weakref.ref(first)
@@ -151,7 +152,7 @@ def test_an_agent_that_fails_costs_its_own_stages(tmp_path, agent):
 def test_cells_with_more_configurations_than_a_worker_keeps_share_it(tmp_path):
     tasks = tuple(many_tasks(tmp_path / "tasks", 2))
     requests = [
-        RunRequest(
+        Evaluation(
             (WAITING,), tasks, tmp_path / str(rounds), replace(CHEAP, protocol=ProtocolConfig(max_rounds=rounds))
         )
         for rounds in (2, 3, 4, 5)
@@ -171,7 +172,7 @@ def test_ray_runs_many_at_once(tmp_path, monkeypatch):
     monkeypatch.setenv("RAY_TMPDIR", "/tmp")  # paths of sockets have a greatest length
     tasks = tuple(many_tasks(tmp_path / "tasks", 6))
     config = replace(CHEAP, hosting=AgentHosting())
-    evaluate_all([RunRequest((WAITING,), tasks, tmp_path / "run", config)], Workforce(1, "ray", jobs_at_once=4))
+    evaluate_all([Evaluation((WAITING,), tasks, tmp_path / "run", config)], Workforce(1, "ray", jobs_at_once=4))
     evaluate([WAITING], tasks, tmp_path / "local", config=config, num_workers=0)
     assert texts(tmp_path / "run") == texts(tmp_path / "local")
 
@@ -180,7 +181,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from test_many_episodes import CHEAP
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.tasks.listing import task_files
 
 tasks, run_dir, agent, at_once = sys.argv[1:]

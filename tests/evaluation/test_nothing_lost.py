@@ -25,7 +25,8 @@ from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.parallel import folders
 from evonav.parallel.folders import replacing, write_atomically, writing
 from evonav.parallel.local import PROCESS_NAME
@@ -159,7 +160,8 @@ from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.component import Component
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.listing import task_files
 from evonav.evaluation.protocol import ProtocolConfig
 

@@ -17,7 +17,8 @@ from evonav.evaluation.episode.oracle_baseline import OracleBaseline
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.tasks.listing import task_files
 

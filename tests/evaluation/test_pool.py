@@ -17,7 +17,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
+from evonav.evaluation.run.evaluate import evaluate, evaluate_all
+from evonav.evaluation.run.run import Evaluation, RunConfig
 from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import task_files
 
@@ -38,7 +39,7 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
         simulator=Component("flaky_simulator:make", {"num_losses": 0}, {"folder": str(folder)}),
     )
     configs = [RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=3), seed=seed) for seed in (0, 1)]
-    together = [RunRequest(("random-walk",), tasks, tmp_path / f"cell-{i}", config) for i, config in enumerate(configs)]
+    together = [Evaluation(("random-walk",), tasks, tmp_path / f"cell-{i}", config) for i, config in enumerate(configs)]
     news = []
     summaries = evaluate_all(together, Workforce(1), on_progress=lambda *one: news.append(one))
     assert len((folder / "starts").read_text()) == 2  # one a run, though episodes of both are under way at once
@@ -119,7 +120,7 @@ def test_ray_records_the_same_though_an_actor_is_killed(tasks, tmp_path, monkeyp
         thread = threading.Thread(target=kill, daemon=True)
         thread.start()
         evaluate_all(
-            [RunRequest((agent,), tuple(tasks), tmp_path / "run", CONFIG)],
+            [Evaluation((agent,), tuple(tasks), tmp_path / "run", CONFIG)],
             Workforce(2, "ray", num_gpus=0.5),
             on_progress=lambda _, news: note(news),
         )

@@ -14,7 +14,8 @@ from evonav.evaluation.hosting.isolation import AgentHosting, Isolation
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.bundled import bundled_tasks
 from vlm_stub import KEY, check_request, serving
 

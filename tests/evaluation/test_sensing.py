@@ -15,7 +15,8 @@ from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap
 from evonav.memory.clouds import clouds_of

@@ -10,8 +10,9 @@ from evonav.component import Component
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
-from evonav.evaluation.run.settings_model import NUM_RETRIES
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
+from evonav.evaluation.run.run_settings import NUM_RETRIES
 from evonav.report.run import load_run
 from evonav.tasks.listing import task_files
 

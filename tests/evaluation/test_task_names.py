@@ -16,7 +16,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import NAMES_KEY, RunConfig, agent_seed, evaluate, perception_seed
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import NAMES_KEY, RunConfig, agent_seed, perception_seed
 from evonav.report import write_report
 from evonav.submission.pack import pack
 from evonav.tasks.bundled import bundled_tasks

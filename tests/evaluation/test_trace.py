@@ -23,7 +23,8 @@ from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import bundled_houses
 from evonav.replay.replay import RunReplay

@@ -16,7 +16,7 @@ from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.process import check_importable
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.parallel.folders import writing

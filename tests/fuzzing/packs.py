@@ -12,7 +12,7 @@ from forged_pack import ForgedPack, line_of, rescored
 from mutation import json_bytes, mutated_bytes, mutated_json
 
 from evonav.evaluation.run import components
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
 from evonav.submission.verify import verify
 from evonav.tasks.bundled import bundled_tasks

@@ -16,7 +16,8 @@ from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks import load_tasks
 from evonav.tasks.bundled import bundled_tasks
 

@@ -12,7 +12,8 @@ from evonav.errors import PerceptionError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception

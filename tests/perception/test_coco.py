@@ -15,7 +15,8 @@ from evonav.errors import InvalidArgumentError, PerceptionError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception import coco

@@ -5,7 +5,8 @@ from pathlib import Path
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files

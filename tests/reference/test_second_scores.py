@@ -11,7 +11,7 @@ from second_scores import table
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.report.run import load_run
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files

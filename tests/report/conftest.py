@@ -7,7 +7,8 @@ from evonav.component import Component
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 

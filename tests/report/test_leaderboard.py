@@ -13,7 +13,7 @@ from browser import Chromium, needs_browser
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.file import About
 from evonav.submission.leaderboard import Leaderboard, RankedTasks, Unranked, packed_files, rank
 from evonav.submission.leaderboard_page import write_leaderboard

@@ -15,7 +15,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
 from evonav.report.pages import run_page as html
 from evonav.report.plots.run_plots import run_breakdowns

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from forged_pack import ForgedPack
 
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files

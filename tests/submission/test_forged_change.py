@@ -12,7 +12,7 @@ from forged_pack import ForgedPack, assert_rejected, line_of, rescored
 
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import evaluate
+from evonav.evaluation.run.evaluate import evaluate
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import bundled_houses
 from evonav.submission.pack import pack

@@ -10,7 +10,8 @@ from evonav.controlled.generate import ControlledOptions
 from evonav.controlled.layout import tasks_of
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.house import bundled_houses
 from evonav.submission.file import About, read_header
 from evonav.submission.pack import pack

@@ -22,7 +22,8 @@ from evonav.component import Component
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import RunConfig
 from evonav.house import bundled_houses
 from evonav.parallel.folders import LOCK_NAME
 from evonav.tasks.bundled import bundled_tasks

@@ -17,11 +17,10 @@ from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, check_decision
-from evonav.evaluation.run.decision_resources import DecisionResources, SpendingSettings
-from evonav.evaluation.run.run import RunRequest, evaluate_all
-from evonav.evaluation.run.run_settings import RunSettings
+from evonav.evaluation.run.evaluate import evaluate_all
+from evonav.evaluation.run.run import Evaluation
+from evonav.evaluation.run.run_settings import DecisionResources, RunSettings, Settings, SpendingSettings
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
-from evonav.evaluation.run.settings_model import Settings
 
 AgentSource = str | Callable[..., Agent]
 """A name, a class, or a function that makes an agent."""
@@ -101,15 +100,15 @@ def evaluate(
         decision=model,
     )
     config = settings.config(seed, backend, decisions, protocol)
-    _run(RunRequest(named.names, tuple(found), folder, config), settings, retry_errored)
+    _run(Evaluation(named.names, tuple(found), folder, config), settings, retry_errored)
     return Run(folder)
 
 
-def _run(request: RunRequest, settings: RunSettings, retry_errored: bool) -> None:
-    request.config.backend.check()
+def _run(evaluation: Evaluation, settings: RunSettings, retry_errored: bool) -> None:
+    evaluation.config.backend.check()
     with progress_bar("stages") as show:
         evaluate_all(
-            [request],
+            [evaluation],
             settings.workforce(),
             num_retries=settings.num_retries,
             retry_errored=retry_errored,

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all
-from evonav.evaluation.run.settings_model import NUM_RETRIES
+from evonav.evaluation.run.evaluate import evaluate_all
+from evonav.evaluation.run.run import Evaluation, Progress, RunConfig
+from evonav.evaluation.run.run_settings import NUM_RETRIES
 from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import task_files
 
@@ -43,8 +44,8 @@ def evaluate_controlled(
         StoreError: A run's folder holds another run, or cannot be written.
     """
     arms = [arm.name for arm in read_controlled(directory).arms]
-    requests = [
-        RunRequest(
+    runs = [
+        Evaluation(
             tuple(agents),
             tuple(task_files(tasks_of(directory, arm))),
             run_of(directory, arm),
@@ -53,7 +54,7 @@ def evaluate_controlled(
         for arm in arms
     ]
     summaries = evaluate_all(
-        requests,
+        runs,
         workforce or Workforce(1),
         num_retries=num_retries,
         retry_errored=retry_errored,

@@ -14,7 +14,7 @@ from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.provenance import isolations_of
+from evonav.evaluation.run.summary import isolations_of
 from evonav.submission.file import About, PackedTask, Submission, write_submission
 
 

@@ -13,10 +13,8 @@ from pydantic import ConfigDict, Field
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.decision_resources import SpendingSettings
-from evonav.evaluation.run.run_settings import RunSettings
+from evonav.evaluation.run.run_settings import RunSettings, SettingError, Settings, SpendingSettings, settings_of
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
-from evonav.evaluation.run.settings_model import SettingError, Settings, settings_of
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, listed
 from evonav.tasks.records import described_schema
 from evonav.tasks.subsets import SubsetError, parse_subset

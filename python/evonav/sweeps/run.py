@@ -22,8 +22,9 @@ from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_decision
-from evonav.evaluation.run.decision_resources import DecisionResources
-from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, run_identity
+from evonav.evaluation.run.evaluate import evaluate_all
+from evonav.evaluation.run.run import Evaluation, Progress, RunConfig
+from evonav.evaluation.run.run_settings import DecisionResources
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
@@ -55,12 +56,12 @@ class CellRun:
     """A cell with its run."""
 
     cell: Cell
-    request: RunRequest
+    evaluation: Evaluation
 
     @property
     def num_stages(self) -> int:
         """Number of stages of all agents."""
-        return len(self.cell.agents) * sum(task.num_stages for task in self.request.tasks)
+        return len(self.cell.agents) * sum(task.num_stages for task in self.evaluation.tasks)
 
 
 def cells_of(sweep: SweepFile) -> list[Cell]:
@@ -152,7 +153,7 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
     return [
         CellRun(
             cell,
-            RunRequest(
+            Evaluation(
                 cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, None)
             ),
         )
@@ -169,14 +170,14 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
     if sweep.decisions[run.cell.decision].asks_rules:
         return run
     resources = DecisionResources(
-        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_askers=sweep.num_episodes
+        run.evaluation.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_askers=sweep.num_episodes
     )
     try:
         config = config_of(sweep, run.cell, resources)
         check_decision(config.backend.decision, run.cell.seed)
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error
-    return replace(run, request=replace(run.request, config=config))
+    return replace(run, evaluation=replace(run.evaluation, config=config))
 
 
 def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
@@ -253,7 +254,7 @@ def run_sweep(
         for name in dict.fromkeys(run.cell.simulator for run in todo):
             _check_simulator(next(run for run in todo if run.cell.simulator == name))
         evaluate_all(
-            [run.request for run in todo],
+            [run.evaluation for run in todo],
             sweep.workforce(),
             num_retries=sweep.num_retries,
             retry_errored=retry_errored,
@@ -274,7 +275,7 @@ def _content(run: CellRun) -> dict[str, Any]:
         "agents": list(run.cell.agents),
         "axes": axes,
         "num_stages": run.num_stages,
-        "run": json.loads(json.dumps(run_identity(run.request.tasks, run.request.config))),
+        "run": json.loads(json.dumps(run.evaluation.identity)),
     }
 
 
@@ -294,7 +295,7 @@ def _differences(there: Mapping[str, Any], requested: Mapping[str, Any]) -> Iter
 def _is_recorded(run: CellRun) -> bool:
     """Return true if every stage of a cell is recorded, in a run of the same identity."""
     try:
-        with RunStore(run.request.run_dir) as store:
+        with RunStore(run.evaluation.run_dir) as store:
             if store.meta("config") != _content(run)["run"]:
                 return False  # `evaluate_all` says what differs
             states = store.states()
@@ -303,7 +304,7 @@ def _is_recorded(run: CellRun) -> bool:
     return all(
         (agent, task.task_id, stage) in states
         for agent in run.cell.agents
-        for task in run.request.tasks
+        for task in run.evaluation.tasks
         for stage in range(1, task.num_stages + 1)
     )
 
@@ -311,6 +312,6 @@ def _is_recorded(run: CellRun) -> bool:
 def _check_simulator(run: CellRun) -> None:
     """Start the simulator once, before anything is written for a cell."""
     try:
-        run.request.config.backend.check()
+        run.evaluation.config.backend.check()
     except EvonavError as error:
         raise type(error)(f"simulators.{run.cell.simulator}: {error}") from error

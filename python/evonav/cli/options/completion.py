@@ -36,7 +36,7 @@ def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click'
 
 def sweep_keys(incomplete: str) -> list[str]:
     """Keys of sweep files."""
-    from evonav.evaluation.run.settings_model import keys_of
+    from evonav.evaluation.run.run_settings import keys_of
     from evonav.sweeps.file import SweepFile
 
     return [f"{key}=" for key in keys_of(SweepFile) if key.startswith(incomplete)]

@@ -12,8 +12,8 @@ if TYPE_CHECKING:  # the command must start fast
 
     from evonav.component import Component
     from evonav.decision.question import DecisionModel
-    from evonav.evaluation.run.decision_resources import SpendingSettings
     from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.run_settings import SpendingSettings
     from evonav.evaluation.run.settings import DecisionSettings
     from evonav.tasks.listing import TaskFile
 
@@ -52,7 +52,7 @@ def decision_component(
         StoreError: The file of exchanges cannot be opened.
     """
     from evonav.evaluation.run.components import check_decision
-    from evonav.evaluation.run.decision_resources import DecisionResources
+    from evonav.evaluation.run.run_settings import DecisionResources
 
     decisions.check()
     if decisions.kind != "vlm":
@@ -80,7 +80,7 @@ def print_estimate(
     from evonav.cli.display import progress
     from evonav.counted import counted
     from evonav.decision.vlm.counting import OUTPUT_TOKENS
-    from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
+    from evonav.evaluation.cost_estimate import estimate_run, total_usage
 
     options = dict(config.backend.decision.options)
     price = spending.price(options["model"])

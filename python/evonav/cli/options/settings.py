@@ -135,8 +135,8 @@ def settings_from(
     Raises:
         SettingError: A key is unknown or its value invalid.
     """
+    from evonav.evaluation.run.run_settings import settings_of, unknown_key
     from evonav.evaluation.run.settings import CommandSettings
-    from evonav.evaluation.run.settings_model import settings_of, unknown_key
     from evonav.toml import key_and_value, set_value
 
     raw: dict[str, Any] = {}
@@ -154,8 +154,8 @@ def settings_from(
 
 def setting_keys(prefixes: Sequence[str] = ()) -> list[str]:
     """Return the keys that `--set` takes, those of options of their own included."""
+    from evonav.evaluation.run.run_settings import keys_of
     from evonav.evaluation.run.settings import CommandSettings
-    from evonav.evaluation.run.settings_model import keys_of
 
     return [key for key in keys_of(CommandSettings) if not prefixes or key.startswith(tuple(prefixes))]
 
@@ -188,7 +188,7 @@ def _described(prefixes: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 def usage_error(error: Exception) -> typer.BadParameter | None:
     """Return the error of an invalid setting as wrong usage of its option; `None` for any other error."""
-    from evonav.evaluation.run.settings_model import SettingError
+    from evonav.evaluation.run.run_settings import SettingError
 
     if not isinstance(error, SettingError):
         return None

@@ -24,7 +24,7 @@ def demo(
     It takes a minute or two. The report is a page with tables, maps and replays of one task.
     """
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import evaluate
+    from evonav.evaluation.run.evaluate import evaluate
     from evonav.report import write_report
 
     context.with_resource(early_worker())

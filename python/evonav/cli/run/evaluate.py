@@ -108,7 +108,8 @@ def evaluate(
     Three agents run on the bundled tasks by default. Look at the results with `evonav report OUT`.
     """
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunRequest, evaluate_all
+    from evonav.evaluation.run.evaluate import evaluate_all
+    from evonav.evaluation.run.run import Evaluation
 
     context.with_resource(early_worker())
     if houses is not None and tasks is not None:
@@ -146,7 +147,7 @@ def evaluate(
             return
         with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
             (summaries,) = evaluate_all(
-                [RunRequest(tuple(names), tuple(task_files), out, config)],
+                [Evaluation(tuple(names), tuple(task_files), out, config)],
                 workforce,
                 num_retries=run.num_retries,
                 retry_errored=retry_errored or fail_fast or pdb,
@@ -160,7 +161,7 @@ def evaluate(
 
 def early_worker() -> "AbstractContextManager[None]":
     """Start a worker while the command still imports what decides its settings."""
-    from evonav.evaluation.run.program import PROGRAM
+    from evonav.evaluation.run import PROGRAM
     from evonav.parallel.local import started_early
 
     return started_early(PROGRAM)

@@ -58,7 +58,7 @@ def sweep(
         return
     if file is None:
         raise typer.BadParameter("name a sweep file, such as examples/sweeps/noise.toml")
-    from evonav.evaluation.run.provenance import typed_command
+    from evonav.evaluation.run.summary import typed_command
     from evonav.sweeps.file import read_sweep
     from evonav.sweeps.run import cell_runs, cells_of, chosen, task_sets
 
@@ -152,9 +152,9 @@ def _print_plan(
     from rich.table import Table
 
     from evonav.cli.display import status
+    from evonav.evaluation.cost_estimate import estimate_run, total_usage
     from evonav.evaluation.hosting.isolation import AgentHosting
     from evonav.evaluation.run.components import check_agent_name
-    from evonav.evaluation.run.cost_estimate import estimate_run, total_usage
     from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
@@ -172,16 +172,18 @@ def _print_plan(
             cost = [""] * 3 if has_models else []
             if settings.decisions[cell.decision].kind == "vlm":
                 tell(cell.name)
-                config = run.request.config
+                config = run.evaluation.config
                 options = dict(config.backend.decision.options)
-                found = estimate_run(cell.agents, run.request.tasks, config, options, num_workers=settings.num_workers)
+                found = estimate_run(
+                    cell.agents, run.evaluation.tasks, config, options, num_workers=settings.num_workers
+                )
                 usage, price = total_usage(found), settings.price(options["model"])
                 total_usd += 0.0 if price is None else price.of(usage)
                 dollars = "?" if price is None else f"{price.of(usage):.2f}"
                 num_requests = sum(estimate.num_requests for estimate in found)
                 cost = [f"{num_requests:.0f}", str(usage.input_tokens), dollars]
             total += run.num_stages
-            table.add_row(cell.name, ", ".join(cell.agents), str(len(run.request.tasks)), str(run.num_stages), *cost)
+            table.add_row(cell.name, ", ".join(cell.agents), str(len(run.evaluation.tasks)), str(run.num_stages), *cost)
     show(table)
     typer.echo(counted(total, "stage") + (f", about ${total_usd:.2f}" if total_usd else ""))
     if has_models and settings.prices is None:

@@ -57,7 +57,7 @@ class SweepProgress:
         progress = cls(out, {run.cell.name: _CellState(run.num_stages) for run in runs})
         for run in runs:
             state = progress.cells[run.cell.name]
-            counts = _recorded(run.request.run_dir, run.cell.agents)
+            counts = _recorded(run.evaluation.run_dir, run.cell.agents)
             state.num_done = sum(counts.values())
             state.num_failed = counts["errored"] + counts["not_run"]
         return progress

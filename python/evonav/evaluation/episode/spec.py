@@ -74,7 +74,7 @@ class StageSpec:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots: workers refer to it weakly
 class EpisodeSpec:
     """A task as the evaluator knows it."""
 

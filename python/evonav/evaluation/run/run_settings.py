@@ -1,25 +1,136 @@
-"""Declare the options of a run's workers, limits and retries, once for Python, sweep files and commands."""
+"""Define what all settings are and how they are read; the settings of a run's workers, limits, retries and costs.
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, TypeVar
+Small commands use these: nothing heavy is imported here.
+"""
 
-from pydantic import Field
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
+from pydantic import Field, ValidationError
+
+from evonav.decision.vlm.ledger import LEDGER_NAME
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, Isolation, usual_isolation
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.settings_model import NUM_RETRIES, SettingError, Settings
 from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
+from evonav.tasks.records import Record
 
 if TYPE_CHECKING:
+    from evonav.decision.vlm.account import Price
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
     from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
 
-SettingsT = TypeVar("SettingsT", bound="RunSettings")
-
+NUM_RETRIES = 2
+"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
+MAX_SHOWN = 80
+"""Characters of the longest value that an error shows."""
 VLM_EPISODES_AT_ONCE = 16
 """Episodes that a worker runs at once where a server is asked, which takes most of the time."""
+
+SettingsT = TypeVar("SettingsT", bound="Settings")
+RunSettingsT = TypeVar("RunSettingsT", bound="RunSettings")
+
+
+class SettingError(InvalidArgumentError):
+    """A setting that is invalid beside the others; the command and sweep files add its full name."""
+
+    def __init__(self, settings: "type[Settings]", key: str, problem: str) -> None:
+        """Create the error.
+
+        Args:
+            key: A field of the settings; dots reach into settings that are fields.
+            problem: The problem, as the end of a sentence that begins with the field's name.
+        """
+        super().__init__(f"{key} {problem}")
+        self.settings = settings
+        self.key = key
+        self.problem = problem
+
+
+class Settings(Record):
+    """Options that people write, in a file or on the command line.
+
+    The string below a field is its description in the JSON Schema of sweep files and in the list of keys.
+    """
+
+
+def settings_of(model: type[SettingsT], raw: Mapping[str, Any]) -> SettingsT:
+    """Return settings from plain values, as a file or options give them.
+
+    Raises:
+        SettingError: A key is unknown or missing, or a value invalid.
+    """
+    try:
+        text = json.dumps(raw, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(f"holds a value that is no text, number, list or table: {error}") from None
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        raise _first_problem(model, error) from None
+
+
+def keys_of(model: type[Settings]) -> Iterator[str]:
+    """Yield the keys of settings, those of settings that are fields with a dot."""
+    for name, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Settings):
+            yield from (f"{name}.{key}" for key in keys_of(field.annotation))
+        else:
+            yield name
+
+
+def unknown_key(model: type[Settings], key: str, known: Sequence[str], hint: str = "") -> SettingError:
+    """Return the error of a key that there is not, with the nearest one that there is.
+
+    Args:
+        hint: What it says if no key is near; default: the keys that there are.
+    """
+    last = key.rpartition(".")[2]
+    near = [one for one in known if one.rpartition(".")[2] == last] or get_close_matches(key, known, 1)
+    near = near or [one for one in known if get_close_matches(last, [one.rpartition(".")[2]])]
+    hint = f"did you mean {near[0]}?" if near else hint or f"there are {', '.join(known)}"
+    return SettingError(model, key, f"is no such key; {hint}")
+
+
+def _first_problem(model: type[Settings], error: ValidationError) -> SettingError:
+    found = error.errors(include_url=False, include_context=True)
+    # A key that nobody knows explains what is missing.
+    first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
+    key = ".".join(str(part) for part in first["loc"] if part != "[key]")
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    if first["type"] == "extra_forbidden":
+        before = "".join(f"{part}." for part in first["loc"][:-1])
+        unknown = unknown_key(model, key, [f"{before}{name}" for name in _model_at(model, first["loc"]).model_fields])
+        return SettingError(model, key, f"{unknown.problem}{more}")
+    if first["type"] == "missing":
+        return SettingError(model, key, f"is missing{more}")
+    if first["type"] == "string_pattern_mismatch" and "[key]" in first["loc"]:
+        rule = "is no name: letters, digits, '.', '-' and single '_', and the first is a letter or digit"
+        return SettingError(model, key, f"{rule}{more}")
+    shown = repr(first.get("input"))
+    shown = shown if len(shown) <= MAX_SHOWN else shown[: MAX_SHOWN - 3] + "..."
+    return SettingError(model, key, f"= {shown}: {first['msg']}{more}")
+
+
+def _model_at(model: type[Settings], place: Sequence[int | str]) -> type[Settings]:
+    """Return the settings that a place of an error is in."""
+    for part in place[:-1]:
+        if part in model.model_fields:
+            model = next(_models_in(model.model_fields[str(part)].annotation), model)
+    return model
+
+
+def _models_in(annotation: Any) -> Iterator[type[Settings]]:  # noqa: ANN401 - a type hint
+    if isinstance(annotation, type) and issubclass(annotation, Settings):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)
 
 
 class RunSettings(Settings):
@@ -59,8 +170,8 @@ class RunSettings(Settings):
         return max(1, self.num_workers) * (self.episodes_at_once or 1)
 
     def with_episodes(
-        self: SettingsT, decisions: "Iterable[DecisionSettings]", simulators: "Iterable[SimulatorSettings]"
-    ) -> SettingsT:
+        self: RunSettingsT, decisions: "Iterable[DecisionSettings]", simulators: "Iterable[SimulatorSettings]"
+    ) -> RunSettingsT:
         """Return these settings with a number of episodes at once: the given one, or the default.
 
         Args:
@@ -123,3 +234,59 @@ class RunSettings(Settings):
 
         is_here = self.num_workers > 0 and self.engine == "local"
         return usual_isolation() if is_here and not sandboxed_model_problem(backend.decision) else "process"
+
+
+class SpendingSettings(Settings):
+    """Prices of models, and how much may be spent."""
+
+    prices: str | None = None
+    """JSON file of prices in dollars per million tokens: {"MODEL": {"input_usd": .., "output_usd": ..}}."""
+    max_cost: float | None = Field(default=None, gt=0.0)
+    """Largest cost in dollars; later questions fail. It needs prices. Default: no limit."""
+
+    def price(self, model: str) -> "Price | None":
+        """Return a model's price; `None` without a file of prices.
+
+        Raises:
+            InvalidArgumentError: The file cannot be read, or lacks the model.
+        """
+        from evonav.decision.vlm.account import read_prices
+
+        if self.prices is None:
+            return None
+        table = read_prices(Path(self.prices))
+        if model not in table:
+            raise InvalidArgumentError(f"{self.prices}: has no prices of {model!r}")
+        return table[model]
+
+    def host_options(self, model: str) -> dict[str, Any]:
+        """Return the keyword arguments of a decision model that asks `model`."""
+        price = self.price(model)
+        if self.max_cost is not None and price is None:
+            raise SettingError(
+                type(self),
+                "max_cost",
+                "needs the model's prices: name a file with --prices (in a sweep file: prices = ...)",
+            )
+        spending: dict[str, Any] = {} if price is None else {"price": [price.input_usd, price.output_usd]}
+        return spending if self.max_cost is None else {**spending, "max_cost_usd": self.max_cost}
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionResources:
+    """The files in which a run stores answers of its model and logs their costs."""
+
+    run_dir: Path
+    """Folder of the run, which holds the answers unless the settings name another file."""
+    spending_log: Path
+    """File in which all workers log costs, of one run or of several."""
+    spending: SpendingSettings
+    account: str | None = None
+    """Name in the spending log; default: the model's."""
+    num_askers: int = 1
+    """Number of episodes that may ask at once."""
+
+    @classmethod
+    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_askers: int) -> "DecisionResources":
+        """Return the resources of a run that has a spending log of its own."""
+        return cls(run_dir, run_dir / LEDGER_NAME, spending, num_askers=num_askers)

@@ -16,15 +16,13 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.errors import StoreError
 from evonav.evaluation.run.components import USUAL_CAMERA
-from evonav.evaluation.run.decision_resources import SpendingSettings
-from evonav.evaluation.run.run_settings import RunSettings
-from evonav.evaluation.run.settings_model import SettingError, Settings
+from evonav.evaluation.run.run_settings import RunSettings, SettingError, Settings, SpendingSettings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
 from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
-    from evonav.evaluation.run.decision_resources import DecisionResources
+    from evonav.evaluation.run.run_settings import DecisionResources
 
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""

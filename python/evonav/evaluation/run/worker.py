@@ -6,7 +6,7 @@ off. A worker that dies or hangs costs its episode, not the run.
 A stage that was lost to the machine is retried: its episode runs from the beginning, with a fresh agent and the same
 seed. This brings a deterministic agent to the state in which it began the stage, which no snapshot would do for every
 agent; for another agent, the newer rollout replaces the older. The worker retries after a lost simulator, a lost agent
-process or a failure of the harness; `evonav.evaluation.run.scheduler` retries after a lost worker.
+process or a failure of the harness; `evonav.evaluation.run.evaluate` retries after a lost worker.
 
 A worker may run several episodes at once, each on a thread. One of them computes at a time; the others wait for their
 agents, which are in processes of their own and wait for a model most of the time. So nothing here, nor a simulator, a
@@ -17,7 +17,7 @@ import json
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
 from inspect import GEN_CLOSED, getgeneratorstate
@@ -53,8 +53,8 @@ END_TIMEOUT_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class WorkerConfig:
-    """The configuration that episodes need beside the task and the agent."""
+class WorkerSetup:
+    """What the episodes of a run need beside the task and the agent."""
 
     backend: Backend
     protocol: ProtocolConfig
@@ -82,19 +82,24 @@ class EpisodeJob:
     sends_floor_plans: bool = False
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
-    def text(self, config_text: str) -> str:
+    def text(self, run: int) -> str:
         """Return the text of the job for a worker.
 
         Args:
-            config_text: A `WorkerConfig`, as `CONFIG` writes it.
+            run: Number of the job's run among the setups that the worker has.
         """
-        return f"{json.dumps(asdict(self))}\n{config_text}"
+        return f"{run}\n{json.dumps(asdict(self))}"
 
 
-CONFIG = TypeAdapter(WorkerConfig)
-"""Writes and reads the configuration as JSON."""
+SETUPS = TypeAdapter(tuple[WorkerSetup, ...])
+"""Writes and reads the setups of runs as JSON."""
 EVENT: TypeAdapter[EncodedStage | StageFailure | None] = TypeAdapter(EncodedStage | StageFailure | None)
 """Writes and reads an event of a job as JSON: a finished stage, a failure, or `None` at an end without either."""
+
+
+def worker_settings(jobs_at_once: int, setups: Sequence[WorkerSetup]) -> str:
+    """Return the text with which a worker makes its `EpisodeWork`."""
+    return f"{jobs_at_once}\n{SETUPS.dump_json(tuple(setups)).decode()}"
 
 
 class Turns:
@@ -124,30 +129,23 @@ class Turns:
         self._lock.acquire(timeout=timeout_s)
 
 
-@dataclass(frozen=True)
-class LoadedTask:
-    """A task in memory, which the episodes of several agents share."""
-
-    spec: EpisodeSpec
-
-
 class WorkerContext:
-    """Runs episodes of one configuration, and keeps simulators and agents' processes, which are slow to start."""
+    """Runs episodes of one run, and keeps simulators and agents' processes, which are slow to start."""
 
     def __init__(
         self,
-        config: WorkerConfig,
+        setup: WorkerSetup,
         alive: Callable[[], None],
         waiting: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        """Store the configuration; simulators start with the first episodes.
+        """Store the setup; simulators start with the first episodes.
 
         Args:
             alive: Shows that an episode continues.
             waiting: Lets other episodes compute while the block waits for an agent.
         """
-        hosting = config.hosting
-        self.config = config
+        hosting = setup.hosting
+        self.setup = setup
         self.num_users = 0
         """Number of episodes that use it."""
         # An agent in this process has one time limit for a whole stage.
@@ -156,24 +154,24 @@ class WorkerContext:
         self._own_cpu_s = time.process_time if hosting.is_in_process else time.thread_time
         self._idle: list[Simulator] = []
         self._busy: list[Simulator] = []
-        self._tasks: WeakValueDictionary[str, LoadedTask] = WeakValueDictionary()
-        self._last_task: LoadedTask | None = None
+        self._tasks: WeakValueDictionary[str, EpisodeSpec] = WeakValueDictionary()
+        self._last_task: EpisodeSpec | None = None
         """The task that was asked for last: the next episode is often another agent's in it."""
-        self._processes = None if hosting.is_in_process else AgentProcesses(hosting, config.processes, waiting)
+        self._processes = None if hosting.is_in_process else AgentProcesses(hosting, setup.processes, waiting)
 
-    def task(self, path: str) -> LoadedTask:
+    def task(self, path: str) -> EpisodeSpec:
         """Return the task in a folder. It is read for each agent in this process alone, which could change arrays."""
         if (found := self._tasks.get(path)) is None:
-            found = LoadedTask(self.config.backend.tasks.create(Path(path)))
-            if not self.config.hosting.is_in_process:
+            found = self.setup.backend.tasks.create(Path(path))
+            if not self.setup.hosting.is_in_process:
                 self._tasks[path] = self._last_task = found
         return found
 
     @contextmanager
     def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Iterator[Iterator[StageOutcome]]:
         """Run an episode from its beginning, with a fresh agent; if it does not end, its simulator is closed."""
-        perception = self.config.backend.perception.create()
-        simulator = self._idle.pop() if self._idle else self.config.backend.simulator.create()
+        perception = self.setup.backend.perception.create()
+        simulator = self._idle.pop() if self._idle else self.setup.backend.simulator.create()
         self._busy.append(simulator)
         is_whole = False
         try:
@@ -185,7 +183,7 @@ class WorkerContext:
                     agent,
                     simulator,
                     perception,
-                    self.config.protocol,
+                    self.setup.protocol,
                     job.seed,
                     _Heartbeat(self._on_round),
                     perception_seed=job.perception_seed,
@@ -204,11 +202,11 @@ class WorkerContext:
     def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
         if self._processes is not None and job.agent not in ORACLE_BASELINE_NAMES:
-            return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed, job.task_id)
+            return RemoteAgent(self._processes, job.agent, self.setup.backend.decision, job.seed, job.task_id)
         try:
-            if self.config.hosting.isolation == "debugger" and job.agent not in ORACLE_BASELINE_NAMES:
+            if self.setup.hosting.isolation == "debugger" and job.agent not in ORACLE_BASELINE_NAMES:
                 return self._debugged_agent(job)
-            return make_agent(job.agent, self.config.backend.decision.create(job.seed))
+            return make_agent(job.agent, self.setup.backend.decision.create(job.seed))
         except (KeyboardInterrupt, EndedError):
             raise
         except BaseException as error:
@@ -219,7 +217,7 @@ class WorkerContext:
         from evonav.evaluation.hosting.debugger import DebuggedAgent, post_mortem
 
         with post_mortem():
-            return DebuggedAgent(make_agent(job.agent, self.config.backend.decision.create(job.seed)))
+            return DebuggedAgent(make_agent(job.agent, self.setup.backend.decision.create(job.seed)))
 
     def close(self) -> None:
         """Close the simulators and end the agents' processes; safe to call twice."""
@@ -278,25 +276,28 @@ class _Retries:
 
 
 class EpisodeWork:
-    """The work of `evonav.parallel.pool`. Cells of a sweep share a worker: each configuration has a context."""
+    """The work of `evonav.parallel.pool`. Cells of a sweep share a worker: each run has a context."""
 
-    def __init__(self, num_at_once: str, alive: Callable[[], None]) -> None:
+    def __init__(self, settings: str, alive: Callable[[], None]) -> None:
         self._alive = alive
-        self._contexts: dict[str, WorkerContext] = {}
+        jobs_at_once, _, setups = settings.partition("\n")
+        self._setups = SETUPS.validate_json(setups)
+        self._contexts: dict[int, WorkerContext] = {}
+        """By the number of their runs; the one that was used last comes last."""
         # A single episode runs on the main thread, where a signal may come at any moment: it takes no turns.
-        self._turns = Turns() if int(num_at_once) > 1 else None
+        self._turns = Turns() if int(jobs_at_once) > 1 else None
 
     def __call__(self, text: str) -> Generator[str, None, str]:
         """Run the episode of `EpisodeJob.text`; yield and return events, as `EVENT` writes them.
 
         After a failure that costs only the attempt, the failure is an event, and the stages from stage 1 on come again.
         """
-        head, _, config_text = text.partition("\n")
-        with self._used(config_text) as context:
-            job, num_left = EpisodeJob(**json.loads(head)), _Retries(context.config.num_retries)
+        run, _, job_text = text.partition("\n")
+        with self._used(int(run)) as context:
+            job, num_left = EpisodeJob(**json.loads(job_text)), _Retries(context.setup.num_retries)
             try:
                 task = context.task(job.path)
-                spec = replace(task.spec, opaque_id=job.opaque_id)
+                spec = replace(task, opaque_id=job.opaque_id)
                 is_whole = False
                 while not is_whole:
                     is_whole = True
@@ -313,25 +314,25 @@ class EpisodeWork:
             return _text(None)
 
     @contextmanager
-    def _used(self, config_text: str) -> Iterator[WorkerContext]:
-        """Take a turn, and keep the context of a configuration open meanwhile."""
+    def _used(self, run: int) -> Iterator[WorkerContext]:
+        """Take a turn, and keep the context of a run open meanwhile."""
         with nullcontext() if self._turns is None else self._turns.turn():
-            context = self._context(config_text)
+            context = self._context(run)
             context.num_users += 1
             try:
                 yield context
             finally:
                 context.num_users -= 1
 
-    def _context(self, config_text: str) -> WorkerContext:
-        found = self._contexts.pop(config_text, None)
+    def _context(self, run: int) -> WorkerContext:
+        found = self._contexts.pop(run, None)
         unused = [key for key, context in self._contexts.items() if context.num_users == 0]
         while found is None and unused and len(self._contexts) >= MAX_CONTEXTS:
             self._contexts.pop(unused.pop(0)).close()
         if found is None:
             waiting = nullcontext if self._turns is None else self._turns.waiting
-            found = WorkerContext(CONFIG.validate_json(config_text), self._alive, waiting)
-        self._contexts[config_text] = found
+            found = WorkerContext(self._setups[run], self._alive, waiting)
+        self._contexts[run] = found
         return found
 
     def close(self) -> None:

@@ -13,7 +13,8 @@ from typing import Any
 
 from evonav.component import Component
 from evonav.decision.vlm.ledger import Ledger, Usage
-from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
+from evonav.evaluation.run.evaluate import evaluate
+from evonav.evaluation.run.run import Progress, RunConfig, agent_seed
 from evonav.statistics import student_quantile
 from evonav.tasks.listing import TaskFile
 
