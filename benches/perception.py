@@ -13,7 +13,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import compare
 from evonav.tasks.public import Goal
@@ -88,7 +88,7 @@ def _rounds() -> list[Round]:
 
 def _perceiver(word: str, rounds: Sequence[Round]) -> tuple[Callable[[int], object], bool]:
     """What perceives round `i`, and whether it needs colours."""
-    backend = Backend(perception=read_word(word))
+    backend = Backend(perception=parse_perception(word))
     goal = Goal(1, "Bed", "the bed", "the bed", "Find the bed.", np.zeros((300, 300, 3), np.uint8))
     perceptions: list[Perception] = []
     for number, one in enumerate(rounds):

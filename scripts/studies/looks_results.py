@@ -19,7 +19,7 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.settings import RULES
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import RecordedRun, load_run
@@ -63,7 +63,7 @@ def parts(text: RecordedRun, looks: RecordedRun) -> dict[str, str]:
 
 def _backend(rule: str) -> Backend:
     decision: Component[DecisionModel] = Component(f"evonav.decision.backends:{RULES[rule]}")
-    return Backend(perception=read_word(HEADLINE), decision=decision)
+    return Backend(perception=parse_perception(HEADLINE), decision=decision)
 
 
 def comparison_table(text: RecordedRun, looks: RecordedRun) -> Table:

@@ -18,7 +18,7 @@ from evonav.evaluation.metrics.navigation import AgentSummary, house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
@@ -201,7 +201,7 @@ def _plot(runs: Mapping[str, RecordedRun], measure: str) -> CurvePlot:
 
 
 def _backend(word: str) -> Backend:
-    return Backend(perception=read_word(word))
+    return Backend(perception=parse_perception(word))
 
 
 def _arguments() -> argparse.Namespace:

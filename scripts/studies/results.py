@@ -24,7 +24,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import Progress, RunConfig
 from evonav.evaluation.run.settings import SimulatorSettings
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import ComparedAgent
 from evonav.report.paper.reweighted import reweighted_table
@@ -73,14 +73,15 @@ def main() -> None:
     agents = asked.agents.split(",")
     subset = spread(tasks, asked.sweep)
     if not asked.write_only:
-        run_agents(asked.out / "main", agents, tasks, Backend(perception=read_word(HEADLINE)), asked)
+        backend = Backend(perception=parse_perception(HEADLINE))
+        run_agents(asked.out / "main", agents, tasks, backend, asked)
         if asked.small:
             small = pooled_tasks(asked.small)
-            run_agents(asked.out / "small", agents, small, Backend(perception=read_word(HEADLINE)), asked)
-        run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, Backend(perception=read_word(HEADLINE)), asked)
-        run_agents(asked.out / "departing", (LOOKING, DECLINING), tasks, Backend(perception=read_word(HEADLINE)), asked)
+            run_agents(asked.out / "small", agents, small, backend, asked)
+        run_agents(asked.out / "plus", ("3d-mem+", "msgnav+"), tasks, backend, asked)
+        run_agents(asked.out / "departing", (LOOKING, DECLINING), tasks, backend, asked)
         run_agents(asked.out / "labels", RANKING_AGENTS, tasks, Backend(), asked)
-        wide = Backend(perception=read_word(HEADLINE), simulator=SimulatorSettings(hfov_deg=120.0).component())
+        wide = Backend(perception=parse_perception(HEADLINE), simulator=SimulatorSettings(hfov_deg=120.0).component())
         run_agents(asked.out / "wide", WIDE_AGENTS, tasks, wide, asked)
         for rate in RATES:
             run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
@@ -106,7 +107,7 @@ def spread(tasks: Sequence[TaskFile], num: int) -> list[TaskFile]:
 def noisy_backend(rate: float) -> Backend:
     """The text matcher, of whose answers a share is another valid one."""
     return Backend(
-        perception=read_word(HEADLINE),
+        perception=parse_perception(HEADLINE),
         decision=Component("evonav.decision.backends:text_match", {"noise": {"wrong": rate}} if rate else {}),
     )
 

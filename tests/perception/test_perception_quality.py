@@ -57,7 +57,7 @@ def folder(tasks, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(folder):
-    return {one.word: one for one in scores(read_records(folder))}
+    return {one.perception: one for one in scores(read_records(folder))}
 
 
 def values(measures, *names):
@@ -137,11 +137,11 @@ def test_differences_are_of_the_same_houses_in_every_resample(folder, found):
     records = read_records(folder)
     twice = scores({"once": records["missing_a_third"], "again": records["missing_a_third"]})
     (same,) = differences(twice)
-    assert (same.word, same.less) == ("again", "once")
+    assert (same.perception, same.less) == ("again", "once")
     assert {each.value for each in same.measures.values()} == {0.0}
     assert {each.ci95 for each in same.measures.values()} == {None}  # of one alone they are not
     assert twice[0].overall["recall"].ci95[0] < twice[0].overall["recall"].ci95[1]
-    pairs = {(each.word, each.less): each.measures for each in differences(list(found.values()))}
+    pairs = {(each.perception, each.less): each.measures for each in differences(list(found.values()))}
     assert len(pairs) == 6
     less_truth = pairs["missing_a_third", "gt"]["recall"]
     assert less_truth.value == pytest.approx(found["missing_a_third"].overall["recall"].value - 1)
@@ -195,7 +195,7 @@ def test_workers_change_nothing_and_what_is_there_is_not_done_again(folder, task
     assert again == [(4, 4, "")]
     for spec in SPECS[1:3]:
         for task in tasks[:2]:
-            mine, theirs = (record_path(place, spec.word, task.task_id).read_bytes() for place in (tmp_path, folder))
+            mine, theirs = (record_path(place, spec.name, task.task_id).read_bytes() for place in (tmp_path, folder))
             assert mine == theirs
 
 
@@ -250,7 +250,7 @@ def test_mistakes_are_named(folder, tasks, tmp_path):
 def test_files_tell_the_same_as_the_scores(folder, found, tmp_path):
     shutil.copytree(folder, tmp_path / "copy")
     page, shown = write_perception_report(tmp_path / "copy")
-    assert [one.word for one in shown] == [spec.word for spec in SPECS]
+    assert [one.perception for one in shown] == [spec.name for spec in SPECS]
     told = json.loads((tmp_path / "copy" / "summary.json").read_text())["perceptions"]
     assert [one["overall"]["recall"]["value"] for one in told] == [one.overall["recall"].value for one in shown]
     rows = list(csv.DictReader((tmp_path / "copy" / "summary.csv").read_text().splitlines()))

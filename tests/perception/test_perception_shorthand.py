@@ -3,7 +3,7 @@
 import pytest
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.shorthand import GROUND_TRUTH, NOISY, PREDICTED, read_word, word_of
+from evonav.perception.shorthand import GROUND_TRUTH, NOISY, PREDICTED, parse_perception, short_name_of
 
 WORDS = {
     "gt": (GROUND_TRUTH, {}),
@@ -18,19 +18,22 @@ WORDS = {
 
 @pytest.mark.parametrize("word", WORDS)
 def test_words_say_what_is_made_and_can_be_said_again(word: str) -> None:
-    read = read_word(word)
+    read = parse_perception(word)
     assert (read.path, dict(read.options)) == WORDS[word]
-    assert word_of(read.path, read.options) == word
+    assert short_name_of(read.path, read.options) == word
 
 
 def test_a_device_is_no_part_of_what_is_recorded() -> None:
-    read = read_word("predicted:unigoal,device=cpu")
+    read = parse_perception("predicted:unigoal,device=cpu")
     assert (read.options, read.host_options) == ({"stack": "unigoal"}, {"device": "cpu"})
-    assert word_of(read.path, read.options) == "predicted:unigoal"
+    assert short_name_of(read.path, read.options) == "predicted:unigoal"
 
 
 def test_options_go_before_those_of_the_word() -> None:
-    assert read_word("noisy:good,miss_rate=0.3", {"miss_rate": 0.5}).options == {"preset": "good", "miss_rate": 0.5}
+    assert parse_perception("noisy:good,miss_rate=0.3", {"miss_rate": 0.5}).options == {
+        "preset": "good",
+        "miss_rate": 0.5,
+    }
 
 
 @pytest.mark.parametrize(
@@ -49,4 +52,4 @@ def test_options_go_before_those_of_the_word() -> None:
 )
 def test_bad_words_are_named_with_what_is_known(word: str, said: str) -> None:
     with pytest.raises(InvalidArgumentError, match=said):
-        read_word(word)
+        parse_perception(word)

@@ -31,7 +31,7 @@ from evonav.perception.predicted import (
     stack_of,
     weights_of,
 )
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.perception.vocabulary import (
     COCO_UNIGOAL,
     DINO_UNIGOAL,
@@ -167,7 +167,7 @@ def test_colours_can_be_swapped_as_3d_mems_code_does() -> None:
     np.testing.assert_array_equal(view.rgb, one.rgb[..., [2, 1, 0]])
     assert view.depth_m is one.depth_m
     assert view.horizon_rad == one.pose.horizon_rad
-    word = read_word("predicted:3d-mem,swapped_colours=true")
+    word = parse_perception("predicted:3d-mem,swapped_colours=true")
     assert weights_of("3d-mem", StackConfig(swapped_colours=word.options["swapped_colours"]))
     with pytest.raises(InvalidArgumentError, match="predicted:unigoal: swapped_colours is of 3d-mem"):
         weights_of("unigoal", StackConfig(swapped_colours=True))

@@ -3,7 +3,7 @@
 import perception_results as script
 from made_up_run import WriteRun
 
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.report.run import load_run
 
 
@@ -38,4 +38,4 @@ def test_every_default_perception_is_a_word_with_a_folder_and_a_name_of_its_own(
         "mini",
     ]
     for word in script.PERCEPTIONS:
-        read_word(word)
+        parse_perception(word)

@@ -28,7 +28,7 @@ NAMES = ("gt", "noisy", "predicted")
 GRAMMAR = "gt, noisy[:PRESET][,KEY=VALUE...], predicted[:STACK][,KEY=VALUE...] or module:function"
 
 
-def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component[Perception]":
+def parse_perception(word: str, options: Mapping[str, Any] | None = None) -> "Component[Perception]":
     """Return the component of the perception with a short name.
 
     Args:
@@ -61,8 +61,8 @@ def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component
     return Component(f"{kind}:{variant}", given)
 
 
-def word_of(make: str, options: Mapping[str, Any]) -> str:
-    """Return the short name of the perception in a run's records: the inverse of `read_word`."""
+def short_name_of(make: str, options: Mapping[str, Any]) -> str:
+    """Return the short name of the perception in a run's records: the inverse of `parse_perception`."""
     left = dict(options)
     head = {GROUND_TRUTH: "gt", NOISY: "noisy", PREDICTED: "predicted"}.get(make, make)
     variant = left.pop("preset", None) if make == NOISY else left.pop("stack", None) if make == PREDICTED else None

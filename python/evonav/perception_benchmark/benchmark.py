@@ -51,7 +51,7 @@ NUM_PICTURES = 4
 class PerceptionSpec:
     """A perception with the name under which it is measured."""
 
-    word: str
+    name: str
     component: Component[Perception]
 
 
@@ -84,7 +84,7 @@ class MeasuredTasks:
     tasks: tuple[str, ...]
     """Tasks that have a record of every perception of the folder."""
     failures: tuple[tuple[str, str, str], ...]
-    """Word, task and last line of what went wrong."""
+    """Perception, task and last line of what went wrong."""
 
 
 def measure(
@@ -114,7 +114,7 @@ def measure(
         EngineError: Workers cannot be had.
     """
     config = config or TourConfig()
-    perceptions = [spec.word for spec in specs]
+    perceptions = [spec.name for spec in specs]
     if not specs or not tasks:
         raise InvalidArgumentError(f"no {'task' if specs else 'perception'} to measure")
     if len(set(perceptions)) != len(perceptions):
@@ -125,7 +125,7 @@ def measure(
             (spec, task, number < NUM_PICTURES)
             for number, task in enumerate(tasks)
             for spec in specs
-            if not record_path(out, spec.word, task.task_id).exists()
+            if not record_path(out, spec.name, task.task_id).exists()
         ]
         _claim_models(header, [spec for spec in specs if any(spec is job[0] for job in jobs)], out)
         num_all = len(tasks) * len(specs)
@@ -140,11 +140,11 @@ def measure(
         ended = finished(WORK, settings, jobs, text_of, num_workers=num_workers, timeout_s=TASK_TIMEOUT_S)
         for (spec, task, _), text, why in ended:
             if text is None:
-                failures.append((spec.word, task.task_id, why))
+                failures.append((spec.name, task.task_id, why))
             else:
-                write_record(out, spec.word, task.task_id, text)
+                write_record(out, spec.name, task.task_id, text)
             num_done += 1
-            on_progress(num_done, num_all, f"{spec.word} {task.task_id}")
+            on_progress(num_done, num_all, f"{spec.name} {task.task_id}")
         return MeasuredTasks(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
 
 
@@ -158,19 +158,19 @@ def _begun(
     """Claim the folder; records of tasks that are others now are dropped."""
     identity = {"evonav": __version__, "tour": asdict(config), **simulator.identity("simulator")}
     there = read_header(out)
-    options = {spec.word: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
+    options = {spec.name: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
     digests = {task.task_id: task.digest for task in tasks}
-    perceptions = [spec.word for spec in specs]
+    perceptions = [spec.name for spec in specs]
     if there is not None:
         check_same_run(there.identity, identity, out)
-        for word, known in there.options.items():
-            check_same_run({word: known}, {word: options.get(word, known)}, out)
-        perceptions = [*there.perceptions, *(word for word in perceptions if word not in there.perceptions)]
+        for name, known in there.options.items():
+            check_same_run({name: known}, {name: options.get(name, known)}, out)
+        perceptions = [*there.perceptions, *(name for name in perceptions if name not in there.perceptions)]
         options = {**there.options, **options}
         for task_id, digest in digests.items():
             if there.digests.get(task_id, digest) != digest:
-                for word in there.perceptions:
-                    record_path(out, word, task_id).unlink(missing_ok=True)
+                for name in there.perceptions:
+                    record_path(out, name, task_id).unlink(missing_ok=True)
         digests = {**there.digests, **digests}
     return Header(
         identity=identity,
@@ -186,8 +186,8 @@ def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path) ->
     """Record hashes of weights and versions of libraries before the first view, or check that they are the folder's."""
     for spec in specs:
         found = Backend(perception=spec.component).check_perception([AGENT])
-        there = header.models.setdefault(spec.word, found)
-        check_same_run({spec.word: there}, {spec.word: found}, out)
+        there = header.models.setdefault(spec.name, found)
+        check_same_run({spec.name: there}, {spec.name: found}, out)
     write_header(out, header)
 
 
@@ -200,9 +200,9 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
 
     def work(text: str) -> str:
         given, path, digest, has_picture = json.loads(text)
-        spec = PerceptionSpec(given["word"], Component(**given["component"]))
+        spec = PerceptionSpec(given["name"], Component(**given["component"]))
         case, perception = Backend().tasks.create(Path(path)), spec.component.create()
-        record = measure_task(case, perception, simulator, config, word=spec.word, has_picture=has_picture, alive=alive)
+        record = measure_task(case, perception, simulator, config, name=spec.name, has_picture=has_picture, alive=alive)
         record.digest = digest
         return record.model_dump_json()
 
@@ -215,7 +215,7 @@ def measure_task(
     simulator: Simulator,
     config: TourConfig,
     *,
-    word: str,
+    name: str,
     has_picture: bool = False,
     alive: Callable[[], None] = lambda: None,
 ) -> TaskRecord:
@@ -257,7 +257,7 @@ def measure_task(
         task_id=case.task_id,
         digest="",
         house=case.house,
-        word=word,
+        perception=name,
         image_px=image_px,
         stages=stages,
         num_views=num_views,

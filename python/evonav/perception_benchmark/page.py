@@ -45,7 +45,7 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
         confusions=plot_elements(confusion_plots(found)),
         features=plot_elements(feature_plots(found)),
         tasks=[task for task, _ in found[0].pictures],
-        pictures={(one.word, task): picture for one in found for task, picture in one.pictures},
+        pictures={(one.perception, task): picture for one in found for task, picture in one.pictures},
     )
     return write_atomically(folder / REPORT_NAME, text), found
 
@@ -56,7 +56,8 @@ def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
         "schema_version": 1,
         "perceptions": [_values(one) for one in found],
         "differences": [
-            {"perception": each.word, "less": each.less, **measure_values(each.measures)} for each in differences(found)
+            {"perception": each.perception, "less": each.less, **measure_values(each.measures)}
+            for each in differences(found)
         ],
     }
 
@@ -67,7 +68,7 @@ def _values(one: Scores) -> dict[str, Any]:
         for by, rows in {**one.groups, "depth": one.depth}.items()
     }
     return {
-        "perception": one.word,
+        "perception": one.perception,
         "num_tasks": one.num_tasks,
         "num_houses": one.num_houses,
         "num_views": one.num_views,

@@ -26,13 +26,13 @@ COSINE_NAMES = {
 def perception_plots(found: Sequence[Scores]) -> list[Plot]:
     """Return the plots of all perceptions, in reading order."""
     curves = [
-        Line(one.word, tuple(zip(RECALLS.tolist(), one.precision_curve, strict=True)), has_dots=False)
+        Line(one.perception, tuple(zip(RECALLS.tolist(), one.precision_curve, strict=True)), has_dots=False)
         for one in found
         if one.precision_curve
     ]
     title = "Precision and recall at IoU 0.5"
     plots: list[Plot] = [_square_plot(title, curves, "recall", "precision, mean over categories")]
-    calibrations = [Line.of(one.word, one.calibration, scale=1) for one in found if one.calibration]
+    calibrations = [Line.of(one.perception, one.calibration, scale=1) for one in found if one.calibration]
     calibration = _square_plot("Precision by confidence", calibrations, "confidence", "precision")
     plots.append(replace(calibration, has_diagonal=True))
     for by, name in _GROUPS:
@@ -65,7 +65,7 @@ def feature_plots(found: Sequence[Scores]) -> list[CurvePlot]:
             )
             for name, share in shares.items()
         ]
-        plot = _square_plot(one.word, lines, "cosine of features", "share of pairs")
+        plot = _square_plot(one.perception, lines, "cosine of features", "share of pairs")
         plots.append(replace(plot, x_range=(float(low), 1.0), y_top=top))
     return plots
 
@@ -80,7 +80,7 @@ def _group_plot(found: Sequence[Scores], by: str, name: str, measure: str) -> Gr
     groups = tuple(
         f"{group.name}\nn = {group.measures[measure].n}" if measure == "recall" else group.name for group in first
     )
-    series = tuple(Series.of(one.word, [group.measures[measure] for group in one.groups[by]]) for one in found)
+    series = tuple(Series.of(one.perception, [group.measures[measure] for group in one.groups[by]]) for one in found)
     return GroupPlot(f"{measure.capitalize()} by {name}", groups, series, "% with 95% intervals by house")
 
 
@@ -88,7 +88,7 @@ def _memory_plots(found: Sequence[Scores]) -> list[CurvePlot]:
     plots = []
     for name, title in _MEMORY:
         lines = [
-            Line.of(one.word, [(share, measures[name]) for share, measures in one.memory_curve], scale=1)
+            Line.of(one.perception, [(share, measures[name]) for share, measures in one.memory_curve], scale=1)
             for one in found
             if one.memory_curve
         ]
@@ -115,5 +115,5 @@ def _confusion_plot(one: Scores) -> ConfusionPlot:
         right, missed = mine["recall"].value or 0.0, 1.0 - (mine["located"].value or 0.0)
         others = (shares.get((name, label), 0.0) for label in labels)
         rows.append(ConfusionRow(name, mine["recall"].n, (right, missed, *others)))
-    title = f"{one.word}: labels of objects, % of each category (n)"
+    title = f"{one.perception}: labels of objects, % of each category (n)"
     return ConfusionPlot(title, ("right", "nothing", *labels), tuple(rows))

@@ -8,8 +8,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from evonav.drawing.svg import slug
 from evonav.errors import StoreError
 from evonav.parallel.folders import write_atomically
@@ -141,7 +139,7 @@ class TaskRecord(MeasurementRecord):
     digest: str
     """Digest of `task.json`."""
     house: str
-    word: str
+    perception: str
     """The perception."""
     image_px: int
     """Pixels of an image."""
@@ -164,7 +162,7 @@ class Header(MeasurementRecord):
 
     identity: dict[str, Any]
     """Settings that records of one folder share."""
-    perceptions: list[str] = Field(validation_alias="words", serialization_alias="words")
+    perceptions: list[str]
     """Perceptions, in the order in which they were first requested."""
     options: dict[str, dict[str, Any]]
     """Import path and keywords, by perception."""
@@ -176,18 +174,18 @@ class Header(MeasurementRecord):
     """Digests by task."""
 
 
-def record_path(folder: Path, word: str, task_id: str) -> Path:
+def record_path(folder: Path, perception: str, task_id: str) -> Path:
     """Return the path of the record of a perception on a task."""
-    return folder / RECORD_DIR / slug(word) / f"{task_id}.json.gz"
+    return folder / RECORD_DIR / slug(perception) / f"{task_id}.json.gz"
 
 
-def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
+def write_record(folder: Path, perception: str, task_id: str, text: str) -> None:
     """Write a record.
 
     Raises:
         StoreError: It cannot be written.
     """
-    write_atomically(record_path(folder, word, task_id), gzip.compress(text.encode(), compresslevel=6, mtime=0))
+    write_atomically(record_path(folder, perception, task_id), gzip.compress(text.encode(), compresslevel=6, mtime=0))
 
 
 def read_record(path: Path) -> TaskRecord:
@@ -215,7 +213,7 @@ def write_header(folder: Path, header: Header) -> None:
     Raises:
         StoreError: It cannot be written.
     """
-    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(by_alias=True), indent=2) + "\n")
+    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(), indent=2) + "\n")
 
 
 def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
@@ -228,7 +226,10 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
     if header is None:
         raise StoreError(f"{folder}: holds no {HEADER_NAME}; `evonav perception` makes one")
     tasks = complete_tasks(folder, header)
-    return {word: [read_record(record_path(folder, word, task)) for task in tasks] for word in header.perceptions}
+    return {
+        perception: [read_record(record_path(folder, perception, task)) for task in tasks]
+        for perception in header.perceptions
+    }
 
 
 def complete_tasks(folder: Path, header: Header) -> list[str]:

@@ -46,7 +46,7 @@ class LabelConfusion:
 class Scores:
     """Scores of one perception."""
 
-    word: str
+    perception: str
     num_tasks: int
     num_houses: int
     num_views: int
@@ -79,14 +79,14 @@ def scores(records: Mapping[str, Sequence[TaskRecord]]) -> list[Scores]:
     """
     if not records or not all(records.values()):
         raise StoreError("no task has a record of every perception yet: run the command again")
-    return [_Scorer(word, mine).scores() for word, mine in records.items()]
+    return [_Scorer(perception, mine).scores() for perception, mine in records.items()]
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionDifference:
     """One perception less another, over the same views."""
 
-    word: str
+    perception: str
     less: str
     measures: Mapping[str, Estimate]
 
@@ -95,8 +95,8 @@ def differences(found: Sequence[Scores]) -> list[PerceptionDifference]:
     """Return the differences of every two perceptions, in the metrics that detectors are usually compared by."""
     return [
         PerceptionDifference(
-            b.word,
-            a.word,
+            b.perception,
+            a.perception,
             {
                 name: theirs[name].minus(ours[name])
                 for ours, theirs, names in ((a.overall, b.overall, COMPARED), (a.memory, b.memory, COMPARED_MEMORY))
@@ -112,8 +112,8 @@ def differences(found: Sequence[Scores]) -> list[PerceptionDifference]:
 class _Scorer:
     """One perception's objects and detections as arrays."""
 
-    def __init__(self, word: str, records: Sequence[TaskRecord]) -> None:
-        self.word, self.records = word, records
+    def __init__(self, perception: str, records: Sequence[TaskRecord]) -> None:
+        self.perception, self.records = perception, records
         self.houses = ClusterBootstrap([r.house for r in records], num_resamples=NUM_RESAMPLES)
         truths, found = [r.truths for r in records], [r.detections for r in records]
         self.truth_house = np.repeat(self.houses.cluster_of, [len(t.view) for t in truths])
@@ -160,7 +160,7 @@ class _Scorer:
         depth = other.depth_groups(houses, records)
         cosines, texts = other.cosines(houses, records)
         return Scores(
-            word=self.word,
+            perception=self.perception,
             num_tasks=len(records),
             num_houses=houses.num_clusters,
             num_views=sum(sum(record.num_views) for record in records),

@@ -56,7 +56,7 @@ def _table(
 
 
 def _overall(found: Sequence[Scores]) -> Iterator[tuple[str, Mapping[str, Estimate]]]:
-    return ((one.word, one.overall) for one in found)
+    return ((one.perception, one.overall) for one in found)
 
 
 def _headline(found: Sequence[Scores]) -> Table:
@@ -78,7 +78,7 @@ def _differences(found: Sequence[Scores]) -> Table:
     heads = ("AP50", "AP", "precision", "recall", "F1", "located", "memory precision", "memory recall")
     return _table(
         "Perceptions against each other",
-        ((f"{each.word} minus {each.less}", each.measures) for each in differences(found)),
+        ((f"{each.perception} minus {each.less}", each.measures) for each in differences(found)),
         {head: (name, SIGNED) for head, name in zip(heads, (*COMPARED, *COMPARED_MEMORY), strict=True)},
         f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared.",
         first="perceptions",
@@ -103,7 +103,7 @@ def _parts(found: Sequence[Scores]) -> Table:
 def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
     names = [group.name for group in found[0].groups[by]]
     rows = tuple(
-        (one.word, measure, *(estimate_text(group.measures.get(measure), has_n=True) for group in one.groups[by]))
+        (one.perception, measure, *(estimate_text(group.measures.get(measure), has_n=True) for group in one.groups[by]))
         for one in found
         for measure in ("recall", "precision")
     )
@@ -117,7 +117,7 @@ def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
 def _by_outline(found: Sequence[Scores]) -> Table:
     return _table(
         "Recall by how much is in the way",
-        ((one.word, {group.name: group.measures["recall"] for group in one.groups["outline"]}) for one in found),
+        ((one.perception, {group.name: group.measures["recall"] for group in one.groups["outline"]}) for one in found),
         {group.name: (group.name, WITH_N) for group in found[0].groups["outline"]},
         "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border.",
     )
@@ -130,7 +130,7 @@ def _categories(found: Sequence[Scores], most: int | None) -> Table:
     rows = tuple(
         (
             name if i == 0 else "",
-            one.word,
+            one.perception,
             str(mine[name]["recall"].n),
             str(mine[name]["precision"].n),
             *(estimate_text(mine[name][measure]) for measure in measures),
@@ -147,10 +147,10 @@ def _confusions(found: Sequence[Scores], most: int) -> Table:
     rows: list[tuple[str, ...]] = []
     for one in found:
         rows += [
-            (one.word, each.category, each.label, str(each.num), estimate_text(each.share, has_n=True))
+            (one.perception, each.category, each.label, str(each.num), estimate_text(each.share, has_n=True))
             for each in one.confusions[:most]
         ]
-        rows += [(one.word, "(nothing)", label, str(num), NONE) for label, num in one.unexplained[: most // 2]]
+        rows += [(one.perception, "(nothing)", label, str(num), NONE) for label, num in one.unexplained[: most // 2]]
     note = f"The most frequent. {INTERVALS}"
     columns = ("perception", "object", "told as", "times", "of the objects %")
     return Table("What is taken for what", columns, tuple(rows), (note,))
@@ -159,7 +159,7 @@ def _confusions(found: Sequence[Scores], most: int) -> Table:
 def _memory(found: Sequence[Scores]) -> Table:
     return _table(
         "The memory of objects that comes of it",
-        ((one.word, one.memory) for one in found),
+        ((one.perception, one.memory) for one in found),
         {
             "entries": ("entries", {"scale": 1}),
             "objects seen": ("seen", {"scale": 1}),
@@ -180,7 +180,7 @@ def _memory(found: Sequence[Scores]) -> Table:
 def _staleness(found: Sequence[Scores]) -> Table:
     return _table(
         "Stale entries in the next house",
-        ((one.word, one.memory) for one in found if one.memory["stale_at_start"].n),
+        ((one.perception, one.memory) for one in found if one.memory["stale_at_start"].n),
         {"as it begins": ("stale_at_start", WITH_N), "after its tour": ("stale_after_tour", WITH_N)},
         "Entries that were right in the house before and are not in this one; in % of all entries (n).",
     )
@@ -211,7 +211,7 @@ def _features(found: Sequence[Scores]) -> Table:
             "same object": ("cosine_same_object", THREE_DIGITS),
             "same category": ("cosine_same_category", THREE_DIGITS),
             "other": ("cosine_other", THREE_DIGITS),
-            "its word": ("cosine_text_own", THREE_DIGITS),
+            "its perception": ("cosine_text_own", THREE_DIGITS),
             "other words": ("cosine_text_other", THREE_DIGITS),
             "nearest word right %": ("text_right", WITH_N),
         },
@@ -223,22 +223,22 @@ def perception_csv(found: Sequence[Scores]) -> str:
     columns = ("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses")
     rows: list[tuple[object, ...]] = []
 
-    def write(word: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
+    def write(perception: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
         for name, each in measures.items():
             ends = each.ci95 or (None, None)
-            rows.append((word, by, group, name, each.value, *ends, each.n, found[0].num_houses))
+            rows.append((perception, by, group, name, each.value, *ends, each.n, found[0].num_houses))
 
     for each in differences(found):
-        write(each.word, "less", each.less, each.measures)
+        write(each.perception, "less", each.less, each.measures)
     for one in found:
-        write(one.word, "", "", one.overall)
-        write(one.word, "memory", "", one.memory)
+        write(one.perception, "", "", one.overall)
+        write(one.perception, "memory", "", one.memory)
         for share, measures in one.memory_curve:
-            write(one.word, "memory by share of the tour", f"{share:g}", measures)
+            write(one.perception, "memory by share of the tour", f"{share:g}", measures)
         groups: dict[str, Sequence[ScoreGroup]] = {**one.groups, "depth": one.depth}
         for by, parts in groups.items():
             for group in parts:
-                write(one.word, by, group.name, group.measures)
+                write(one.perception, by, group.name, group.measures)
         for pair in one.confusions:
-            write(one.word, "confusion", f"{pair.category} as {pair.label}", {"share": pair.share})
+            write(one.perception, "confusion", f"{pair.category} as {pair.label}", {"share": pair.share})
     return csv_text(columns, rows)

@@ -25,7 +25,7 @@ M = TypeVar("M", bound=BaseModel)
 class MeasurementRecord(BaseModel):
     """A part of a file, without unknown keys; infinity and NaN are strings."""
 
-    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings", populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
 
 
 def finished(

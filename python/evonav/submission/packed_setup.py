@@ -7,7 +7,7 @@ from typing import Any
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.components import USUAL_CAMERA, Backend
 from evonav.evaluation.run.settings import RULES
-from evonav.perception.shorthand import word_of
+from evonav.perception.shorthand import short_name_of
 from evonav.submission.file import Submission
 
 _SIMULATOR = f"{Backend.__module__}:embedded_simulator"
@@ -59,7 +59,7 @@ def packed_setup(header: Submission) -> PackedSetup:
     simulator = str(parts.get("simulator", ""))
     camera = [f"{key}={value}" for key, value in camera_of(parts).items()]
     return PackedSetup(
-        perception=word_of(str(parts.get("perception", "")), perception),
+        perception=short_name_of(str(parts.get("perception", "")), perception),
         decision=",".join([kind, *rates]),
         model=str(decision.get("model", decision.get("path", ""))),
         simulator=",".join([simulator, *camera] if camera or simulator != _SIMULATOR else []),

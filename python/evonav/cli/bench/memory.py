@@ -252,7 +252,7 @@ def chosen_streams(
 ) -> "list[StreamSpec]":
     """Return the streams that the options choose."""
     from evonav.memory_benchmark.streams.spec import KINDS, reference_specs
-    from evonav.perception.shorthand import read_word
+    from evonav.perception.shorthand import parse_perception
 
     names = [name.upper() for name in listed(kinds)]
     if unknown := [name for name in names if name not in KINDS]:
@@ -266,7 +266,7 @@ def chosen_streams(
         first = [spec for spec in specs if spec.seed == 0]
         specs = [replace(spec, seed=seed) for spec in first for seed in wanted]
     if perception is not None:
-        read_word(perception)
+        parse_perception(perception)
         specs = [spec if spec.kind == "S8" else replace(spec, perception=perception) for spec in specs]
     return specs
 

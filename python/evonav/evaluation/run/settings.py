@@ -18,7 +18,7 @@ from evonav.errors import StoreError
 from evonav.evaluation.run.components import USUAL_CAMERA
 from evonav.evaluation.run.run_settings import RunSettings, SettingError, Settings, SpendingSettings
 from evonav.perception import Perception
-from evonav.perception.shorthand import PREDICTED, read_word
+from evonav.perception.shorthand import PREDICTED, parse_perception
 from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
@@ -116,7 +116,9 @@ class PerceptionSettings(Settings):
             InvalidArgumentError: There is no such perception, or a keyword is invalid.
         """
         host_options = _given(models=self.models and str(Path(self.models).absolute()), device=self.device)
-        found = read_word(self.make, {**self.options, **(host_options if self.make.startswith("predicted") else {})})
+        found = parse_perception(
+            self.make, {**self.options, **(host_options if self.make.startswith("predicted") else {})}
+        )
         if host_options and found.path != PREDICTED:
             raise SettingError(type(self), next(iter(host_options)), "is for perception predicted")
         return found

@@ -18,7 +18,7 @@ from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise, summary_json
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import write_atomically
-from evonav.perception.shorthand import word_of
+from evonav.perception.shorthand import short_name_of
 
 SUMMARY_NAME = "summary.json"
 MODELS_KEY = "perception_models"
@@ -62,7 +62,7 @@ def save_summary(run_dir: Path, summaries: Sequence[AgentSummary], pairs: Sequen
         models = store.meta(MODELS_KEY)
     content = summary_json(summaries, pairs)
     if make := backend.get("perception"):
-        content["perception"] = word_of(make, backend.get("perception_options", {}))
+        content["perception"] = short_name_of(make, backend.get("perception_options", {}))
     if models:
         content[MODELS_KEY] = models
     text = json.dumps(content, indent=2, sort_keys=True) + "\n"

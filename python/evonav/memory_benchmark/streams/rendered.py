@@ -20,7 +20,7 @@ from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import RATE_HZ, StreamSpec
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.perception import Perception, StageScene
-from evonav.perception.shorthand import read_word
+from evonav.perception.shorthand import parse_perception
 from evonav.sensors.observation import View, VisibleOccupancy
 from evonav.tasks.language import PROCTHOR_TYPES, STRUCTURE_TYPES
 from evonav.tasks.public import Goal
@@ -126,7 +126,7 @@ class RenderedStream:
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
         """Render the stream, one frame at a time."""
-        perception: Perception = read_word(self.spec.perception).create()
+        perception: Perception = parse_perception(self.spec.perception).create()
         current = -1
         for index, (frame, bodies) in enumerate(self._rendered(rgb=self.rgb or perception.needs_rgb)):
             number = int(self.plan.frame_scenes[index])

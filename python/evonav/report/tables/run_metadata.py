@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import Any
 
 from evonav.evaluation.records.schema import EndState
-from evonav.perception.shorthand import word_of
+from evonav.perception.shorthand import short_name_of
 from evonav.report.run import RecordedRun
 
 MAX_LISTED = 12
@@ -64,7 +64,7 @@ def perception_of(run: RecordedRun) -> str:
     backend = run.config.get("backend")
     parts = backend if isinstance(backend, dict) else {}
     make, options = parts.get("perception"), parts.get("perception_options", {})
-    return word_of(make, options) if isinstance(make, str) and isinstance(options, dict) else ""
+    return short_name_of(make, options) if isinstance(make, str) and isinstance(options, dict) else ""
 
 
 def run_facts(run: RecordedRun) -> list[tuple[str, str]]:
