@@ -10,7 +10,7 @@ README = Path(__file__).with_name("README.md")
 _INTRODUCTION = """# Benchmarks
 Written by `python -m benches` (`make bench`); `python -m benches NAME` runs and rewrites one section. Figures are CPU
 time on one core; evonav and its peer take turns on the same input. *Ratio*: median of peer / evonav by pairs; above 1
-evonav is faster. `evonav bench NAME --against FILE` compares with an earlier run. Machine: below each table.
+evonav is faster. `evonav bench speed NAME --against FILE` compares with an earlier run. Machine: below each table.
 """
 
 
