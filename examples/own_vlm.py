@@ -14,7 +14,7 @@ from evonav.decision.prompts import Picture, Prompt
 class OwnVlm:
     """Goes where it is bright; believes that an object is still there."""
 
-    needs_images = True
+    needs = frozenset({"images"})
 
     def ask(self, prompt: Prompt) -> str:
         """The first line is the answer, the second a reason."""

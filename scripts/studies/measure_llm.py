@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from evonav.component import Component
 from evonav.decision.backends import text_match, vlm
-from evonav.decision.question import AnswerError, ClosedQuestion, Question, Reply
+from evonav.decision.question import AnswerError, ClosedQuestion, DecisionModel, Question, Reply
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
@@ -31,10 +31,10 @@ AGENTS = "fu,ftu,3d-mem,msgnav,unigoal-paper"
 A = TypeVar("A")
 
 
-class Compared:
+class Compared(DecisionModel):
     """The text matcher, which also shows some questions to a model and notes both answers in a file."""
 
-    needs_images = False
+    needs = frozenset()
 
     def __init__(self, seed: int, log: str, model: str, base_url: str, stride: int, limit: int) -> None:
         """Create the pair; every `stride`-th question of a kind is asked until `limit` were."""

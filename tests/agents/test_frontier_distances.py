@@ -16,7 +16,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 def questions(*, needs_colours: bool) -> list[Any]:
     """Return an agent's questions while it goes to the frontier that is named last."""
     model = Scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
-    model.needs_colours = needs_colours  # type: ignore[attr-defined]
+    model.needs = frozenset({"colours"}) if needs_colours else frozenset()
     agent = agent_factory("fu")(decision=model)
     run(agent, stage_case(1, "Mug|1"), start=START, protocol=ProtocolConfig(max_rounds=12), size_px=120)
     return model.questions

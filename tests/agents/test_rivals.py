@@ -6,8 +6,7 @@ from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.registry import agent_factory, new_agent
-from evonav.decision.appearance.model import AppearanceMatch
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import AppearanceMatch, TextMatch
 from evonav.toml import tomllib
 
 RIVALS = ("evolving", "dynamem", "dualmap", "khronos-fu", "vlfm", "onemap")

@@ -243,7 +243,7 @@ def test_memory_lasts_over_stages(table_moved):
 def all_shown():
     """Frontiers alone are chosen, all classes are kept, and images are asked for; the chair moves after a stage."""
     model = scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
-    model.needs_images = True
+    model.needs = frozenset({"images"})
     navigator = NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)  # does not run out of frontiers
     agent = Watched(ThreeDMemConfig(navigator=navigator, max_classes=100), model)
     stages = (stage_case(1, "Chair|1"), stage_case(2, "Chair|1", moves=CHAIR_AWAY, mode="SALIENT_OBJECT"))

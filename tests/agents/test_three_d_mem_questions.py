@@ -10,7 +10,7 @@ from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandi
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.question import AnswerError
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import TextMatch
 from evonav.tasks.public import Goal
 
 CLASSES = tuple(sorted(("Apple", "Bed", "Chair", "CounterTop", "DiningTable", "Fridge", "Mug", "Sink")))

@@ -15,7 +15,7 @@ from evonav.agents.unigoal.bev import BevMap
 from evonav.agents.unigoal.graphs import GraphConfig
 from evonav.agents.unigoal.questions import CategoryQuestion
 from evonav.agents.unigoal.scene_questions import GroupScoreQuestion, RelationLinesQuestion
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import TextMatch
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory.occupancy import BLOCKED, FREE

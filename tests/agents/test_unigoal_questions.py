@@ -20,7 +20,7 @@ from evonav.agents.unigoal.scene_questions import (
     RoomQuestion,
 )
 from evonav.decision.question import AnswerError
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import TextMatch
 from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 

@@ -8,10 +8,10 @@ import pytest
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.decision.appearance.matcher import AppearanceMatcher
-from evonav.decision.appearance.model import AppearanceMatch
 from evonav.decision.backends import appearance_match
 from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate
 from evonav.decision.metered import Metered
+from evonav.decision.rules import AppearanceMatch
 from evonav.decision.text.language import parse_goal
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.settings import DecisionSettings
@@ -154,7 +154,7 @@ def test_numbers_out_of_range_are_refused(options: dict[str, float]) -> None:
 
 def test_agents_of_a_model_that_looks_see_colours_also_behind_wrappers() -> None:
     model = Metered(appearance_match(0, noise={"wrong": 0.1}))
-    assert not model.needs_images
+    assert model.needs == {"colours"}
     assert FrontierUpdate(decision=model).sensors.needs_rgb
 
 

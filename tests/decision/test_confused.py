@@ -14,12 +14,12 @@ from evonav.agents.msgnav.candidates import GraphChoice, GraphObject, PastChoice
 from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.three_d_mem.questions import SnapshotCandidate, SnapshotChoice, SnapshotQuestion
 from evonav.component import Component
-from evonav.decision.appearance.model import AppearanceMatch
 from evonav.decision.backends import appearance_match, text_match
 from evonav.decision.candidates import Appearance, Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.noisy import NoiseRates, Noisy
 from evonav.decision.query import QuerySession
-from evonav.decision.text.matcher import Matcher, TextMatch
+from evonav.decision.rules import AppearanceMatch, TextMatch
+from evonav.decision.text.matcher import Matcher
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -169,10 +169,12 @@ def test_a_pack_says_how_often_its_model_was_confused() -> None:
     assert packed_setup(Submission.model_construct(config={"backend": parts})).decision == "text,confused=0.2"
 
 
-class Silent:
+class Silent(TextMatch):
     """Has no rules."""
 
-    needs_images = False
+    def __init__(self) -> None:
+        super().__init__()
+        self.matcher = None  # type: ignore[assignment]
 
 
 def run(folder: Path, num_workers: int, noise: dict[str, float]) -> list[StageRecord]:

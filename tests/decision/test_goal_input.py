@@ -13,14 +13,14 @@ from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.unigoal.agent import UniGoal
 from evonav.component import Component
 from evonav.decision.appearance.matcher import AppearanceMatcher
-from evonav.decision.appearance.model import AppearanceMatch
 from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
-from evonav.decision.backends import appearance_match, counting, own, vlm
+from evonav.decision.backends import appearance_match, counting, custom, vlm
 from evonav.decision.candidates import Appearance, ObjectCandidate
-from evonav.decision.goal_input import GoalInput, PictureGoal, goal_as_given, goal_input_of
+from evonav.decision.goal_input import GoalInput, PictureGoal, goal_as_given
 from evonav.decision.metered import Metered
 from evonav.decision.prompts import Picture, goal_prompt
 from evonav.decision.question import Question, Reply
+from evonav.decision.rules import AppearanceMatch, TextMatch
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -151,7 +151,7 @@ def record_texts(folder: Path, decision: Component[Any], num_workers: int) -> li
 def test_whole_stages_go_by_the_picture_alone_for_any_number_of_workers(tmp_path: Path) -> None:
     Recorder.asked.clear()
     path = f"{__name__}:Recorder"
-    here = record_texts(tmp_path / "here", Component("evonav.decision.backends:own", {"path": path}), 0)
+    here = record_texts(tmp_path / "here", Component("evonav.decision.backends:custom", {"path": path}), 0)
     assert Recorder.asked
     assert all(isinstance(question.goal, PictureGoal) for question in Recorder.asked)
     assert not any(" on " in question.goal.unified_instruction for question in Recorder.asked)
@@ -201,8 +201,8 @@ def test_models_that_see_nothing_refuse_pictures(tmp_path: Path) -> None:
     with pytest.raises(InvalidArgumentError, match="expected one of text, image, both"):
         appearance_match(0, goal_input="picture")  # type: ignore[arg-type]
     with pytest.raises(InvalidArgumentError, match="says itself what it goes by"):
-        own(0, path=f"{__name__}:Recorder", goal_input="image")
-    assert goal_input_of(vlm(0, model="any", goal_input="image")) == "image"
+        custom(0, path=f"{__name__}:Recorder", goal_input="image")
+    assert vlm(0, model="any", goal_input="image").goal_input == "image"
     ledger = str(tmp_path / "spending.sqlite")
-    assert goal_input_of(counting(0, model="any", ledger=ledger, goal_input="both")) == "both"
-    assert goal_input_of(object()) == "text"
+    assert counting(0, model="any", ledger=ledger, goal_input="both").goal_input == "both"
+    assert TextMatch().goal_input == "text"

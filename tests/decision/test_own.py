@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from test_noisy import Letter
 
-from evonav.decision.backends import own
+from evonav.decision.backends import custom
 from evonav.decision.custom_model import CustomClient
+from evonav.decision.options import PromptOptions
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.question import AnswerError, Question, Reply
+from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.response_cache import ResponseCache
@@ -23,7 +24,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 class Asking:
     """Counts how often it is asked."""
 
-    needs_images = False
+    needs = frozenset()
 
     def __init__(self, seed: int = -1) -> None:
         self.seed = seed
@@ -34,10 +35,10 @@ class Asking:
         return "abc"[len(self.prompts) - 1]
 
 
-class Answering:
+class Answering(DecisionModel):
     """A whole decision model."""
 
-    needs_images = False
+    needs = frozenset()
 
     def answer(self, question: Question[str], attempt: int = 0) -> Reply[str]:
         return Reply(question.parse("b"), "b")
@@ -62,10 +63,10 @@ class Failing:
 def test_asked_once_and_kept_by_attempt(tmp_path: Path) -> None:
     store = ResponseCache(tmp_path / "e.sqlite")
     asking = Asking()
-    model = VlmDecision(CustomClient("mine", asking, store=store), structured="off")
+    model = VlmDecision(CustomClient("mine", asking, store=store), PromptOptions(structured="off"))
     assert [model.answer(Letter(), attempt).answer for attempt in (0, 0, 1, 0)] == ["a", "a", "b", "a"]
     assert len(asking.prompts) == 2
-    replay = VlmDecision(CustomClient("mine", asking, store=store, mode="replay"), structured="off")
+    replay = VlmDecision(CustomClient("mine", asking, store=store, mode="replay"), PromptOptions(structured="off"))
     assert replay.answer(Letter(), 1).answer == "b"
     for client in (replay.client, CustomClient("other", asking, store=store, mode="replay")):
         with pytest.raises(VlmError, match="not_recorded"):
@@ -75,37 +76,37 @@ def test_asked_once_and_kept_by_attempt(tmp_path: Path) -> None:
 def test_lost_answers_are_lost_and_kept_and_bugs_are_told(tmp_path: Path) -> None:
     store = ResponseCache(tmp_path / "e.sqlite")
     failing = Failing(TimeoutError("too slow"))
-    model = VlmDecision(CustomClient("mine", failing, store=store), structured="off")
+    model = VlmDecision(CustomClient("mine", failing, store=store), PromptOptions(structured="off"))
     for _ in range(2):
         with pytest.raises(AnswerError, match="too slow") as caught:
             model.answer(Letter())
         assert caught.value.fault == "lost"
     assert failing.num == 1
-    broken = VlmDecision(CustomClient("mine", Failing(KeyError("x")), store=store), structured="off")
+    broken = VlmDecision(CustomClient("mine", Failing(KeyError("x")), store=store), PromptOptions(structured="off"))
     with pytest.raises(DecisionError, match="mine: KeyError"):
         broken.answer(Letter(), 1)
     assert len(store) == 0
 
 
 def test_objects_are_made_by_import_path() -> None:
-    asking = own(7, path="test_own:Asking")
-    assert asking.needs_images is False
+    asking = custom(7, path="test_own:Asking")
+    assert asking.needs == frozenset()
     assert asking.answer(Letter()).answer == "a"
-    assert own(7, path="test_own:Answering").answer(Letter()).answer == "b"
+    assert custom(7, path="test_own:Answering").answer(Letter()).answer == "b"
     for path, words in (
-        ("test_own:Neither", "neither `ask` nor `answer`"),
+        ("test_own:Neither", "no evonav.decision.DecisionModel and has no `ask`"),
         ("test_own:Nobody", "Nobody"),
         ("no_such_module:X", "no_such_module"),
     ):
         with pytest.raises(InvalidArgumentError, match=words):
-            own(0, path=path)
+            custom(0, path=path)
 
 
 class Heavy:
     """Takes long to load."""
 
     num_made = 0
-    needs_images = False
+    needs = frozenset()
 
     def __init__(self) -> None:
         Heavy.num_made += 1
@@ -116,12 +117,12 @@ class Heavy:
 
 def test_models_are_loaded_once_and_only_to_be_asked(tmp_path: Path) -> None:
     path = str(tmp_path / "e.sqlite")
-    models = [own(seed, path="test_own:Heavy", cache=path) for seed in range(2)]
-    assert models[0].needs_images is False
+    models = [custom(seed, path="test_own:Heavy", cache=path) for seed in range(2)]
+    assert models[0].needs == frozenset()
     assert Heavy.num_made == 0
     assert [model.answer(Letter(), attempt).answer for attempt, model in enumerate(models)] == ["a", "a"]
     assert Heavy.num_made == 1
-    replay = own(5, path="test_own:Heavy", cache=path, mode="replay")
+    replay = custom(5, path="test_own:Heavy", cache=path, mode="replay")
     assert replay.answer(Letter(), 1).answer == "a"
     assert Heavy.num_made == 1
 

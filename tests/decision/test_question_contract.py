@@ -13,8 +13,8 @@ import pytest
 from evonav.component import Component
 from evonav.decision.noisy import GARBAGE
 from evonav.decision.prompts import Picture, Text
-from evonav.decision.question import AnswerError, Question, Reply
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
+from evonav.decision.rules import TextMatch
 from evonav.decision.vlm.decision import read_json, with_schema
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
@@ -31,10 +31,10 @@ WITH_CASE = ("decompose", "goal-relations", "scene-relations")
 ASKED: dict[str, list[tuple[Question[Any], Reply[Any]]]] = defaultdict(list)
 
 
-class Collecting:
+class Collecting(DecisionModel):
     """The text matcher, with images, keeping some questions of each kind."""
 
-    needs_images = True
+    needs = frozenset({"images"})
 
     def __init__(self, seed: int) -> None:
         self.model = TextMatch()

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from evonav.agents.frontier_update.questions import ChooseQuestion, Sighting, VerifyQuestion
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.question import AnswerError, Question
-from evonav.decision.text.matcher import Matcher, TextMatch
+from evonav.decision.rules import TextMatch
+from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import rank_by_feature, rank_entries
 from evonav.errors import DecisionError
 from evonav.memory.presence import DepthEvidence

@@ -6,7 +6,8 @@ from evonav.agents.agent import SensorConfig
 from evonav.agents.hosting import wire
 from evonav.component import Component
 from evonav.decision.metered import Metered
-from evonav.decision.question import Reply
+from evonav.decision.noisy import NoiseRates, Noisy
+from evonav.decision.question import DecisionModel, Reply
 from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.ledger import Usage
 from evonav.errors import InvalidArgumentError
@@ -21,34 +22,24 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
 
-class Client:
-    def __init__(self, account):
-        self.account = account
-
-
-class Model:
-    needs_images = True
+class Model(DecisionModel):
+    needs = frozenset({"images"})
 
     def __init__(self, account=None):
-        if account is not None:
-            self.client = Client(account)
+        self.account = account
 
     def answer(self, question, attempt=0):
         if question is None:
             raise ValueError("no question")
         return Reply(question, "so")
 
-
-class Wrapped(Model):
-    """As `Noisy` wraps a model."""
-
-    def __init__(self, model):
-        self.model = model
+    def costs(self):
+        return {} if self.account is None else self.account.costs()
 
 
 def test_a_metered_model_answers_the_same_and_counts_its_questions():
     metered = Metered(Model())
-    assert metered.needs_images
+    assert metered.needs == {"images"}
     assert metered.answer("q").text == "so"
     with pytest.raises(ValueError, match="no question"):
         metered.answer(None)
@@ -61,7 +52,7 @@ def test_tokens_and_money_are_the_accounts_even_of_a_wrapped_model():
     account = Account(Price(2.0, 10.0), model="m")
     account.settle(account.reserve(Usage(1, 1)), Usage(1_000_000, 500_000))
     account.replayed()
-    costs = Metered(Wrapped(Model(account))).costs()
+    costs = Metered(Noisy(Model(account), NoiseRates(), 0)).costs()
     assert (costs["input_tokens"], costs["output_tokens"], costs["num_replayed"]) == (1_000_000, 500_000, 1)
     assert costs["cost_usd"] == pytest.approx(7.0)
 

@@ -126,8 +126,8 @@ def test_failures_are_contained_as_without_a_sandbox(tmp_path):
     ("change", "num_workers", "reason"),
     [
         ({}, 0, "use one worker or more"),
-        ({"decision": Component("evonav.decision.backends:own", {}, {"cache": "x"})}, 1, "needs files or a network"),
-        ({"decision": Component("evonav.decision.backends:own", {"path": "x.py"})}, 1, "needs files or a network"),
+        ({"decision": Component("evonav.decision.backends:custom", {}, {"cache": "x"})}, 1, "needs files or a network"),
+        ({"decision": Component("evonav.decision.backends:custom", {"path": "x.py"})}, 1, "needs files or a network"),
     ],
 )
 def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, change, num_workers, reason):

@@ -69,7 +69,7 @@ def test_a_sandbox_is_the_default_for_local_workers(has_sandbox, settings, expec
 
 
 def test_a_model_that_needs_files_has_no_sandbox(has_sandbox):
-    own = replace(TOY, decision=Component("evonav.decision.backends:own", {"path": "x.py"}))
+    own = replace(TOY, decision=Component("evonav.decision.backends:custom", {"path": "x.py"}))
     assert config_of(own, workers=1).hosting.isolation == "process"
 
 

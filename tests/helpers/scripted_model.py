@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from evonav.decision.question import Question, Reply
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.question import DecisionModel, Question, Reply
+from evonav.decision.rules import TextMatch
 
 A = TypeVar("A")
 
 
-class Scripted:
+class Scripted(DecisionModel):
     """Parses a script's texts by the grammar of the question, as a model's answers are."""
 
     def __init__(self, script: Callable[[Question[Any]], str], *, needs_images: bool = False) -> None:
@@ -20,7 +20,7 @@ class Scripted:
             needs_images: Whether questions shall hold images.
         """
         self._script = script
-        self.needs_images = needs_images
+        self.needs = frozenset({"images"}) if needs_images else frozenset()
         self.questions: list[Question[Any]] = []
         """All questions so far."""
 

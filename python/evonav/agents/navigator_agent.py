@@ -18,11 +18,11 @@ from evonav.agents.agent import (
 from evonav.agents.explanation import entry_belief, frontier_beliefs
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import FrontierCandidate, Point2
-from evonav.decision.goal_input import goal_as_given, goal_input_of
+from evonav.decision.goal_input import goal_as_given
 from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import TextMatch
 from evonav.memory import Frontier
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -50,10 +50,10 @@ class NavigatorAgent(ABC):
             sensors: The sensors that the agent needs, apart from colours.
         """
         model: DecisionModel = decision or TextMatch()
-        self._shows_images = model.needs_images
-        self._names_colours = not self._shows_images and bool(getattr(model, "needs_colours", False))
+        self._shows_images = "images" in model.needs
+        self._names_colours = not self._shows_images and "colours" in model.needs
         self.sensors = replace(sensors or SensorConfig(), needs_rgb=self._shows_images or self._names_colours)
-        self._goal_input = goal_input_of(model)
+        self._goal_input = model.goal_input
         self._navigator_config = config
         self._queries = QuerySession(model, num_tries=num_tries)
         self._counters: Counter[str] = Counter()

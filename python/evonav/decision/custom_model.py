@@ -1,4 +1,7 @@
-"""Models of your own: any object with `ask(prompt) -> str`, with a cache as for a model behind an endpoint."""
+"""Models of your own: a `DecisionModel`, or any object with `ask(prompt) -> str`.
+
+One with `ask` has a cache as a model behind an endpoint has.
+"""
 
 import inspect
 from collections.abc import Callable
@@ -6,7 +9,7 @@ from typing import Any, Protocol, cast
 
 from evonav.component import import_callable
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.question import DecisionModel
+from evonav.decision.question import DecisionModel, Need
 from evonav.decision.vlm.account import Account
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.caching_client import CachingClient, Mode
@@ -16,8 +19,8 @@ from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 
 
-class CustomModel(Protocol):
-    """The least that a model of your own must have. With `needs_images = False` it gets no images."""
+class AskedModel(Protocol):
+    """The least that a model of your own must have. With `needs = frozenset()` it gets no images."""
 
     def ask(self, prompt: Prompt) -> str:
         """Answer a prompt in its grammar.
@@ -34,7 +37,7 @@ class CustomClient(CachingClient):
     def __init__(
         self,
         name: str,
-        model: CustomModel,
+        model: AskedModel,
         *,
         store: ResponseCache | None = None,
         mode: Mode | None = None,
@@ -65,7 +68,7 @@ class CustomClient(CachingClient):
             }
             for turn in prompt.turns
         ]
-        return {"own_model": self.name, "turns": turns, "attempt": attempt}
+        return {"custom_model": self.name, "turns": turns, "attempt": attempt}
 
     def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
         reserved_usd = self.account.reserve(Usage())
@@ -94,11 +97,17 @@ class CustomClient(CachingClient):
         return Answer(text, self.name, Usage(), key, is_replayed)
 
 
+def needs_of(model: object) -> frozenset[Need]:
+    """Return what a model with `ask` needs in its prompts: images, unless its attribute `needs` lacks them."""
+    needs: frozenset[Need] = getattr(model, "needs", frozenset({"images"}))
+    return needs
+
+
 class _MadeWhenAsked:
     """An instance of a class with `ask`, made at the first question: a replay loads no weights."""
 
     def __init__(self, path: str, factory: Callable[..., Any], seed: int) -> None:
-        self.needs_images = bool(getattr(factory, "needs_images", True))
+        self.needs = needs_of(factory)
         self._origin = (path, factory, seed)
         self._model: Any = None
 
@@ -109,7 +118,7 @@ class _MadeWhenAsked:
         return answer
 
 
-def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
+def load_custom_model(path: str, seed: int) -> AskedModel | DecisionModel:
     """Load the model at `module:name`: a class's instance, or what a function returns.
 
     Made once a process and used for all its episodes, unless it has a parameter `seed`: then once an episode.
@@ -118,16 +127,19 @@ def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
         seed: Seed of the agent, for a factory with a parameter `seed`.
 
     Raises:
-        InvalidArgumentError: It cannot be imported or made, or has neither `answer` nor `ask`.
+        InvalidArgumentError: It cannot be imported or made, or is neither a `DecisionModel` nor has `ask`.
     """
     factory = import_callable(path, "decision model")
-    is_class = inspect.isclass(factory)
-    if is_class and hasattr(factory, "ask") and not hasattr(factory, "answer"):
+    if inspect.isclass(factory) and hasattr(factory, "ask") and not issubclass(factory, DecisionModel):
         return _MadeWhenAsked(path, factory, seed)
     model = _made(path, factory, seed)
-    if callable(getattr(model, "answer", None)) or callable(getattr(model, "ask", None)):
-        return cast("CustomModel | DecisionModel", model)
-    raise InvalidArgumentError(f"decision `{path}`: a {type(model).__name__} has neither `ask` nor `answer`")
+    if isinstance(model, DecisionModel):
+        return model
+    if callable(getattr(model, "ask", None)):
+        return cast("AskedModel", model)
+    raise InvalidArgumentError(
+        f"decision `{path}`: a {type(model).__name__} is no evonav.decision.DecisionModel and has no `ask`"
+    )
 
 
 _MADE: dict[str, Any] = {}

@@ -1,11 +1,11 @@
 """Give agents that ask a decision model the goal as a sentence, as the reference image, or as both.
 
-The paper's input is the sentence (Sec. C.1), and every agent's `Goal` also holds the image. A decision model says by an
-attribute `goal_input` what the agents that ask it go by; without one it is the sentence.
+The paper's input is the sentence (Sec. C.1), and every agent's `Goal` also holds the image. A decision model's
+`goal_input` says which of them its agents go by.
 """
 
 from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from evonav.errors import InvalidArgumentError
 from evonav.tasks.language import noun_of
@@ -18,12 +18,6 @@ GOAL_INPUTS: tuple[GoalInput, ...] = get_args(GoalInput)
 @dataclass(frozen=True, slots=True)
 class PictureGoal(Goal):
     """A goal whose reference image counts: prompts show it, and rules that look compare views with it."""
-
-
-def goal_input_of(model: Any) -> GoalInput:  # noqa: ANN401 - any decision model
-    """Return what a decision model's agents go by."""
-    goal_input: GoalInput = getattr(model, "goal_input", "text")
-    return goal_input
 
 
 def goal_as_given(goal: Goal, goal_input: GoalInput) -> Goal:

@@ -1,11 +1,9 @@
 """Measure what a decision model costs: time, questions, tokens and money."""
 
 import time
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from evonav.decision.question import DecisionModel, Question, Reply
-from evonav.decision.vlm.account import Account
-from evonav.decision.wrapper import ModelWrapper
+from evonav.decision.question import DecisionModel, ModelWrapper, Question, Reply
 
 A = TypeVar("A")
 
@@ -31,31 +29,10 @@ class Metered(ModelWrapper):
             self._cpu_s += time.process_time() - cpu_s
 
     def costs(self) -> dict[str, float]:
-        """Return the costs so far; tokens and money only if the model has an account."""
-        costs: dict[str, float] = {
+        """Return the costs so far, with those that the model knows."""
+        return {
             "decision_wall_s": self._wall_s,
             "decision_cpu_s": self._cpu_s,
             "num_questions": self._num_questions,
+            **self.model.costs(),
         }
-        account = _account_of(self.model)
-        return costs if account is None else {**costs, **account_costs(account)}
-
-
-def account_costs(account: Account) -> dict[str, float]:
-    """Return the tokens of an account, and money if it knows prices."""
-    costs: dict[str, float] = {
-        "num_replayed": account.num_replayed,
-        "input_tokens": account.usage.input_tokens,
-        "output_tokens": account.usage.output_tokens,
-    }
-    return costs if account.cost_usd is None else {**costs, "cost_usd": account.cost_usd}
-
-
-def _account_of(model: Any) -> Account | None:  # noqa: ANN401 - any wrapper
-    """Return the account of a model, or of the model that it wraps."""
-    while model is not None:
-        account = getattr(getattr(model, "client", None), "account", None)
-        if isinstance(account, Account):
-            return account
-        model = getattr(model, "model", None)
-    return None

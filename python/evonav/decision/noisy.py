@@ -15,9 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
-from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
-from evonav.decision.text.matcher import Matcher
-from evonav.decision.wrapper import ModelWrapper
+from evonav.decision.question import AnswerError, DecisionModel, ModelWrapper, Question, Reply
 from evonav.errors import InvalidArgumentError
 
 A = TypeVar("A")
@@ -100,25 +98,17 @@ class Noisy(ModelWrapper):
         Raises:
             InvalidArgumentError: Answers are to be confused, but the model has no rules whose scores tell how likely.
         """
-        matcher: Matcher | None = getattr(model, "matcher", None)
-        if rates.confused and not isinstance(matcher, Matcher):
+        if rates.confused and model.matcher is None:
             raise InvalidArgumentError(
                 f"noise confused = {rates.confused:g}: needs a model that scores objects by rules, text or looks"
             )
         super().__init__(model)
-        self._matcher = matcher
         self.rates = rates
         self.counts: Counter[str] = Counter()
         """Number of mistakes by name; `no_other` counts questions without another answer."""
         self._seed = seed
         self._sleep = sleep
         self._num_asked: Counter[str] = Counter()
-
-    def check(self) -> None:
-        """Check the model."""
-        check = getattr(self.model, "check", None)
-        if check is not None:
-            check()
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the model's answer, or a mistake; a lost or refused question does not reach the model.
@@ -165,13 +155,13 @@ class Noisy(ModelWrapper):
         return Reply(other, f"{question.answer_text(other)}\nA wrong answer on purpose (noise).")
 
     def _confused(self, question: Question[A], reply: Reply[A], draws: random.Random) -> Reply[A]:
-        assert self._matcher is not None, "checked when it was made"
-        rated = question.namesakes(reply.answer, self._matcher)
+        assert self.matcher is not None, "checked when it was made"
+        rated = question.namesakes(reply.answer, self.matcher)
         if rated:
             answers, scores = zip(*rated, strict=True)
             (other,) = draws.choices(answers, scores if any(scores) else None)
             return _mistaken(question, other, "confused_objects")
-        unseen = question.exploring(reply.answer, self._matcher)
+        unseen = question.exploring(reply.answer, self.matcher)
         if unseen is not None:
             return _mistaken(question, unseen, "confused_unseen")
         return replace(reply, counter="confused_kept")

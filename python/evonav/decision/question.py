@@ -8,8 +8,9 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
+from evonav.decision.goal_input import GoalInput
 from evonav.decision.prompts import Prompt
 from evonav.errors import DecisionError
 from evonav.tasks.public import Goal
@@ -145,17 +146,21 @@ class YesNoQuestion(ClosedQuestion[bool]):
         return "yes" if answer else "no"
 
 
-class DecisionModel(Protocol):
-    """A model that answers questions.
+Need = Literal["images", "colours"]
+"""What questions to a model hold beside words: views and crops, or the names of the colours in them."""
 
-    One that needs no images but the names of the colours in them has an attribute `needs_colours = True`.
-    """
 
-    @property
-    def needs_images(self) -> bool:
-        """True if questions should have images; agents then ask for colours, which cost rendering time."""
-        ...
+class DecisionModel(ABC):
+    """A model that answers questions. A subclass needs `answer`; the rest has defaults."""
 
+    needs: frozenset[Need] = frozenset()
+    """What questions should hold; agents then ask the simulator for colours, which cost rendering time."""
+    goal_input: GoalInput = "text"
+    """Form of the goal that agents who ask the model go by."""
+    matcher: "Matcher | None" = None
+    """The rules by which it answers, if it does; agents and simulated mistakes use their scores."""
+
+    @abstractmethod
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Answer a question.
 
@@ -166,7 +171,36 @@ class DecisionModel(Protocol):
             AnswerError: There is no usable answer this time.
             DecisionError: There will be none: no key, no money left, not recorded. The stage cannot go on.
         """
-        ...
+
+    def check(self) -> None:  # noqa: B027 - by default there is nothing to check
+        """Check before the first question that the model can be asked; ask nothing.
+
+        Raises:
+            DecisionError: The model cannot be asked; the message says what to do.
+        """
+
+    def costs(self) -> dict[str, float]:
+        """Return the tokens and the money that this process has spent so far; empty for a model without costs."""
+        return {}
+
+
+class ModelWrapper(DecisionModel):
+    """Says of itself what another model says; subclasses answer by it."""
+
+    def __init__(self, model: DecisionModel) -> None:
+        """Store the other model."""
+        self.model = model
+        self.needs = model.needs
+        self.goal_input = model.goal_input
+        self.matcher = model.matcher
+
+    def check(self) -> None:
+        """Check the other model."""
+        self.model.check()
+
+    def costs(self) -> dict[str, float]:
+        """Return the other model's costs."""
+        return self.model.costs()
 
 
 def first_line(text: str) -> str:

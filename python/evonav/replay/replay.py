@@ -16,6 +16,7 @@ from pathlib import Path
 
 from evonav.component import import_callable
 from evonav.decision.custom_model import load_custom_model
+from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec, opaque_task_id
@@ -183,7 +184,7 @@ class RunReplay:
 def _answers_itself(backend: Backend) -> bool:
     """Return whether the user's own model answers the questions itself, so that its answers are not stored."""
     path = backend.decision.options.get("path")
-    return path is not None and hasattr(load_custom_model(str(path), 0), "answer")
+    return path is not None and isinstance(load_custom_model(str(path), 0), DecisionModel)
 
 
 def _loss(record: StageRecord) -> Loss | None:

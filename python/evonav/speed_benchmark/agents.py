@@ -15,8 +15,8 @@ import numpy as np
 from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo, Stop
 from evonav.agents.hosting.serving import peak_memory_mb
 from evonav.agents.registry import BUILT_IN
-from evonav.decision.question import Question, Reply
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.question import DecisionModel, Question, Reply
+from evonav.decision.rules import TextMatch
 from evonav.errors import SimulationError
 from evonav.evaluation.agent_order import PAPER_ORDER
 from evonav.evaluation.episode.episode import Episode
@@ -85,10 +85,10 @@ class Led:
         return action
 
 
-class TextMatchWithImages:
+class TextMatchWithImages(DecisionModel):
     """The text matcher, for agents that believe that it looks at images; prompts are made as for a VLM."""
 
-    needs_images = True
+    needs = frozenset({"images"})
 
     def __init__(self) -> None:
         self._rules = TextMatch()

@@ -41,7 +41,7 @@ class Conditions:
     perception: str
     """Perception, as `--perception` names it."""
     decision: str
-    """Kind of the decision model: text, vlm or own; with the rates of its simulated mistakes."""
+    """Kind of the decision model: text, looks, vlm or custom; with the rates of its simulated mistakes."""
     simulator: str
     """Simulator, unless it is the usual one."""
 

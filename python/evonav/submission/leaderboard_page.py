@@ -24,7 +24,7 @@ _DECISIONS = {
     "text": "decisions by rules",
     "looks": "decisions by rules that look",
     "vlm": "decisions by a model",
-    "own": "decisions by a model of its own",
+    "custom": "decisions by a model of its own",
 }
 _SPLITS = ("relocated", "not_relocated")
 

@@ -23,7 +23,7 @@ class PackedSetup:
     perception: str
     """Perception, as `--perception` names it."""
     decision: str
-    """Kind of the decision model: text, looks, vlm or own; with the rates of its mistakes, and what agents go by."""
+    """Kind of the decision model: text, looks, vlm or custom; with the rates of its mistakes, and what agents go by."""
     model: str
     """The decision model's name, if it has one."""
     simulator: str

@@ -18,7 +18,7 @@ from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.proactive.priors import room_ratios
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.matcher import matcher_of
+from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
@@ -50,7 +50,7 @@ class Evolving(FailThenUpdate):
     def __init__(self, config: EvolvingConfig | None = None, decision: DecisionModel | None = None) -> None:
         self._own = config or EvolvingConfig()
         super().__init__(self._own, decision)
-        self._matcher = matcher_of(self._queries.model)
+        self._matcher = self._queries.model.matcher or Matcher()
         self._belief = Belief({}, 1.0)
 
     def begin_stage(self, goal: Goal) -> None:

@@ -37,7 +37,7 @@ from evonav.agents.proactive.standing import (
 from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import similarity
-from evonav.decision.text.matcher import matcher_of
+from evonav.decision.text.matcher import Matcher
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.sensors.observation import Observation
@@ -55,7 +55,7 @@ class Proactive(NavigatorAgent):
     def __init__(self, config: ProactiveConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or ProactiveConfig()
         super().__init__(self.config.navigator, decision, num_tries=3)
-        self._matcher = matcher_of(self._queries.model)
+        self._matcher = self._queries.model.matcher or Matcher()
 
     def _new_navigator(self) -> Navigator:
         navigator = super()._new_navigator()

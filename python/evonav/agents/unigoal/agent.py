@@ -29,10 +29,10 @@ from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
 from evonav.decision.candidates import Point2
-from evonav.decision.goal_input import goal_as_given, goal_input_of
+from evonav.decision.goal_input import goal_as_given
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.matcher import TextMatch
+from evonav.decision.rules import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -66,7 +66,7 @@ class UniGoal:
     def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or UniGoalConfig()
         model: DecisionModel = decision or TextMatch()
-        self._goal_input = goal_input_of(model)
+        self._goal_input = model.goal_input
         self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._diagnostics = RoundDiagnostics()
         self._task: TaskInfo | None = None

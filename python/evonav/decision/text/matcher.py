@@ -1,8 +1,7 @@
-"""Decide without a network: read the instruction by rule, and compare it with what the agent remembers.
+"""Compare a goal with what the agent remembers by rules that only read.
 
-`TextMatch` stands where the paper's agents ask GPT-4o. It is deterministic, free, and blind to images: it knows objects
-by label and box, so it judges "on" and "next to" by geometry and a room by what stands in it. Each question brings its
-own rule: the method `by_rule(matcher)`, which returns an answer and the reason for it.
+They know objects by label and box, so they judge "on" and "next to" by geometry and a room by what stands in it. Each
+question brings its own rule: the method `by_rule(matcher)`, which returns an answer and the reason for it.
 """
 
 import math
@@ -10,14 +9,10 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
-from evonav.decision.question import Question, Reply
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, is_structure, parse_goal, similarity
 from evonav.tasks.public import Goal
-
-A = TypeVar("A")
 
 ROOM_SIGNS: dict[str, tuple[str, ...]] = {
     "kitchen": (
@@ -283,33 +278,3 @@ def gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
         max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)
     )
     return math.hypot(*gaps_m)
-
-
-class TextMatch:
-    """Answers every question by the question's own rule."""
-
-    needs_images = False
-
-    def __init__(self, config: TextMatchConfig | None = None) -> None:
-        """Create a model whose rules use the given thresholds."""
-        self.matcher = Matcher(config)
-
-    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """Return the rule's answer, which is the same at every attempt.
-
-        Raises:
-            AnswerError: Nothing fits, and there is nothing to choose.
-            DecisionError: The question has no rule.
-        """
-        answer, reason = question.by_rule(self.matcher)
-        return Reply(answer, f"{question.answer_text(answer)}\n{reason}")
-
-
-def matcher_of(model: object) -> Matcher:
-    """Return the matcher of a model that answers by rules, also if it is wrapped; else one that only reads."""
-    while model is not None:
-        matcher = getattr(model, "matcher", None)
-        if isinstance(matcher, Matcher):
-            return matcher
-        model = getattr(model, "model", None)
-    return Matcher()

@@ -141,6 +141,15 @@ class Account:
             cost_usd = 0.0 if self.price is None or usage is None else self.price.of(usage)
             self._ledger.settle(self._model, reserved_usd, usage, cost_usd)
 
+    def costs(self) -> dict[str, float]:
+        """Return the tokens so far, and the money if prices are known."""
+        costs: dict[str, float] = {
+            "num_replayed": self.num_replayed,
+            "input_tokens": self.usage.input_tokens,
+            "output_tokens": self.usage.output_tokens,
+        }
+        return costs if self.cost_usd is None else {**costs, "cost_usd": self.cost_usd}
+
     def replayed(self) -> None:
         """Count an answer that came from the cache."""
         with self._lock:

@@ -131,6 +131,10 @@ class CachingClient(ABC):
             return error.kind == "malformed"
         return False
 
+    def costs(self) -> dict[str, float]:
+        """Return what the questions have cost so far."""
+        return self.account.costs()
+
     @property
     def never_asks(self) -> bool:
         """True if only cached answers are returned."""

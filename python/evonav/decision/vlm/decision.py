@@ -8,22 +8,19 @@ content of `answer` is parsed as any other answer is.
 
 import json
 from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
-from evonav.decision.goal_input import GoalInput, check_goal_input
+from evonav.decision.goal_input import check_goal_input
+from evonav.decision.options import PromptOptions
 from evonav.decision.prompts import Prompt, Text, Turn, with_notice
-from evonav.decision.question import AnswerError, Fault, Question, Reply
+from evonav.decision.question import AnswerError, DecisionModel, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.caching_client import CachingClient
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.decision.vlm.relay import RelayedClient
-from evonav.errors import DecisionError, InvalidArgumentError, StoreError
+from evonav.errors import DecisionError, StoreError
 
 A = TypeVar("A")
-
-Structured = Literal["auto", "on", "off"]
-"""Answers by JSON Schema: `auto` asks for them until the server refuses."""
-STRUCTURED: tuple[Structured, ...] = ("auto", "on", "off")
 
 FAULTS: Mapping[VlmFailure, Fault] = {
     "refusal": "refusal",
@@ -46,47 +43,33 @@ _AS_JSON = "Give the answer as JSON: what belongs on the first line as `answer`,
 _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, in order, the reason as `reason`."
 
 
-class VlmDecision:
+_USUAL = PromptOptions()
+
+
+class VlmDecision(DecisionModel):
     """Answers every question by asking a model."""
 
-    def __init__(
-        self,
-        client: CachingClient | RelayedClient,
-        *,
-        structured: Structured = "auto",
-        needs_images: bool = True,
-        tells_of_change: bool = False,
-        goal_input: GoalInput = "text",
-    ) -> None:
+    def __init__(self, client: CachingClient | RelayedClient, options: PromptOptions = _USUAL) -> None:
         """Create a decision model.
 
-        Args:
-            structured: Answers by JSON Schema: auto, on, off.
-            needs_images: True if agents should put images into questions.
-            tells_of_change: True if prompts say that things may have been moved, see `with_notice`.
-            goal_input: Form of the goal that agents go by: the sentence, the picture, or both.
-
         Raises:
-            InvalidArgumentError: `structured` is none of the three, or a model without images is to go by a picture.
+            InvalidArgumentError: A model without images is to go by a picture.
         """
-        if structured not in STRUCTURED:
-            raise InvalidArgumentError(f"structured: expected one of {', '.join(STRUCTURED)}, got {structured!r}")
-        check_goal_input(goal_input, sees_images=needs_images)
+        check_goal_input(options.goal_input, sees_images=options.images)
         self.client = client
-        self.goal_input = goal_input
-        self.structured: Structured = structured
-        self.needs_images = needs_images
-        self.tells_of_change = tells_of_change
+        self.goal_input = options.goal_input
+        self.needs = frozenset({"images"}) if options.images else frozenset()
+        self.options = options
         self._is_refused = False
         """True after the server has refused `response_format`."""
 
     def check(self) -> None:
-        """Check before the first question that the model can be asked; ask nothing.
-
-        Raises:
-            DecisionError: The model cannot be asked; the message says what to do.
-        """
+        """Check that the client can ask; see `DecisionModel.check`."""
         self.client.check()
+
+    def costs(self) -> dict[str, float]:
+        """Return what the client has spent."""
+        return self.client.costs()
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the model's answer, parsed by the question's grammar.
@@ -105,18 +88,18 @@ class VlmDecision:
             if fault is None:
                 raise
             raise AnswerError(fault, str(error)) from error
-        if is_json and (self.structured == "on" or _fields(answer.text) is not None):
+        if is_json and (self.options.structured == "on" or _fields(answer.text) is not None):
             return read_json(question, answer.text)
         # A server that ignores a schema answers in lines, which are as good.
         return Reply(question.parse(answer.text), answer.text)
 
     def _ask(self, question: Question[A], attempt: int) -> tuple[Answer, bool]:
         """Return the answer, and whether JSON was requested."""
-        plain = with_notice(question.prompt(), tells_of_change=self.tells_of_change)
-        if self.structured == "off":
+        plain = with_notice(question.prompt(), tells_of_change=self.options.tells_of_change)
+        if self.options.structured == "off":
             return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())
-        if self.structured == "on":
+        if self.options.structured == "on":
             return self.client.ask(as_json, attempt), True
         # In a replay, an exchange that is not cached as JSON is of a server without schemas.
         asks_plain = self._is_refused or self.client.never_asks

@@ -97,6 +97,10 @@ class RelayedClient:
     def check(self) -> None:
         """Check nothing: the evaluator has checked the model before the run."""
 
+    def costs(self) -> dict[str, float]:
+        """Return nothing: the evaluator counts the costs."""
+        return {}
+
     def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
         """Return the model's answer.
 

@@ -10,7 +10,6 @@ import time
 from contextlib import suppress
 
 from evonav.component import Component
-from evonav.decision.metered import account_costs
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import VlmError
@@ -64,9 +63,9 @@ class ModelRelay:
             DecisionError: The model cannot be asked.
             InvalidArgumentError: An option makes no sense.
         """
-        from evonav.decision.backends import vlm_client
+        from evonav.decision.options import VlmOptions
 
-        self._client = vlm_client(**decision.keywords)
+        self._client = VlmOptions.read(decision.keywords).client()
         if self._thread is None:
             self._thread = threading.Thread(target=self._serve, daemon=True)
             self._thread.start()
@@ -79,7 +78,7 @@ class ModelRelay:
 
     def costs(self) -> dict[str, float]:
         """Return what the model has cost since `use`, as the evaluator counts it; empty before."""
-        return {} if self._client is None else account_costs(self._client.account)
+        return {} if self._client is None else self._client.costs()
 
     def close_far_end(self) -> None:
         """Close this process's copy of the agent's end."""

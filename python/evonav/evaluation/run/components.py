@@ -209,9 +209,7 @@ def check_decision(decision: Component[DecisionModel], seed: int) -> None:
         DecisionError: A key or package is missing.
         InvalidArgumentError: The model cannot be made.
     """
-    check = getattr(decision.create(seed), "check", None)
-    if check is not None:
-        check()
+    decision.create(seed).check()
 
 
 def embedded_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - `style` and those of `USUAL_CAMERA`

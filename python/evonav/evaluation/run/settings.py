@@ -22,6 +22,7 @@ from evonav.perception.shorthand import PREDICTED, parse_perception
 from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
+    from evonav.decision.options import AskedOptions, VlmOptions
     from evonav.evaluation.run.run_settings import DecisionResources
 
 EXCHANGES_NAME = "exchanges.sqlite"
@@ -224,16 +225,13 @@ class DecisionSettings(Settings):
         if self.kind == "text":
             self._refuse_all_but("model")
         elif self.kind == "looks":
-            from evonav.decision.appearance.model import AppearanceMatch
+            from evonav.decision.rules import AppearanceMatch
 
             self._refuse_all_but("model", "eagerness", "mistakes", "goal_input")
             AppearanceMatch(eagerness=self.eagerness, mistakes=self.mistakes)
         elif self.kind == "vlm":
-            from evonav.decision.backends import vlm_config
-
             self._refuse_all_but(*type(self).model_fields.keys() - {"eagerness", "mistakes"})
-            identity = self.identity(0)
-            vlm_config(identity["model"], identity["request"], self._server(1))
+            _ = self._vlm(0).model_copy(update={"server": self._server(1)}).config
         elif ":" not in self.kind:
             raise SettingError(type(self), "kind", f"{self.kind}: expected text, looks, vlm or module:name")
         else:
@@ -254,18 +252,32 @@ class DecisionSettings(Settings):
             return changed
         if self.kind == "looks":
             return {"eagerness": self.eagerness, "mistakes": self.mistakes, **changed}
-        if self.kind != "vlm":
-            return {"path": self.kind, "tells_of_change": self.tell_of_change, **changed}
-        from evonav.decision.backends import SAMPLING
+        return self._asked(seed).identity()
 
-        model = self.named_model()
+    def _asked(self, seed: int) -> "AskedOptions":
+        """Return the options of a model that is asked by prompts, as far as they do not depend on files."""
+        from evonav.decision.options import CustomOptions
+
+        return self._vlm(seed) if self.kind == "vlm" else CustomOptions(path=self.kind, **self._prompting())
+
+    def _vlm(self, seed: int) -> "VlmOptions":
+        from evonav.decision.options import SAMPLING, VlmOptions
+
         sampling: dict[str, Any] = {**SAMPLING, "seed": seed}
         if self.reasoning:
             sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
         given = _given(temperature=self.temperature, top_p=self.top_p, max_tokens=self.max_tokens)
-        request = {**sampling, **given}
-        how = {"structured": self.structured, "images": self.images, "tells_of_change": self.tell_of_change}
-        return {"model": model, **how, "request": request, **changed}
+        return VlmOptions(
+            model=self.named_model(),
+            structured=self.structured,
+            images=self.images,
+            request={**sampling, **given},
+            **self._prompting(),
+        )
+
+    def _prompting(self) -> dict[str, Any]:
+        noise = dict(self.noise) or None
+        return {"tells_of_change": self.tell_of_change, "goal_input": self.goal_input, "noise": noise}
 
     def component(self, seed: int, resources: "DecisionResources | None") -> Component[DecisionModel]:
         """Return the component of this decision model.
@@ -280,22 +292,21 @@ class DecisionSettings(Settings):
             StoreError: The file of exchanges cannot be opened.
         """
         self.check()
-        options = self.identity(seed)
         if self.asks_rules:
-            return Component(f"evonav.decision.backends:{RULES[self.kind]}", options)
-        path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'own'}"
+            return Component(f"evonav.decision.backends:{RULES[self.kind]}", self.identity(seed))
+        path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'custom'}"
+        options = self._asked(seed)
         if resources is None:
-            return Component(path, options)
-        host_options: dict[str, Any] = {
+            return Component(path, options.identity())
+        files: dict[str, Any] = {
             **self._response_cache(resources.run_dir),
             "ledger": str(resources.spending_log.absolute()),
+            "account": resources.account or None,
         }
-        if resources.account:
-            host_options["account"] = resources.account
         if self.kind == "vlm":
-            host_options["server"] = self._server(resources.num_askers)
-            host_options |= resources.spending.host_options(options["model"])
-        return Component(path, options, host_options)
+            files["server"] = self._server(resources.num_askers)
+            files |= resources.spending.host_options(self.named_model())
+        return Component(path, options.identity(), options.model_copy(update=files).host())
 
     def _refuse_all_but(self, *allowed: str) -> None:
         """Reject settings that would be ignored."""
