@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from evonav.evaluation.run.components import load_case
+from evonav.evaluation.run.components import load_spec
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise.config import noise_presets
@@ -59,7 +59,7 @@ def view(task: int, place: int, yaw_rad: float) -> tuple[StageScene, Frame]:
     """A view in a bundled house."""
     simulator = EmbeddedSimulator()
     with bundled_tasks() as folder:
-        case = load_case(sorted(folder.glob("*/task.json"))[task].parent)
+        case = load_spec(sorted(folder.glob("*/task.json"))[task].parent)
     simulator.reset(case.stages[0].house_json)
     places = simulator.reachable_positions()
     x_m, _, z_m = places[place % len(places)].tolist()

@@ -5,7 +5,7 @@ from dataclasses import replace
 from toy_house import ToySimulator, episode_spec
 
 
-def load_case(path):
+def load_spec(path):
     return replace(episode_spec(path.name.rpartition("-")[0]), task_id=path.name)
 
 

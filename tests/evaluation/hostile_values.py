@@ -247,7 +247,7 @@ class Forging(Explorer):
 
 def load_long(path, num_stages):
     """Read the toy task with its first stage over and over."""
-    spec = toy_house.load_case(path)
+    spec = toy_house.load_spec(path)
     first = spec.stages[0]
     stages = (replace(first, public=replace(first.public, stage=k)) for k in range(1, num_stages + 1))
     return replace(spec, stages=tuple(islice(stages, num_stages)))

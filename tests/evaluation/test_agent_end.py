@@ -27,7 +27,7 @@ from evonav.evaluation.run.components import Backend
 
 if __name__ == "__main__":
     root = Path(sys.argv[1])
-    backend = Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator"))
+    backend = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator"))
     config = RunConfig(backend=backend)
     evaluate(["unruly_agents:Announcing"], task_files(Path(sys.argv[2])), root / "run", config=config, num_workers=1)
 """

@@ -14,7 +14,7 @@ PARTS = Backend(
     decision=Component("c:model", {"request": {"seed": 3}}),
 )
 HEADER = {
-    "cases": "evonav.evaluation.run.components:load_case",
+    "tasks": "evonav.evaluation.run.components:load_spec",
     "simulator": "a.b:make",
     "simulator_options": {"quality": 1},
     "perception": "evonav.perception.ground_truth:GroundTruthPerception",

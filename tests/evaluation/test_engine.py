@@ -27,7 +27,7 @@ from evonav.report.run import load_run
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
-TOY = Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator"))
+TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
 
 
@@ -280,7 +280,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 if __name__ == "__main__":
     root = Path(sys.argv[1])
     config = RunConfig(
-        backend=Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator")),
+        backend=Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator")),
         protocol=ProtocolConfig(max_rounds=12),
     )
     show = lambda news: print(news.num_done, flush=True)

@@ -43,7 +43,7 @@ from vlm_stub import serving
 
 WAITING = "waiting_parts:Waiting"
 CHEAP = RunConfig(
-    backend=replace(TOY, tasks=Component("chaos_house:load_case")),
+    backend=replace(TOY, tasks=Component("chaos_house:load_spec")),
     protocol=ProtocolConfig(max_rounds=3),
     hosting=AgentHosting(usual_isolation()),
 )

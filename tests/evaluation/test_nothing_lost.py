@@ -150,7 +150,7 @@ def many_tasks(folder, num):
 
 
 CHEAP = RunConfig(
-    backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
+    backend=Backend(tasks=Component("chaos_house:load_spec"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
 )
 DRIVER = """
@@ -166,7 +166,7 @@ from evonav.tasks.listing import task_files
 from evonav.evaluation.protocol import ProtocolConfig
 
 config = RunConfig(
-    backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
+    backend=Backend(tasks=Component("chaos_house:load_spec"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
     hosting=AgentHosting("process" if sandbox_problem() else "sandbox"),
 )

@@ -122,7 +122,7 @@ def process_loot(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TOY_LOOT", str(found))
         config = RunConfig(
-            backend=Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator")),
+            backend=Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator")),
             protocol=ProtocolConfig(max_rounds=2),
         )
         evaluate(["prying_agent:Prying"], task_files(folder / "secret-tasks", 1), folder / "secret-run", config=config)

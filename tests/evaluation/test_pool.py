@@ -35,7 +35,7 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
     folder = tmp_path / "starts"
     folder.mkdir()
     backend = Backend(
-        tasks=Component("toy_house:load_case"),
+        tasks=Component("toy_house:load_spec"),
         simulator=Component("flaky_simulator:make", {"num_losses": 0}, {"folder": str(folder)}),
     )
     configs = [RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=3), seed=seed) for seed in (0, 1)]

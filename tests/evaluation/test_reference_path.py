@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from evonav.evaluation.episode.motion import Planner
-from evonav.evaluation.run.components import embedded_simulator, load_case
+from evonav.evaluation.run.components import embedded_simulator, load_spec
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from evonav.world.pose import Pose
@@ -63,7 +63,7 @@ def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
     elsewhere, longer_m = 0, []
     with bundled_tasks() as directory:
         for task in task_files(directory):
-            spec = load_case(task.path)
+            spec = load_spec(task.path)
             for number, stage in enumerate(spec.stages, 1):
                 house = spec.parsed_house(number)
                 simulator.reset(stage.house_json, spec.start)

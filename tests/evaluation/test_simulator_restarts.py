@@ -28,7 +28,7 @@ def tasks(tmp_path):
 def flaky(folder, **options):
     folder.mkdir()
     backend = Backend(
-        tasks=Component("toy_house:load_case"),
+        tasks=Component("toy_house:load_spec"),
         simulator=Component("flaky_simulator:make", options, {"folder": str(folder)}),
     )
     return RunConfig(backend=backend, protocol=CONFIG.protocol)

@@ -33,7 +33,7 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import write_task
 from evonav.tasks.listing import task_files
 
-TOY = Backend(tasks=Component("toy_house:load_case"), simulator=Component("test_trace:colour_simulator"))
+TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("test_trace:colour_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
 
 

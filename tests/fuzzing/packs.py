@@ -31,7 +31,7 @@ class Packs:
 
     @classmethod
     def made_in(cls, folder: Path) -> "Packs":
-        components.load_case = lru_cache(components.load_case)  # the task to verify with is always the same
+        components.load_spec = lru_cache(components.load_spec)  # the task to verify with is always the same
         path = folder / "honest.gz"
         with bundled_tasks() as bundled:
             tasks = task_files(bundled, 1)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from evonav.component import Component
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.run.components import load_case
+from evonav.evaluation.run.components import load_spec
 from evonav.tasks.listing import TaskFile, task_files
 
 
 def load_short(path: Path, num_stages: int) -> EpisodeSpec:
     """Read the first stages of a task."""
-    spec = load_case(path)
+    spec = load_spec(path)
     return replace(spec, stages=spec.stages[:num_stages])
 
 

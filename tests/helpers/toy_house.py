@@ -299,7 +299,7 @@ def episode_spec(task_id):
     return EpisodeSpec(task_id=task_id, house="toy", start=Pose(1.0, 0.9, 3.0, 0.0), stages=EPISODES[task_id]())
 
 
-def load_case(path: Path):
+def load_spec(path: Path):
     return episode_spec(path.name)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evonav import _core
-from evonav.evaluation.run.components import load_case
+from evonav.evaluation.run.components import load_spec
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise.config import NoiseConfig, noise_presets
@@ -35,7 +35,7 @@ def views(num_tasks: int = 4, num_rounds: int = 5) -> Views:
     found = []
     with bundled_tasks() as folder:
         for path in sorted(folder.glob("*/task.json"))[:num_tasks]:
-            case = load_case(path.parent)
+            case = load_spec(path.parent)
             simulator.reset(case.stages[0].house_json)
             scene = StageScene(case.task_id, case.stages[0].public, "fu", 7, tuple(simulator.objects))
             places = simulator.reachable_positions()

@@ -8,7 +8,7 @@ import pytest
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.run.components import load_case
+from evonav.evaluation.run.components import load_spec
 from evonav.perception.noise.config import NoiseConfig, noise_presets
 from evonav.perception.noise.confusion import read_confusion
 from evonav.perception.simulated import noisy_perception
@@ -165,7 +165,7 @@ def test_the_first_noun_of_an_instruction_is_the_target() -> None:
     num = right = 0
     with bundled_tasks() as folder:
         for path in sorted(folder.glob("*/task.json")):
-            for stage in load_case(path.parent).stages:
+            for stage in load_spec(path.parent).stages:
                 num += 1
                 right += nouns_of(stage.public.unified_instruction, categories)[:1] == [stage.public.category]
     assert right == num > 50

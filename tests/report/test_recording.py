@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.components import load_case
+from evonav.evaluation.run.components import load_spec
 from evonav.replay.rerun_export import check_recording
 from evonav.tasks.bundled import bundled_tasks
 from evonav.world.embedded import EmbeddedSimulator
@@ -84,7 +84,7 @@ def test_depth_is_what_the_camera_measured(recording: Path, viewed_run: Path) ->
     with RunStore(viewed_run) as store:
         (record, *_) = store.records("fu")
     with bundled_tasks() as tasks:
-        house_json = load_case(tasks / record.task_id).stages[0].house_json
+        house_json = load_spec(tasks / record.task_id).stages[0].house_json
     simulator = EmbeddedSimulator()
     simulator.reset(house_json)
     pose = record.trace[0].pose

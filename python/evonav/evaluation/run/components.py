@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import closing, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -25,7 +25,7 @@ from evonav.perception import Perception
 from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.world.simulator import Simulator, SimulatorConfig, vertical_fov_deg
 
-TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
+TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_spec")
 
 
 USUAL_CAMERA = {"width_px": 300, "height_px": 300, "hfov_deg": 90.0}
@@ -37,8 +37,6 @@ TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
 TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
 RECENT_HOUSES: deque[Any] = deque(maxlen=8)
 """Houses of this process's simulators: the next agent in a task finds those of its stages there."""
-HEADER_KEYS = {"cases": "tasks", "simulator": "simulator", "perception": "perception", "decision": "decision"}
-"""Field of `Backend` by its key in the headers of runs; options are under `KEY_options`."""
 
 
 @runtime_checkable
@@ -71,14 +69,14 @@ class Backend:
     """Called with the seed of the episode's agent."""
 
     def identity(self) -> dict[str, Any]:
-        """Return what a run's header says of its parts; `from_identity` reads it.
+        """Return what a run's header says of its parts: each by its name, and its options by `NAME_options`.
 
-        Runs are resumed only where it is equal: keys and values must not change.
+        Runs are resumed only where it is equal; `from_identity` reads it.
         """
         parts: dict[str, Any] = {}
-        for key, name in HEADER_KEYS.items():
-            component: Component[Any] = getattr(self, name)
-            parts |= component.identity(key)
+        for one in fields(self):
+            component: Component[Any] = getattr(self, one.name)
+            parts |= component.identity(one.name)
         return parts
 
     @classmethod
@@ -91,14 +89,15 @@ class Backend:
         Raises:
             ValueError: An entry is unknown.
         """
-        unknown = values.keys() - {entry for key in HEADER_KEYS for entry in (key, f"{key}_options")}
+        names = [one.name for one in fields(cls)]
+        unknown = values.keys() - {entry for name in names for entry in (name, f"{name}_options")}
         if unknown:
             raise ValueError(f"unknown entries {sorted(unknown)}")
         default = cls()
         return cls(
             **{
-                name: Component(values.get(key, getattr(default, name).path), values.get(f"{key}_options", {}))
-                for key, name in HEADER_KEYS.items()
+                name: Component(values.get(name, getattr(default, name).path), values.get(f"{name}_options", {}))
+                for name in names
             }
         )
 
@@ -194,7 +193,7 @@ def check_agent_name(
         raise InvalidArgumentError(f"{error}{hint}") from error
 
 
-def load_case(path: Path) -> EpisodeSpec:
+def load_spec(path: Path) -> EpisodeSpec:
     """Read a task from its folder."""
     from evonav.evaluation.episode.spec import episode_spec
     from evonav.tasks import load_task
