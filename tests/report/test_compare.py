@@ -19,6 +19,7 @@ from evonav.report.compare.selection import read_compared_agents
 from evonav.report.export import csv_cell
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.run import load_run
+from evonav.report.tables.verdicts import sentence
 
 SUCCESS = EndState.SUCCESS
 
@@ -119,8 +120,14 @@ def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path:
         pytest.approx(min(1.0, p)) for p in (3 * raw[0], raw[1], 2 * raw[2])
     ]
     assert words.says(found[0]) == "b is ahead"
-    tie = words.sentence("a", "c", found[1].all.effects["success"], "success")
-    assert "a tie at this n (a true difference of" in tie
+    undecided = sentence("a", "c", found[1].all.effects["success"], num_pairs=3)
+    assert undecided.startswith(
+        "SR: undecided between c and a: +4.2 [+0.0, +16.7] points (54.2 vs 50.0%, p = 1.00 by Holm"
+    )
+    assert undecided.endswith("12 houses reliably detect only differences of about 11.1 points or more.")
+    behind = sentence("b", "a", compare(read_compared_agents([str(run), "a", "b"]))[0].all.effects["success"])
+    assert behind.startswith("b is ahead by "), "the difference of the agent that is ahead, whichever is named first"
+    assert "[-" not in behind
     by_rounds = compare(read_compared_agents([str(run)]), measures=["num_rounds", "recall"])
     assert "recall" not in by_rounds[0].all.effects  # no stage has it
     assert by_rounds[0].all.effects["num_rounds"].verdict == "equal"
@@ -134,10 +141,11 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     options = [f"--out={path}" for path in files.values()]
     result = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", *options])
     assert result.exit_code == 0, result.output
-    assert "ftu is ahead of fu: ftu minus fu is +37.5" in " ".join(result.output.split())
-    assert re.search(r"^% +ftu +fu +difference|^ +ftu +fu +difference", result.output, re.MULTILINE), (
-        "in the order named"
+    assert (
+        "ftu is ahead by 37.5 points of SR [18.8, 50.0] (87.5 vs 50.0%, p = 0.031; 16 stages in 8 houses)."
+        in " ".join(result.output.split())
     )
+    assert re.search(r"^ % +ftu +fu +difference", result.output, re.MULTILINE), "in the order named"
     assert max(len(line) for line in result.output.splitlines() if not line.startswith(("written", "note"))) <= 80
     found = one(run, "ftu", "fu")
     rows = {(row["part"], row["measure"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}

@@ -95,7 +95,7 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     (pair,) = differences.rows
     assert pair[:2] == ("ftu minus fu", "+6.3 [-0.6, +13.2]")
     assert pair[2].startswith("+41.7 [")
-    assert pair[6:] == ("a tie at this n", "no", "no")
+    assert pair[6:] == ("undecided", "no", "no")
 
 
 def test_a_difference_may_be_in_the_papers_interval_while_the_papers_is_not_in_ours(tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_difference_may_be_in_the_papers_interval_while_the_papers_is_not_in_o
     run = load_run(record_run(tmp_path / "run", records, dict.fromkeys(tasks, 1), ["fu", "ftu"]))
     (pair,) = paper.paper_tables(run)[-1].rows
     assert pair[2].startswith("+1.7 [+0.0, +")
-    assert pair[6:] == ("a tie at this n", "no", "yes")
+    assert pair[6:] == ("undecided", "no", "yes")
 
 
 def test_moved_targets_are_split_by_how_far_they_moved(tmp_path: Path) -> None:

@@ -14,6 +14,8 @@ from evonav.evaluation.metrics.navigation import agent_pairs, summarise
 from evonav.report.run import load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.numbers import percent, rate
+from evonav.report.tables.run_tables import run_tables
+from evonav.report.tables.verdicts import verdict_words
 from evonav.statistics import paired_effect
 
 F64 = NDArray[np.float64]
@@ -64,13 +66,13 @@ def test_a_verdict_is_that_of_the_effect() -> None:
     none, some = np.zeros(12), np.array([1.0, 0.0] * 6)
 
     def told(a: F64, b: F64, of: list[str] = houses) -> str:
-        return tables.verdict_words("fu", "ftu", paired_effect(a, b, of))
+        return verdict_words("fu", "ftu", paired_effect(a, b, of))
 
     assert told(none, some) == "ftu is ahead"
     assert told(some, none) == "fu is ahead"
-    assert told(some, 1 - some) == "a tie at this n"
+    assert told(some, 1 - some) == "undecided"
     assert told(some, some) == "equal on every stage"
-    assert told(none, some, ["one house"] * 12) == "too few houses to tell (1)"
+    assert told(none, some, ["one house"] * 12) == "too few houses (1)"
 
 
 def test_causes_add_up_to_the_stages_without_success(write_run: WriteRun) -> None:
@@ -125,13 +127,13 @@ def test_rates_without_spread_claim_no_interval() -> None:
 
 
 def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> None:
-    table = tables.paired_table(load_run(write_run()).pairs)
+    table = run_tables(load_run(write_run()), {})[1]
     (row,) = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
     # ftu alone succeeds in six second stages, fu alone in one first stage.
     assert (row["Agents"], row["only first / second"]) == ("ftu minus fu", "6 / 1")
     assert row["SR difference [95% CI]"].startswith("+41.7 [")
     # The interval leaves 0 out, p does not suffice: six houses against half a house.
-    assert (row["p"], row["SR verdict"], row["SPL verdict"]) == ("0.062", "a tie at this n", "a tie at this n")
+    assert (row["p"], row["SR verdict"], row["SPL verdict"]) == ("0.062", "undecided", "undecided")
 
 
 def test_no_name_of_an_agent_is_a_formula_in_a_spreadsheet() -> None:

@@ -41,37 +41,60 @@ def show(table: "RichTable") -> None:
     Console(width=max(console.width, needed)).print(table)
 
 
-def show_tables(tables: "Iterable[Table]") -> None:
-    """Print tables of a report; one that is wider than the terminal is printed in parts, below each other."""
+def show_tables(tables: "Iterable[Table]", *, notes: "Sequence[str]" = ()) -> None:
+    """Print tables of a report, then notes, those of all tables once.
+
+    A table that is wider than the terminal is printed with rows as columns if that fits, else in parts, below each
+    other. Agents of files and modules are shown by their classes.
+
+    Args:
+        notes: Notes on all tables.
+    """
+    from textwrap import fill
+
     from rich.console import Console
+    from rich.measure import Measurement
+    from rich.text import Text
+
+    from evonav.report.tables.table import short_names
 
     console = Console()
-    for table in tables:
-        for part in in_parts(table, console.width):
-            console.print(part.rich())
-        if table.notes:
-            console.print("\n".join(table.notes), style="dim italic", markup=False, highlight=False)
+    found = list(tables)
+    names = short_names(text for table in found for row in (table.columns, *table.rows) for text in row)
+    for table in found:
+        for part in in_parts(table.renamed(names), console.width):
+            shown = part.rich()
+            if Measurement.get(console, console.options.update(width=10_000), shown).maximum > console.width:
+                for column, heading, texts in zip(shown.columns, part.columns, _texts(part), strict=True):
+                    column.header = Text(fill(heading, max(1, *map(len, texts))))  # headings are wrapped, and no cell
+            console.print(shown)
+    own = [f"{short} is {name}." for name, short in names.items()]
+    every_note = [*own, *(note for table in found for note in table.renamed(names).notes), *notes]
+    if every_note:
+        console.print("\n".join(dict.fromkeys(every_note)), style="dim italic", markup=False, highlight=False)
 
 
 def in_parts(table: "Table", width: int) -> "list[Table]":
-    """Split the columns of a table, without its notes, so that no line is longer than `width`.
+    """Return a table, without its notes, so that no line is longer than `width`: as it is, turned, or in parts.
 
-    Every part repeats the columns that name a row: the first ones, as many as tell all rows apart. A cell that is wider
-    than the space that is left is wrapped.
+    A table is turned, rows as columns, if that fits. Else its columns are split. Every part repeats the columns that
+    name a row: the first ones, as many as tell all rows apart. A cell that is wider than the space that is left is
+    wrapped.
     """
     from dataclasses import replace
 
-    def width_of(column: int) -> int:
-        heading = table.columns[column].split()
-        return _GAP + max(len(text) for text in ("", *heading, *(row[column] for row in table.rows)))
-
+    table = replace(table, notes=())
     prefixes = range(1, len(table.columns))
     num_keys = next((k for k in prefixes if len({row[:k] for row in table.rows}) == len(table.rows)), 1)
-    widths = [width_of(column) for column in range(len(table.columns))]
-    taken = 1 + min(sum(widths[:num_keys]), width // 2)
+    if _width_of(table, range(len(table.columns))) <= width:
+        return [table]
+    turned = _turned(table, num_keys)
+    if len(table.rows) <= len(table.columns) and _width_of(turned, range(len(turned.columns))) <= width:
+        return [turned]
+    taken = min(_width_of(table, range(num_keys)) + 1, 1 + width // 2)
     groups: list[list[int]] = [[]]
-    for column in range(num_keys, len(widths)):
-        if groups[-1] and taken + sum(widths[other] for other in [*groups[-1], column]) > width:
+    for column in range(num_keys, len(table.columns)):
+        if groups[-1] and taken + _width_of(table, [*groups[-1], column]) > width:
             groups.append([])
         groups[-1].append(column)
     parts = []
@@ -83,11 +106,38 @@ def in_parts(table: "Table", width: int) -> "list[Table]":
                 title=table.title if number == 0 else f"{table.title}, continued",
                 columns=tuple(table.columns[column] for column in columns),
                 rows=tuple(tuple(row[column] for column in columns) for row in table.rows),
-                notes=(),
                 best=frozenset((row, columns.index(column)) for row, column in table.best if column in columns),
             )
         )
     return parts
+
+
+def _width_of(table: "Table", columns: "Iterable[int]") -> int:
+    """Return the width of columns of a table, in characters; only headings are wrapped."""
+    texts = _texts(table)
+    return sum(_GAP + max(map(len, texts[column])) for column in columns)
+
+
+def _texts(table: "Table") -> list[list[str]]:
+    """Return what stays on a line in each column: the words of its heading, and its cells."""
+    return [
+        ["", *heading.split(), *(row[column] for row in table.rows)] for column, heading in enumerate(table.columns)
+    ]
+
+
+def _turned(table: "Table", num_keys: int) -> "Table":
+    """Return a table with its rows as columns, under the texts of their first `num_keys` columns."""
+    from dataclasses import replace
+
+    return replace(
+        table,
+        columns=("", *(" ".join(filter(None, row[:num_keys])) for row in table.rows)),
+        rows=tuple(
+            (table.columns[column], *(row[column] for row in table.rows))
+            for column in range(num_keys, len(table.columns))
+        ),
+        best=frozenset((column - num_keys, row + 1) for row, column in table.best if column >= num_keys),
+    )
 
 
 def write_files(
@@ -121,14 +171,17 @@ def print_table(summaries: "list[AgentSummary]") -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from evonav.report.tables.table import short_names
+
+    names = short_names(summary.agent for summary in summaries)
     table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target moved")
-    table.add_column("agent", overflow="fold", min_width=12)  # may be a long path
+    table.add_column("agent", overflow="fold")
     for heading in ("n", "SR", "95%", "SPL", "95%", "moved", "not moved"):
         table.add_column(heading, justify="right", no_wrap=True)
     for summary in summaries:
         splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
         table.add_row(
-            Text(summary.agent),
+            Text(names.get(summary.agent, summary.agent)),
             str(summary.n),
             percent(summary.sr),
             _percent_interval(summary.sr_ci95),
@@ -137,6 +190,8 @@ def print_table(summaries: "list[AgentSummary]") -> None:
             *("-" if rates is None else f"{percent(rates.sr)} ({rates.n})" for rates in splits),
         )
     show(table)
+    for name, short in names.items():
+        typer.echo(f"{short} is {name}.")
     for summary in summaries:
         if summary.is_incomplete:
             states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)

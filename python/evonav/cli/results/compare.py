@@ -1,12 +1,17 @@
 """`evonav compare`: compare agents on the same stages."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from evonav.cli.display import show_tables, write_files
 from evonav.cli.options.shared import PLOTS, AsJson, ComparedRuns, files_option, listed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from evonav.report.compare.compare import Comparison
 
 
 def compare(
@@ -38,8 +43,6 @@ def compare(
     """
     import json
 
-    from rich.console import Console
-
     from evonav.report.compare import wording
     from evonav.report.compare.compare import compare as compare_agents
     from evonav.report.compare.compare import comparison_json
@@ -53,11 +56,7 @@ def compare(
     if as_json:
         typer.echo(content, nl=False)
     else:
-        console = Console()
-        show_tables(wording.terminal_tables(found))
-        for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
-            console.print(line, markup=False, highlight=False)
-        console.print(wording.METHOD, style="dim", highlight=False)
+        _print(found)
     write_files(
         out,
         {
@@ -69,3 +68,19 @@ def compare(
         lambda: [comparison_plot(found)],
         is_error=as_json,
     )
+
+
+def _print(found: "Sequence[Comparison]") -> None:
+    """Print what the comparison says, in sentences and tables, and then the notes."""
+    from rich.console import Console
+
+    from evonav.report.compare import wording
+    from evonav.report.tables.table import short_names
+
+    console = Console()
+    names = short_names(name for one in found for name in (one.a, one.b))
+    for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
+        for name, short in names.items():
+            line = line.replace(name, short)
+        console.print(line, markup=False, highlight=False)
+    show_tables(wording.terminal_tables(found), notes=[wording.METHOD])

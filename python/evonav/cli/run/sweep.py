@@ -149,6 +149,7 @@ def _print_plan(
     settings: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path
 ) -> None:
     """Print the cells to run and their estimated cost."""
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     from evonav.cli.display import status
@@ -160,9 +161,10 @@ def _print_plan(
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
         check_agent_name(agent, None if settings.isolation == "none" else AgentHosting())
     has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
-    table = Table(title=f"{counted(len(cells), 'cell')} into {out}", title_justify="left")
-    table.add_column("cell", overflow="fold", min_width=20)
-    table.add_column("agents", overflow="fold")
+    table = Table(
+        title=f"{counted(len(cells), 'cell')} into {out}", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
+    table.add_column("cell", overflow="fold")
     for heading in ("tasks", "stages", *(["requests", "tokens in", "dollars"] if has_models else [])):
         table.add_column(heading, justify="right", no_wrap=True)
     total, total_usd = 0, 0.0
@@ -183,8 +185,12 @@ def _print_plan(
                 num_requests = sum(estimate.num_requests for estimate in found)
                 cost = [f"{num_requests:.0f}", str(usage.input_tokens), dollars]
             total += run.num_stages
-            table.add_row(cell.name, ", ".join(cell.agents), str(len(run.evaluation.tasks)), str(run.num_stages), *cost)
+            table.add_row(cell.name, str(len(run.evaluation.tasks)), str(run.num_stages), *cost)
     show(table)
+    for agents in dict.fromkeys(cell.agents for cell in cells):
+        some = [cell.name for cell in cells if cell.agents == agents]
+        which = "" if len(some) == len(cells) else f" in {', '.join(some)}"
+        typer.echo(f"agents{which}: {', '.join(agents)}")
     typer.echo(counted(total, "stage") + (f", about ${total_usd:.2f}" if total_usd else ""))
     if has_models and settings.prices is None:
         typer.echo("no prices: name a file of prices in the sweep file, such as prices = 'prices.json'")

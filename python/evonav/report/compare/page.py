@@ -12,7 +12,7 @@ from evonav.report.pages.template import page_text, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.specs import Gap, GapPlot
 from evonav.report.plots.style import plot_css
-from evonav.report.tables.table import p_words
+from evonav.report.tables.verdicts import p_words
 from evonav.statistics import PairedEffect
 
 

@@ -5,22 +5,24 @@ from collections.abc import Iterable, Sequence
 from evonav.counted import counted
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip, Part
 from evonav.report.export import csv_text
-from evonav.report.tables.numbers import NONE, points
 from evonav.report.tables.table import (
     INTERVALS,
     SPL_NOTE,
     STRICT_NOTE,
-    VERDICTS,
     Table,
-    effect_cells,
     latex_tables,
     markdown_tables,
     mode_words,
+)
+from evonav.report.tables.verdicts import (
+    VERDICTS,
+    effect_cells,
     p_heading,
-    p_words,
+    paired_table,
+    sentence,
     verdict_words,
 )
-from evonav.statistics import MIN_CLUSTERS, Interval, PairedEffect
+from evonav.statistics import Interval
 
 RATES = frozenset(
     {
@@ -48,58 +50,26 @@ def measure_name(field: str) -> str:
 
 
 def pair_table(comparisons: Sequence[Comparison]) -> Table:
-    """Build a table with one row per pair, on all stages that both scored."""
-    rows = []
-    for one in comparisons:
-        sr, spl = one.all.effects["success"], one.all.effects.get("spl")
-        rows.append(
-            (
-                f"{one.b} minus {one.a}",
-                f"{100 * sr.mean_b:.1f} and {100 * sr.mean_a:.1f}",
-                *effect_cells(sr),
-                says(one),
-                *effect_cells(spl),
-                NONE if spl is None else says(one, "spl"),
-                str(one.all.n),
-                f"{one.all.num_only_b} / {one.all.num_only_a}",
-                NONE if sr.detectable is None else f"{100 * sr.detectable:.1f}",
-            )
-        )
-    p_name = p_heading(len(comparisons))
-    columns = (
-        "Agents",
-        "SR %",
-        "SR difference [95% CI]",
-        p_name,
-        "SR verdict",
-        "SPL difference [95% CI]",
-        p_name,
-        "SPL verdict",
-        "n",
-        "only first / second",
-        "detectable",
+    """Build the table with one row per pair, on all stages that both scored."""
+    return paired_table(
+        [
+            (one.a, one.b, effects["success"], effects.get("spl"), one.all.num_only_a, one.all.num_only_b)
+            for one in comparisons
+            for effects in (one.all.effects,)
+        ]
     )
-    notes = (
-        f"Percentage points. {METHOD}",
-        "Only: stages where only the first-named agent succeeded, or only the second. Detectable: the smallest true "
-        "difference in SR that this many houses would show at the 5% level four times in five.",
-    )
-    return Table("Paired differences", columns, tuple(rows), notes)
 
 
 def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     """Build a table of one metric on all stages, for a terminal: one row per pair."""
-    rows = []
-    for one in comparisons:
-        effect = one.all.effects.get(field)
-        if effect is not None:
-            shown = [f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_b, effect.mean_a)]
-            cells = effect_cells(effect, scale_of(field))
-            rows.append((f"{one.b} minus {one.a}", *shown, *cells, says(one, field)))
-    names = (comparisons[0].b, comparisons[0].a) if len(comparisons) == 1 else ("first", "second")
-    columns = ("", *names, "difference [95% CI]", p_heading(len(comparisons)), "verdict")
+    rows = tuple(
+        (f"{one.b} minus {one.a}", *effect_cells(effect, scale_of(field)), says(one, field))
+        for one in comparisons
+        if (effect := one.all.effects.get(field)) is not None
+    )
+    columns = ("", "difference [95% CI]", p_heading(len(comparisons)), "verdict")
     sizes = sorted({one.all.n for one in comparisons})
-    return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
+    return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, rows)
 
 
 def comparison_table(one: Comparison) -> Table:
@@ -121,24 +91,18 @@ def comparison_table(one: Comparison) -> Table:
 
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
     """Return the tables that fit eighty columns; the files contain the rest."""
-    fields = list(dict.fromkeys(field for one in comparisons for field in one.all.effects))
-    tables = [measure_table(comparisons, field) for field in fields]
-    if len(comparisons) == 1:
-        (one,) = comparisons
-        effects = [(part, part.effects["success"]) for part in one.parts]
-        rows = tuple(
-            (
-                part.label,
-                str(part.n),
-                *(f"{100 * mean:.1f}" for mean in (sr.mean_b, sr.mean_a)),
-                *effect_cells(sr),
-            )
-            for part, sr in effects
-        )
-        columns = ("SR %", "n", one.b, one.a, "difference [95% CI]", "p")
-        tables += [Table(f"SR of {one.b} minus {one.a} by kind of stage", columns, rows, (EXPLORING,))]
-        tables += [_short_flips(one)]
-    return [table for table in tables if table.rows]
+    if len(comparisons) > 1:
+        fields = list(dict.fromkeys(field for one in comparisons for field in one.all.effects))
+        return [table for field in fields if (table := measure_table(comparisons, field)).rows]
+    (one,) = comparisons
+    rows = tuple(
+        (part.label, str(part.n), *(f"{100 * mean:.1f}" for mean in (sr.mean_b, sr.mean_a)), *effect_cells(sr))
+        for part in one.parts
+        for sr in (part.effects["success"],)
+    )
+    columns = ("SR %", "n", one.b, one.a, "difference [95% CI]", "p")
+    parts = Table(f"SR of {one.b} minus {one.a} by kind of stage", columns, rows, (EXPLORING,))
+    return [table for table in (comparison_table(one), parts, _short_flips(one)) if table.rows]
 
 
 def _short_flips(one: Comparison) -> Table:
@@ -148,8 +112,8 @@ def _short_flips(one: Comparison) -> Table:
     rows = tuple((f"{flip.task_id} {flip.stage}", flip.category, _stratum(flip), flip.winner) for flip in shown)
     columns = ("Task and stage", "", "", "succeeded")
     num_more = len(one.flips) - len(rows)
-    notes = [f"{num_more} more stages."] if num_more else []
-    notes.append("--md, --html and --json list all, with the command that replays each.")
+    notes = [f"{counted(num_more, 'more stage')} with different outcomes."] if num_more else []
+    notes.append("Files of --out list all, with the command that replays each.")
     return Table(f"Stages with different outcomes: {one.b} and {one.a}", columns, rows, tuple(notes))
 
 
@@ -235,7 +199,7 @@ def findings(comparisons: Sequence[Comparison]) -> list[str]:
         for field in ("success", "spl"):
             effect = one.all.effects.get(field)
             if effect is not None:
-                lines.append(f"{measure_name(field)}: {sentence(one.a, one.b, effect, field, len(comparisons))}")
+                lines.append(sentence(one.a, one.b, effect, measure_name(field), num_pairs=len(comparisons)))
     return lines
 
 
@@ -254,33 +218,9 @@ def warnings(comparisons: Sequence[Comparison]) -> list[str]:
     return lines
 
 
-def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 1) -> str:
-    """Describe one difference in words."""
-    p = f"p = {p_words(effect.adjusted_p)}".replace("= <", "< ")
-    measured = f"{points(effect, scale_of(field))}{' points' if field in RATES else ''}, {p}"
-    measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
-    on = f"on {counted(effect.n, 'stage')} of {counted(effect.num_clusters, 'house')}"
-    verdict = effect.verdict
-    if verdict == "equal":
-        return f"{a} and {b} are equal on each of {counted(effect.n, 'stage')}."
-    if verdict == "few":
-        return f"{b} minus {a}: {measured} {on}: with fewer than {MIN_CLUSTERS} houses, or all alike, one cannot tell."
-    if verdict == "tie":
-        least = "" if effect.detectable is None else f"{amount(effect.detectable, field)} "
-        found = f" (a true difference of {least}would be found four times in five)" if least else ""
-        return f"{b} minus {a}: {measured} {on}: a tie at this n{found}."
-    ahead, behind = (b, a) if verdict == "b" else (a, b)
-    if field not in RATES:
-        return f"{b} minus {a}: {measured} {on}: they differ."
-    relative = "" if effect.relative is None else f", {100 * effect.relative:+.0f}% of {a}'s"
-    return f"{ahead} is ahead of {behind}: {b} minus {a} is {measured}{relative} {on}."
-
-
 def says(one: Comparison, field: str = "success") -> str:
     """Return the verdict about a metric on all stages, after adjustment, in a few words."""
-    effect = one.all.effects[field]
-    is_about_rank = field in RATES or effect.verdict not in ("a", "b")
-    return verdict_words(one.a, one.b, effect) if is_about_rank else "they differ"
+    return verdict_words(one.a, one.b, one.all.effects[field], is_rate=field in RATES)
 
 
 def comparison_csv(comparisons: Sequence[Comparison]) -> str:
@@ -348,11 +288,6 @@ def comparison_latex(comparisons: Sequence[Comparison]) -> str:
     """Return the pairs and every pair's parts as tables for `booktabs`; sentences as comments."""
     lines = "".join(f"% {line}\n" for line in statements(comparisons))
     return lines + latex_tables([pair_table(comparisons), *(part_table(one) for one in comparisons)])
-
-
-def amount(value: float, field: str) -> str:
-    """Return a size without a sign, with its unit where it is points."""
-    return f"{100 * value:.1f} points" if field in RATES else f"{value:.2g}"
 
 
 def where(flip: Flip) -> str:

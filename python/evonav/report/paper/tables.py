@@ -14,7 +14,8 @@ from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates,
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.report.run import RecordedRun, RecordedStage
 from evonav.report.tables.numbers import NONE, number, percent, points, rate
-from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
+from evonav.report.tables.table import INTERVALS, Table
+from evonav.report.tables.verdicts import VERDICTS, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, Interval, newcombe, power, wilson
 
 Perception = Literal["gt", "prediction"]
@@ -255,7 +256,7 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
         p_heading(len(pairs)),
         "SPL, ours [95% CI]",
         "n",
-        "ours says",
+        "our verdict",
         "paper's in our interval",
         "ours in the paper's interval",
     )

@@ -13,7 +13,8 @@ from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import TABLED, Breakdowns
 from evonav.report.run import RecordedRun
 from evonav.report.tables import table as tables
-from evonav.report.tables.numbers import NONE, percent, points, rate
+from evonav.report.tables.numbers import NONE, percent, rate
+from evonav.report.tables.verdicts import paired_table, sentence
 from evonav.statistics import MIN_CLUSTERS
 
 
@@ -21,7 +22,7 @@ def run_tables(run: RecordedRun, breakdowns: Breakdowns) -> list[tables.Table]:
     """Return all tables of a run, in reading order."""
     return [
         tables.headline(run.summaries),
-        tables.paired_table(run.pairs),
+        paired_table([(pair.a, pair.b, pair.sr, pair.spl, pair.num_only_a, pair.num_only_b) for pair in run.pairs]),
         tables.stage_table(run.rows_by_agent()),
         tables.relocation_table(run.summaries),
         tables.mode_table(run.summaries),
@@ -129,11 +130,8 @@ def statements(run: RecordedRun) -> list[str]:
     if pairs and all(pair.sr.num_clusters < MIN_CLUSTERS for pair in pairs):
         return [*lines, f"{counted(pairs[0].sr.num_clusters, 'house')}: too few to tell agents apart."]
     for pair in pairs:
-        effects = (("SR", pair.sr), ("SPL", pair.spl))
-        found = (f"{name} {points(one)} points, {tables.verdict_words(pair.a, pair.b, one)}" for name, one in effects)
-        lines.append(
-            f"{pair.b} minus {pair.a}, on the {counted(pair.n, 'stage')} that both scored: {'; '.join(found)}."
-        )
+        for name, one in (("SR", pair.sr), ("SPL", pair.spl)):
+            lines.append(sentence(pair.a, pair.b, one, name, num_pairs=len(run.pairs)))
     return lines
 
 

@@ -8,7 +8,7 @@ import io
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from shutil import get_terminal_size
 
@@ -18,14 +18,17 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, Stage, rates
+from evonav.evaluation.metrics.navigation import AgentSummary, Rates, Stage, rates
 from evonav.evaluation.records.changes import DURING_STRATA
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
-from evonav.report.tables.numbers import NONE, points, rate
-from evonav.statistics import LEVEL, NUM_RESAMPLES, PairedEffect
+from evonav.report.tables.numbers import NONE, rate
+from evonav.statistics import NUM_RESAMPLES
 
-INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times); – where one house or equal houses give none."
+INTERVALS = (
+    f"95% bootstrap intervals over houses ({NUM_RESAMPLES:,} resamples). – means that there are too few different "
+    "houses for one."
+)
 SPL_NOTE = (
     "SPL is the length of the shortest path to the target divided by that of the walked path, at most 1. A success may "
     "stop short of the target by up to the success radius, so a walked path can be shorter than the shortest path."
@@ -34,10 +37,8 @@ STRICT_NOTE = (
     "Strict success: the agent called stop within 1 m of the target's box, with the target in view. Most agents look "
     "at an object from 1.5 m by design, so their strict rates are low."
 )
-VERDICTS = (
-    "p: two-sided, the agents' names exchanged in whole houses. Holm: p adjusted for the number of pairs. Ahead: p is "
-    f"at most {LEVEL:g} and the interval does not include 0."
-)
+OWN_AGENT = re.compile(r"(?<![\w/.])(?:[\w.~/\\-]*\.py|[A-Za-z_][\w.]*):([A-Z]\w*)")
+"""Name of an agent that is a class of a file or module, such as `./mine.py:Mine`, and the class."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -108,6 +109,22 @@ class Table:
         table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
         return f"<p><b>{escape(self.title)}</b></p>{table}{notes}"
 
+    def renamed(self, names: Mapping[str, str]) -> "Table":
+        """Return the table with names in place of others in all of its texts."""
+
+        def text(old: str) -> str:
+            for name, new in names.items():
+                old = old.replace(name, new)
+            return old
+
+        return replace(
+            self,
+            title=text(self.title),
+            columns=tuple(map(text, self.columns)),
+            rows=tuple(tuple(map(text, row)) for row in self.rows),
+            notes=tuple(map(text, self.notes)),
+        )
+
     def rich(self) -> RichTable:
         """Return the table for `rich.print`."""
         notes = "\n".join(self.notes)
@@ -124,6 +141,13 @@ class Table:
         for i, row in enumerate(self.rows):
             table.add_row(*(Text(cell, style="bold" if (i, j) in self.best else "") for j, cell in enumerate(row)))
         return table
+
+
+def short_names(texts: Iterable[str]) -> dict[str, str]:
+    """Return the class of each agent in texts that is named by file or module, where no other has the same class."""
+    found = {match[0]: match[1] for text in texts for match in OWN_AGENT.finditer(text)}
+    classes = list(found.values())
+    return {name: short for name, short in found.items() if classes.count(short) == 1}
 
 
 def markdown_tables(tables: Iterable[Table]) -> str:
@@ -224,65 +248,6 @@ def cause_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Tabl
     rows = tuple((CAUSE_NAMES[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
     note = "Each stage has one cause, the first that fits."
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
-
-
-def paired_table(pairs: Sequence[AgentPair]) -> Table:
-    """Build the table of differences between agents on the stages that both scored, with a verdict in words."""
-    p_name = p_heading(len(pairs))
-    columns = (
-        "Agents",
-        "SR difference [95% CI]",
-        p_name,
-        "SR verdict",
-        "SPL difference [95% CI]",
-        p_name,
-        "SPL verdict",
-        "n",
-        "only first / second",
-    )
-    rows = tuple(
-        (
-            f"{pair.b} minus {pair.a}",
-            *effect_cells(pair.sr),
-            verdict_words(pair.a, pair.b, pair.sr),
-            *effect_cells(pair.spl),
-            verdict_words(pair.a, pair.b, pair.spl),
-            str(pair.n),
-            f"{pair.num_only_b} / {pair.num_only_a}",
-        )
-        for pair in pairs
-    )
-    notes = (
-        f"Percentage points, on the same stages. {INTERVALS} {VERDICTS}",
-        "Only first / second: stages where only the first-named, or the second-named, agent succeeded.",
-    )
-    return Table("Paired differences", columns, rows, notes)
-
-
-def verdict_words(a: str, b: str, effect: PairedEffect) -> str:
-    """Return the verdict on `b` less `a` in a few words."""
-    return {
-        "equal": "equal on every stage",
-        "few": f"too few houses to tell ({effect.num_clusters})",
-        "tie": "a tie at this n",
-        "a": f"{a} is ahead",
-        "b": f"{b} is ahead",
-    }[effect.verdict]
-
-
-def effect_cells(effect: PairedEffect | None, scale: float = 100) -> tuple[str, str]:
-    """Return a difference with its interval, by default in percentage points, and its adjusted p."""
-    return (NONE, NONE) if effect is None else (points(effect, scale), p_words(effect.adjusted_p))
-
-
-def p_heading(num_pairs: int) -> str:
-    """Return the heading of a column of p, which is adjusted where there are several pairs."""
-    return "p (Holm)" if num_pairs > 1 else "p"
-
-
-def p_words(p: float) -> str:
-    """Return p as text: `0.012`; `<0.0001` where it is less."""
-    return "<0.0001" if p < 0.0001 else f"{p:.4f}" if p < 0.01 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 
 _CSV_COLUMNS = (
