@@ -17,7 +17,8 @@ from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedStage, load_run
 from evonav.report.tables.numbers import NONE, points
-from evonav.report.tables.table import Table, p_words
+from evonav.report.tables.table import Table
+from evonav.report.tables.verdicts import p_words
 from evonav.statistics import PairedEffect, paired_effect
 
 BASELINE = "stage-reset"

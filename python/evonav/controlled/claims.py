@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys
 from evonav.report.tables.numbers import points
-from evonav.report.tables.table import Table, p_words
+from evonav.report.tables.table import Table
+from evonav.report.tables.verdicts import p_words
 from evonav.statistics import LEVEL, MIN_CLUSTERS, PairedEffect
 
 MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")
