@@ -7,9 +7,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +39,7 @@ def run() -> str:
     alone_mb = None
     for num_workers, at_once in NUMBERS:
         num_episodes = num_workers * at_once
-        of_numbers = partial(command, num_workers=num_workers, at_once=at_once)
-        asked_per_s, cores, memory_mb = measured(of_numbers, num_episodes)
+        asked_per_s, cores, memory_mb = measured(num_workers, at_once)
         more = "" if alone_mb is None else f"{(memory_mb - alone_mb) / (num_episodes - 1):.0f} MB"
         alone_mb = memory_mb if alone_mb is None else alone_mb
         each = f"{1e3 * cores / asked_per_s:.0f} ms" if asked_per_s else ""
@@ -59,22 +57,15 @@ def reply(request: dict[str, Any]) -> MockReply:
     return {**answer, "hang_s": LATENCY_S}
 
 
-def measured(
-    command: Callable[[str, Path], list[str]], num_episodes: int, environment: Mapping[str, str] = os.environ
-) -> tuple[float, float, float]:
-    """Questions a second, cores in use, and memory of a run in the middle of it.
-
-    Args:
-        command: Starts the run, given the model's address and the folder of the run.
-        num_episodes: Number of episodes at once.
-        environment: Environment variables of the run.
-    """
+def measured(num_workers: int, at_once: int) -> tuple[float, float, float]:
+    """Questions a second, cores in use, and memory of a run in the middle of it."""
+    num_episodes = num_workers * at_once
     server = MockServer(reply)
     server.requests = None
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(server),
-        _running(command(server.url, Path(folder) / "run"), environment) as pid,
+        _running(command(server.url, Path(folder) / "run", num_workers, at_once)) as pid,
     ):
         began_s = time.monotonic()
         while len(_tree(pid)) <= num_episodes or server.num_requests < 2 * num_episodes:
@@ -92,19 +83,14 @@ def measured(
 
 def command(url: str, out: Path, num_workers: int, at_once: int) -> list[str]:
     """The run: five agents on the bundled tasks."""
-    how_many = ["--workers", str(num_workers), "--set", f"episodes_at_once={at_once}"]
-    return [sys.executable, "-m", "evonav", *asking(url, out), *how_many]
-
-
-def asking(url: str, out: Path, agents: str = AGENTS) -> list[str]:
-    """Arguments of a run that asks the model."""
     asked = ["--decision", "vlm", "--model", "mock", "--base-url", url, "--set", "decision.max_retries=0"]
-    return ["evaluate", "--agent", agents, *asked, "--out", str(out)]
+    how_many = ["--workers", str(num_workers), "--set", f"episodes_at_once={at_once}"]
+    return [sys.executable, "-m", "evonav", "evaluate", "--agent", AGENTS, *asked, "--out", str(out), *how_many]
 
 
 @contextmanager
-def _running(command: Sequence[str], environment: Mapping[str, str]) -> Iterator[int]:
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def _running(command: Sequence[str]) -> Iterator[int]:
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         yield process.pid
     finally:
