@@ -53,7 +53,7 @@ def set_value(table: dict[str, Any], key: str, value: Any, where: str = "the set
     """Set a value in a table; a key with dots reaches into tables in it.
 
     Args:
-        where: What the table is, in errors.
+        where: Name of the table in errors.
 
     Raises:
         InvalidArgumentError: The key reaches into what is no table.

@@ -60,7 +60,7 @@ def test_an_agent_that_resets_remembers_only_this_stage(name: str) -> None:
 
     _, rounds = rounds_of(new_agent(agent_factory(f"{name}@reset")), *moved_table_stages())
     before = {entry.entry_id for stage, belief, _, _ in rounds if stage == 1 for entry in belief.entries}
-    if name == "stage-reset":  # its ids begin anew
+    if name == "stage-reset":  # its ids begin again
         assert first_ids(f"{name}@reset") == first_ids(name)
     else:
         assert before

@@ -1,4 +1,4 @@
-"""A map that a view contradicts is made anew."""
+"""A map that a view contradicts is made again."""
 
 import numpy as np
 import pytest

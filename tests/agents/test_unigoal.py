@@ -204,7 +204,7 @@ def test_the_scene_graph_stays_and_the_goal_graph_goes():
     before, after = noted[1]
     assert len(before) >= 2
     assert after == before
-    # The goal is read once a stage, and anew in the next one.
+    # The goal is read once a stage, and again in the next one.
     assert [q.goal.stage for q in model.questions if q.kind == "goal-objects"] == [1, 2]
     categories = [{entry.details["category"] for entry in record.trace} for record in (first, second)]
     assert categories == [{"chair"}, {"bed"}]

@@ -73,7 +73,7 @@ def test_a_missing_file_of_a_repository_is_named(folder: Path) -> None:
 
 def test_a_damaged_lock_file_says_what_to_do(folder: Path) -> None:
     (folder / LOCK_NAME).write_text("[1]", encoding="utf-8")
-    with pytest.raises(PerceptionError, match="delete it, hashes are then taken anew"):
+    with pytest.raises(PerceptionError, match="delete it, hashes are then taken again"):
         fingerprint(SAM, folder)
 
 

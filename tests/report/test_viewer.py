@@ -171,7 +171,7 @@ def test_a_lost_memory_is_told() -> None:
     page = PageData()
     page.add_stage(ReplayedStage(record, None, (), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
     (stage,) = json.loads(page.text())["stages"]
-    told = "the agent failed in stage 1; its process was lost, and it began anew, without memory, in stage 2"
+    told = "the agent failed in stage 1; its process was lost, and it began again, without memory, in stage 2"
     assert stage["lost"] == told
 
 

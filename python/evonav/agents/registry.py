@@ -72,7 +72,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
     ),
     "vlfm": (
         "evonav.agents.value_maps.vlfm:Vlfm",
-        "rival: VLFM explores frontiers by a value map that each goal begins anew",
+        "rival: VLFM explores frontiers by a value map that each goal begins again",
     ),
     "onemap": (
         "evonav.agents.value_maps.onemap:OneMap",

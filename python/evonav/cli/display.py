@@ -151,7 +151,7 @@ def write_files(
 
     Args:
         texts: Content by the end of the name; a function takes the path.
-        plots: What all other files show.
+        plots: Kind of all other files.
         is_error: Print to standard error.
     """
     from evonav.parallel.folders import write_atomically

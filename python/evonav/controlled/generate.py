@@ -69,7 +69,7 @@ def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dic
     """Generate a task in every arm, by the arm's name.
 
     Where a goal cannot be one in some arm, or the house does not evolve where it must, goals and changes are drawn
-    anew for all arms: no arm is chosen for what became of another.
+    again for all arms: no arm is chosen for what became of another.
 
     Raises:
         TaskRejectedError: The house does not allow it; the message says why.

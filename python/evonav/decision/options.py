@@ -32,7 +32,7 @@ O = TypeVar("O", bound="AskedOptions")  # noqa: E741 - a type of options
 
 
 class PromptOptions(BaseModel):
-    """How a model is prompted and answers."""
+    """The options by which a model is prompted and answers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -46,7 +46,7 @@ class PromptOptions(BaseModel):
 
 
 class AskedOptions(PromptOptions):
-    """What all models have that are asked by prompts. `identity()` decides answers, `host()` how they are reached."""
+    """Options of all models that are asked by prompts. `identity()` decides answers, `host()` how they are reached."""
 
     noise: dict[str, float] | None = None
     """Rates of mistakes, by the names of `NoiseRates`."""
@@ -125,8 +125,10 @@ class VlmOptions(AskedOptions):
     max_cost_usd: float | None = None
     """Largest cost of the run; needs `price`."""
     relay: int | None = None
-    """Descriptor of a connection to a process that asks the model for this one, see `RelayedClient`; options on how the
-    model is reached are that process's."""
+    """Descriptor of a connection to a process that asks the model for this one, see `RelayedClient`.
+
+    Options on how the model is reached are that process's.
+    """
 
     @property
     def config(self) -> VlmConfig:

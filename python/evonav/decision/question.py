@@ -147,14 +147,14 @@ class YesNoQuestion(ClosedQuestion[bool]):
 
 
 Need = Literal["images", "colours"]
-"""What questions to a model hold beside words: views and crops, or the names of the colours in them."""
+"""Contents of questions besides words: views and crops, or the names of the colours in them."""
 
 
 class DecisionModel(ABC):
     """A model that answers questions. A subclass needs `answer`; the rest has defaults."""
 
     needs: frozenset[Need] = frozenset()
-    """What questions should hold; agents then ask the simulator for colours, which cost rendering time."""
+    """Contents that questions should have; agents then ask the simulator for colours, which cost rendering time."""
     goal_input: GoalInput = "text"
     """Form of the goal that agents who ask the model go by."""
     matcher: "Matcher | None" = None

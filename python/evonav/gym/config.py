@@ -80,7 +80,7 @@ class NavConfig(BaseModel):
     style: Style = SimulatorConfig().style
     """Way in which the colours of `rgb` are drawn: `outlined`, `plain` (the fastest) or `default`."""
     randomize: tuple[Randomized, ...] = ()
-    """Properties drawn anew for each episode: `materials`, `lighting` (seen in the style `default`) or `colors`."""
+    """Properties drawn again for each episode: `materials`, `lighting` (seen in the style `default`) or `colors`."""
     render_view: RenderView = "camera"
     """Picture that `render` gives: what the agent's `camera` sees, or a `map` of the house with path and target."""
     map_px: int = Field(400, ge=32, le=2048)

@@ -290,7 +290,7 @@ def _raise_open_files() -> None:
 def _without_main() -> Iterator[None]:
     """Hide the running script from a child that is started inside.
 
-    The child would run it again, and a script without `if __name__ == "__main__"` would start its own work anew.
+    The child would run it again, and a script without `if __name__ == "__main__"` would start its own work again.
     """
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")

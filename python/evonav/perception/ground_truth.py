@@ -63,7 +63,7 @@ class GroundTruthPerception:
 
         The mask of a door is its frame and its leaf, that of a window its frame and its pane.
 
-        Detections are numbered anew in every frame, in the order of their first pixel: neither numbers nor their
+        Detections are renumbered in every frame, in the order of their first pixel: neither numbers nor their
         order tell which instance a detection is.
 
         Args:

@@ -155,7 +155,7 @@ class NoisyPerception:
         phantoms = self._phantoms(frame, masks, view, len(labels))
         labels += [label for label, _, _ in phantoms]
         confidences += [confidence for _, confidence, _ in phantoms]
-        # Numbered anew, so that neither numbers nor order tell how a detection came about.
+        # Renumbered, so that neither numbers nor order tell how a detection came about.
         numbered, order = _core.number_instances(
             masks + 1,
             np.ones(len(labels), np.bool_),

@@ -290,7 +290,7 @@ def _read_lock(lock: Path) -> dict[str, dict[str, object]]:
         if not isinstance(entries, dict) or not all(isinstance(entry, dict) for entry in entries.values()):
             raise ValueError("not an object of objects")
     except (OSError, ValueError) as error:
-        raise PerceptionError(f"{lock} cannot be read ({error}): delete it, hashes are then taken anew") from error
+        raise PerceptionError(f"{lock} cannot be read ({error}): delete it, hashes are then taken again") from error
     return entries
 
 

@@ -358,7 +358,7 @@ def _lost_words(record: StageRecord) -> str:
         stages = ", ".join(map(str, record.failed_before))
         losses.append(f"the agent failed in stage{'s' if len(record.failed_before) > 1 else ''} {stages}")
     if record.memory_lost_at is not None:
-        losses.append(f"its process was lost, and it began anew, without memory, in stage {record.memory_lost_at}")
+        losses.append(f"its process was lost, and it began again, without memory, in stage {record.memory_lost_at}")
     return "; ".join(losses)
 
 

@@ -35,7 +35,7 @@ class Detections:
             """The masks as they are stored, perhaps as runs of equal pixels; the core takes both."""
 
     def taken(self, indices: Sequence[int]) -> "Detections":
-        """Return some of the detections, numbered anew in the order given; the pixels of the others become -1."""
+        """Return some of the detections, renumbered in the order given; the pixels of the others become -1."""
         taken = list(indices)
         if taken == list(range(len(self.labels))):
             return self

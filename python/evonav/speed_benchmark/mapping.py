@@ -36,7 +36,7 @@ class MappedView:
 
     house: str
     is_first: bool
-    """Whether the maps begin anew."""
+    """Whether the maps begin again."""
     pose: Pose
     depth_m: NDArray[np.float32]
     intrinsics: Intrinsics
@@ -81,7 +81,7 @@ class Volume(Protocol):
     def __init__(self, views: list[MappedView]) -> None: ...
 
     def prepare(self, number: int) -> None:
-        """Prepare what is not timed of a view, and begin anew in a new house."""
+        """Prepare what is not timed of a view, and begin again in a new house."""
 
     def __call__(self, number: int, /) -> object:
         """Add the view."""

@@ -1,7 +1,7 @@
-"""Score recorded actions again: executed anew, they must give the same records, byte for byte.
+"""Score recorded actions again: executed again, they must give the same records, byte for byte.
 
 No agent runs. A stand-in answers with the recorded actions, diagnostics and entries. The evaluator computes poses,
-paths, visibility, staleness, distances, SPL and success anew.
+paths, visibility, staleness, distances, SPL and success again.
 """
 
 import json

@@ -110,7 +110,7 @@ class Evolution(Record):
     crowded_ids: tuple[Id, ...] = ()
     """Furniture placed without the free floor that ProcTHOR leaves around it."""
     rearranged_ids: tuple[Id, ...] = ()
-    """Furniture of groups that fitted nowhere unchanged, arranged anew by ProcTHOR's definition of the group."""
+    """Furniture of groups that fitted nowhere unchanged, rearranged by ProcTHOR's definition of the group."""
     additions: tuple[ObjectRecord, ...] = ()
     """Added objects; like all fields below, empty unless an extension is on."""
     removals: tuple[ObjectRecord, ...] = ()

@@ -56,7 +56,7 @@ class DualMap(FrontierUpdate):
         return super()._new_navigator()
 
     def begin_stage(self, goal: Goal) -> None:
-        """Take a new goal: the local map begins anew, and stable furniture is in the abstract one."""
+        """Take a new goal: the local map begins again, and stable furniture is in the abstract one."""
         self._leave(self._navigator.objects.entries)
         super().begin_stage(goal)
         self._failed: list[int] = []

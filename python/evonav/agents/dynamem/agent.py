@@ -56,7 +56,7 @@ class DynaMem(OwnExploration):
         return False
 
     def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
-        """Stop if the look on arrival left the entry's points there; else decide anew."""
+        """Stop if the look on arrival left the entry's points there; else decide again."""
         if self._navigator.objects.entry(entry_id) is None:
             return None
         return self._stop("verified", entry_id)

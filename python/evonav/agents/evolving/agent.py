@@ -64,7 +64,7 @@ class Evolving(FailThenUpdate):
         self._belief = Belief({}, 1.0)
 
     def _after_look(self, observation: Observation) -> None:
-        """Take in what this round's views show of all sites; the next site is chosen anew."""
+        """Take in what this round's views show of all sites; the next site is chosen again."""
         navigator = self._navigator
         navigator.target = None
         denied = {navigator.views.resolve(one) for one in self._denied}

@@ -91,7 +91,7 @@ class FrontierUpdate(NavigatorAgent):
         return None
 
     def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
-        """Act at the reached place of an entry, after a look; `None` to decide anew."""
+        """Act at the reached place of an entry, after a look; `None` to decide again."""
         return self._stop("verified", entry_id)
 
     def _decide(self, observation: Observation) -> AgentAction:

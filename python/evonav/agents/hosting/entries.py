@@ -21,7 +21,7 @@ class Entries:
         """The entries that were read last, by their JSON."""
 
     def write(self, entries: Sequence[object]) -> bytes:
-        """Return entries as JSON in one line; what was written before is not written anew.
+        """Return entries as JSON in one line; what was written before is not written again.
 
         Raises:
             InvalidArgumentError: An entry holds what JSON cannot, or they are too large together.

@@ -131,7 +131,7 @@ class Proactive(NavigatorAgent):
         return last.is_reached or math.dist(here, last.face_m) < self.config.stop_within_m
 
     def _may_have_missed(self, chosen: Option | None, observation: Observation) -> bool:
-        """Return whether nothing is left to go to but what was denied, while there is time to search all anew."""
+        """Return whether nothing is left to go to but what was denied, while there is time to search all again."""
         if observation.num_rounds_left <= self.config.anew_rounds or chosen is None:
             return observation.num_rounds_left > self.config.anew_rounds
         return chosen.kind == "object" and self._is_final and (chosen.key in self._belief.factors or chosen.gain <= 0.0)

@@ -60,7 +60,7 @@ class ProactiveConfig:
     last_rounds: int = 5
     """Rounds before the end from which the agent goes to where the target most likely is within reach."""
     anew_rounds: int = 25
-    """Rounds that must be left to search the house anew when nothing else is left."""
+    """Rounds that must be left to search the house again when nothing else is left."""
     min_radius_m: float = 1.0
     """Distance within which the agent goes to look for even the smallest things."""
     search_radius_m: float = 2.5

@@ -64,7 +64,7 @@ class PresenceBelief:
         """Let things have moved.
 
         Args:
-            room_of: Room of each entry; rooms are numbered anew at each stage.
+            room_of: Room of each entry; rooms are renumbered at each stage.
             visited: Rooms in which the agent was in the last stage.
             here: The agent's room, which does not change; `NO_ROOM` if it is in none.
         """
@@ -134,7 +134,7 @@ class PresenceBelief:
         return True
 
     def update(self) -> None:
-        """Compute the belief in all rooms and entries anew, from all evidence of the stage."""
+        """Compute the belief in all rooms and entries again, from all evidence of the stage."""
         ratios, moved = self._room_ratios()
         prior = self._change_prior
         none = 1.0 - math.fsum(prior.values())

@@ -31,7 +31,7 @@ class ThreeDMemConfig:
     max_classes: int = 10
     """Largest number of classes that pass the prefilter."""
     recluster_reach_m: float = RECLUSTER_REACH_M
-    """Entries nearer than this are clustered anew in each round."""
+    """Entries nearer than this are clustered again in each round."""
     num_tries: int = 3
     """Number of tries before a question without a valid answer counts as failed."""
 

@@ -9,7 +9,7 @@ from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import StoredView, ViewStore
 
 RECLUSTER_REACH_M = 4.0
-"""Entries nearer to the agent than this are clustered anew (3D-Mem: the 3.5 m of its detections and 0.5 m)."""
+"""Entries nearer to the agent than this are clustered again (3D-Mem: the 3.5 m of its detections and 0.5 m)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class SnapshotMemory:
         """Create a memory without snapshots.
 
         Args:
-            reach_m: Entries nearer to the agent than this are clustered anew at each update.
+            reach_m: Entries nearer to the agent than this are clustered again at each update.
         """
         self.reach_m = reach_m
         self.snapshots: list[Snapshot] = []

@@ -135,7 +135,7 @@ class UniGoal:
         return planner.step(pose, target_m, "exploration")
 
     def _exploration_target(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> Point2 | None:
-        """Return a frontier, chosen anew when due, after another match of the graphs.
+        """Return a frontier, chosen again when due, after another match of the graphs.
 
         Without a frontier left, it is a random explored place: the house may look different there by now.
         """

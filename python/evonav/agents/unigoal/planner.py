@@ -56,7 +56,7 @@ class PlannerConfig:
     frontier_span_m: float = 10.0
     """Ways longer than `min_frontier_m` by this and more count alike."""
     replan_steps: int = 40
-    """Steps after which an exploration target is chosen anew ..."""
+    """Steps after which an exploration target is chosen again ..."""
     reached_m: float = 0.5
     """... or when it is this near."""
     collision_m: float = 0.20

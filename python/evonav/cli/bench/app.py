@@ -28,7 +28,7 @@ SECTIONS = {
     "agents": "agents",
     "generation": "generation",
 }
-"""What `evonav bench speed` measures, and the modules of `evonav.speed_benchmark` that do."""
+"""Sections of `evonav bench speed`, each with its module of `evonav.speed_benchmark`."""
 
 
 def _run(

@@ -26,7 +26,7 @@ FLAGS: Mapping[str, str] = {
 PARTS = {"SimulatorSettings": "simulator.", "PerceptionSettings": "perception.", "DecisionSettings": "decision."}
 """Beginnings of keys by the settings that have them."""
 LIST = "help"
-"""What `--set` takes to list the keys."""
+"""Value of `--set` that lists the keys."""
 
 Simulator = Annotated[
     str,
@@ -119,7 +119,7 @@ def set_option(*prefixes: str) -> Any:  # noqa: ANN401 - typer's
 Set = Annotated[list[str] | None, set_option()]
 POOL_KEYS = ("engine", "ray_address")
 PoolSet = Annotated[list[str] | None, set_option(*POOL_KEYS)]
-"""Of commands whose workers may be Ray actors."""
+"""Options of commands whose workers may be Ray actors."""
 
 
 def settings_from(

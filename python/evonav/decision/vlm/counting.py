@@ -27,7 +27,7 @@ class Counting(DecisionModel):
             client: Client that estimates and asks nothing.
             ledger: Ledger of requests and tokens, a row a kind of question.
             name: Name of the episode, which precedes the kind.
-            options: How the model that is not asked would be prompted.
+            options: The options by which the model that is not asked would be prompted.
         """
         self.needs = frozenset({"images"}) if options.images else frozenset()
         self.goal_input = options.goal_input

@@ -173,7 +173,7 @@ class StalenessTracker:
         """True if the target is in a view of this round, at any distance."""
 
     def _enter(self, objects: Sequence[SceneObject], relocations: Sequence[Relocation]) -> None:
-        """Take in a house and the moves that led to it; an object that moves again is to be found anew."""
+        """Take in a house and the moves that led to it; an object that moves again is to be found again."""
         self._objects = objects
         self.bodies: dict[str, list[SceneObject]] = {}
         """The bodies by category."""

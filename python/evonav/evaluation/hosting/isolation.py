@@ -60,7 +60,7 @@ _TOKENS = ("token", "stored_tokens")
 
 @dataclass(frozen=True, slots=True)
 class AgentHosting:
-    """How agents are run: what a user sets of their processes. It is not part of a run's identity."""
+    """Options of agents' processes that a user sets. They are not part of a run's identity."""
 
     isolation: Isolation | Literal["debugger"] = "process"
     """`none` and `debugger` contain only exceptions; `debugger` also opens Python's where one is raised (a terminal).
@@ -80,7 +80,7 @@ class AgentHosting:
 
 @dataclass(frozen=True, slots=True)
 class ProcessSetup:
-    """What a run sets of its agents' processes."""
+    """Options of agents' processes that only a run sets."""
 
     log: str | None = None
     """File to which the output of agents is appended; default: the evaluator's standard error."""
@@ -95,7 +95,7 @@ class ProcessSetup:
 
 
 NO_SETUP = ProcessSetup()
-"""That of a process which no run starts."""
+"""Setup of a process that no run starts."""
 
 
 def usual_isolation() -> Isolation:

@@ -183,7 +183,7 @@ class _StoredMetrics:
     counters: dict[str, int]
     """The agent's cumulative counters at the end of the stage."""
     is_fresh: bool
-    """The agent began anew in this stage, and its counters with it."""
+    """The agent began again in this stage, and its counters with it."""
 
 
 def encode_metrics(record: StageRecord) -> str:

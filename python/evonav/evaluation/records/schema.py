@@ -249,7 +249,7 @@ class StageRecord(Record):
     failed_before: tuple[Whole, ...] = ()
     """Earlier stages of the episode in which the agent failed: it may know less than otherwise."""
     memory_lost_at: Whole | None = None
-    """The last stage, up to this one, that the agent began anew, without memory: its process was lost before."""
+    """The last stage, up to this one, that the agent began again, without memory: its process was lost before."""
     goal: GoalRecord
     target: TargetRecord
     transition: TransitionRecord

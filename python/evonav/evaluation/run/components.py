@@ -171,7 +171,7 @@ def check_agent_name(
     """Check that workers can make an agent of this name.
 
     Args:
-        hosting: Where agents run: one that is not built in is imported there. Default: in this process.
+        hosting: The place where agents run: one that is not built in is imported there. Default: in this process.
         fork_server: Server that forks the process; default: a fresh one is started.
 
     Raises:

@@ -68,7 +68,7 @@ class Evaluation:
     jobs: list[EpisodeJob] = field(init=False, default_factory=list)
     """Episodes with a stage that has no record, from `begin` on."""
     setup: WorkerSetup = field(init=False)
-    """What workers are given of it, from `begin` on."""
+    """The part of it that workers are given, from `begin` on."""
     summaries: list[AgentSummary] | None = field(init=False, default=None)
     """A summary of each agent, once all jobs have ended."""
     _states: dict[tuple[str, str, int], EndState] = field(init=False, default_factory=dict)
@@ -82,7 +82,7 @@ class Evaluation:
 
     @property
     def identity(self) -> dict[str, Any]:
-        """What a folder must say of a run that is resumed in it."""
+        """Identity that a folder must have for a run to be resumed in it."""
         return {
             "evonav": __version__,
             "seed": self.config.seed,

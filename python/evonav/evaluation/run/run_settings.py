@@ -89,7 +89,7 @@ def unknown_key(model: type[Settings], key: str, known: Sequence[str], hint: str
     """Return the error of a key that there is not, with the nearest one that there is.
 
     Args:
-        hint: What it says if no key is near; default: the keys that there are.
+        hint: End of the message if no key is near; default: the keys that there are.
     """
     last = key.rpartition(".")[2]
     near = [one for one in known if one.rpartition(".")[2] == last] or get_close_matches(key, known, 1)

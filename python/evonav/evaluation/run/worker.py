@@ -54,13 +54,13 @@ END_TIMEOUT_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class WorkerSetup:
-    """What the episodes of a run need beside the task and the agent."""
+    """The things that episodes of a run need besides the task and the agent."""
 
     backend: Backend
     protocol: ProtocolConfig
     hosting: AgentHosting
     processes: ProcessSetup = NO_SETUP
-    """Of agents' processes, if they have some."""
+    """Setup of agents' processes, if they have some."""
     num_retries: int = 0
     """Number of retries of a stage."""
 
@@ -283,7 +283,7 @@ class EpisodeWork:
         jobs_at_once, _, setups = settings.partition("\n")
         self._setups = SETUPS.validate_json(setups)
         self._contexts: dict[int, WorkerContext] = {}
-        """By the number of their runs; the one that was used last comes last."""
+        """Contexts by the number of their runs; the one that was used last comes last."""
         # A single episode runs on the main thread, where a signal may come at any moment: it takes no turns.
         self._turns = Turns() if int(jobs_at_once) > 1 else None
 

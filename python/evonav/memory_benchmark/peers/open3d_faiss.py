@@ -35,7 +35,7 @@ class Cloud:
     label: str
     confidence: float = 1.0
     box: Any = None
-    """`open3d.geometry.OrientedBoundingBox`, which the originals keep and compute anew with every change."""
+    """`open3d.geometry.OrientedBoundingBox`, which the originals keep and compute again with every change."""
 
     @property
     def points_m(self) -> NDArray[np.float32]:

@@ -106,7 +106,7 @@ class NoiseConfig:
     """>= 0: what is a view's own in a feature, over what it is in CLIP's."""
 
     persistence: float = 0.0
-    """0..1: correlation of an object's errors in two views; 0: each view errs anew."""
+    """0..1: correlation of an object's errors in two views; 0: each view errs independently."""
     persistence_scope: Scope = "episode"
     """Time for which it lasts: `stage` or `episode`."""
 

@@ -118,5 +118,5 @@ def _lists(evolution: Evolution) -> list[tuple[str, tuple[str, ...]]]:
         ("found no place", evolution.unmoved_ids),
         ("would have cut something off", evolution.blocking_ids),
         ("stand closer than usual", evolution.crowded_ids),
-        ("arranged anew", evolution.rearranged_ids),
+        ("rearranged", evolution.rearranged_ids),
     ]

@@ -1,6 +1,6 @@
 """Domain randomisation: random materials, colours and light.
 
-AI2-THOR draws anew in every session. Here the draws depend on the scene's name, on `SetRandomSeed`, and on the number
+AI2-THOR draws again in every session. Here the draws depend on the scene's name, on `SetRandomSeed`, and on the number
 of such actions before, so that a session that is run again looks the same. A `seed` of the action itself overrides
 that.
 """

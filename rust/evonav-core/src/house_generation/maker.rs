@@ -26,7 +26,7 @@ use crate::{
 };
 
 /// Largest number of times that objects with problems are taken out of a house, before it is
-/// furnished anew.
+/// furnished again.
 const MAX_REMOVALS: usize = 4;
 /// Height from which an object that is to lie is dropped, and its least and largest tilt
 /// (`small_objects._set_drop_heights` of the package `procthor`).
@@ -64,7 +64,7 @@ impl HouseMaker {
     ///
     /// Every room can be entered, every open door can be passed, no object is in a wall or in
     /// another one, and none hangs in the air. Floor plans and furniture that do not satisfy this
-    /// are drawn anew, from streams of their own.
+    /// are drawn again, from streams of their own.
     ///
     /// # Errors
     /// [`Error::Simulation`] if no house passes the checks; then the parameters ask for rooms

@@ -5,7 +5,7 @@
 //! from which the parameters are taken; the code is our own. A room spec is drawn, its rooms grow
 //! on a grid (`structure`), doors connect them (`doors`), furniture is placed in free rectangles of
 //! the floor (`interior`), windows, televisions and paintings on free walls (`hanging`), and small
-//! objects on furniture (`small_objects`). A house that fails the checks (`acceptance`) is drawn anew.
+//! objects on furniture (`small_objects`). A house that fails the checks (`acceptance`) is drawn again.
 
 mod acceptance;
 mod appearance;

@@ -48,7 +48,7 @@ pub struct Snapshot {
 /// Update snapshots by co-visibility clustering.
 ///
 /// Objects in no snapshot, objects near the agent, and all objects that share a snapshot with one
-/// of them are clustered anew; other snapshots stay. Clusters are found by bisection: the group
+/// of them are clustered again; other snapshots stay. Clusters are found by bisection: the group
 /// with the most objects (of equals the older one) becomes a cluster if some frame shows all of it;
 /// otherwise 2-means splits it. Of several such frames, one that was chosen before in this call is
 /// preferred, then the one that shows the most objects, then the one with the largest sum of
@@ -60,7 +60,7 @@ pub struct Snapshot {
 /// * `snapshots` - the previous snapshots; objects that are no longer remembered, or not in their
 ///   frame, are removed.
 /// * `agent_m` - position of the agent, `[x, z]`, world frame.
-/// * `reach_m` - distance within which objects are clustered anew (3D-Mem: 4.0 m).
+/// * `reach_m` - distance within which objects are clustered again (3D-Mem: 4.0 m).
 ///
 /// # Returns
 /// Snapshots by ascending frame. Every object that some frame shows is in exactly one of them.

@@ -122,7 +122,7 @@ impl EmbeddedSimulator {
     }
 
     /// Apply a change; return the simulator of the changed house in the same look. Only moved
-    /// objects are built anew.
+    /// objects are built again.
     ///
     /// # Errors
     /// Those of [`House::apply`] and [`Self::new`].

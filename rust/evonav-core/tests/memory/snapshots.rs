@@ -18,7 +18,7 @@ fn ids(frame: &Frame) -> Set {
     frame.seen.iter().map(|seen| seen.0).collect()
 }
 
-/// The procedure in its own words, on sets: what to cluster anew first, then the bisection.
+/// The procedure in its own words, on sets: what to cluster again first, then the bisection.
 fn update_naive(
     objects: &[Located],
     frames: &[Frame],

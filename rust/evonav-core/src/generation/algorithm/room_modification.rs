@@ -38,7 +38,7 @@ pub struct Modification {
     pub layout: Layout,
     /// Index of the object that `SALIENT_OBJECT` moved.
     pub salient: Option<usize>,
-    /// Objects that were to move but for which no valid place was found, with the reason.
+    /// Objects that were to move and found no valid place, with the reason.
     pub unmoved: Vec<(usize, UnmovedReason)>,
     /// Furniture at places that ProcTHOR's rules do not allow, or with less floor around it.
     pub crowded: Vec<usize>,

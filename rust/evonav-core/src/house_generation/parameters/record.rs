@@ -35,7 +35,7 @@ pub struct HouseParameters {
     pub small_objects: SmallObjects,
     /// Number of floor plans that are drawn before a house is given up; ours.
     pub max_structures: usize,
-    /// Number of times that a floor plan is furnished anew before another one is drawn; ours.
+    /// Number of times that a floor plan is furnished again before another one is drawn; ours.
     pub max_furnishings: usize,
     /// Least number of places of the 0.25 m grid that the agent must reach in each room
     /// (`house.House.validate`).

@@ -188,7 +188,7 @@ impl Scene {
     /// * `house` - the house after the move; its structure must be this scene's.
     /// * `catalogue`, `unknown` - the same with which the scene was built.
     /// * `moved` - indices in `house.objects` of all objects whose pose or parent changed. Objects
-    ///   that stand on them and objects that this scene does not contain are built anew too.
+    ///   that stand on them and objects that this scene does not contain are built again too.
     ///
     /// # Errors
     /// Those of [`Scene::build`].

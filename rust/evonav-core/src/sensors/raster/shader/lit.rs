@@ -118,7 +118,7 @@ impl Lit {
     }
 }
 
-/// Colours all rows, but for the edges between faces.
+/// Colours all rows except for the edges between faces.
 struct Rows<'a> {
     lit: &'a mut Lit,
     mesh: &'a SceneMesh,
