@@ -2,11 +2,8 @@
 
 import tempfile
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
-
-from pydantic import ValidationError
 
 from evonav.agents.agent import Agent
 from evonav.agents.hosting.serving import refuse_in_agent_process
@@ -19,7 +16,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, check_decision
 from evonav.evaluation.run.evaluate import evaluate_all
 from evonav.evaluation.run.run import Evaluation
-from evonav.evaluation.run.run_settings import DecisionResources, RunSettings, Settings, SpendingSettings
+from evonav.evaluation.run.run_settings import DecisionResources, RunSettings, Settings, SpendingSettings, settings_of
 from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
 
 AgentSource = str | Callable[..., Agent]
@@ -151,12 +148,6 @@ def read_settings(
     if not isinstance(values, Mapping):
         raise InvalidArgumentError(f"{name} = {value!r}: expected a word, or a dictionary of {model.__name__}'s fields")
     try:
-        return model.model_validate(dict(values))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = str(first["loc"][0])
-        if first["type"] == "extra_forbidden":
-            near = get_close_matches(field, model.model_fields, 1)
-            hint = f"did you mean `{near[0]}`?" if near else f"there are {', '.join(model.model_fields)}"
-            raise InvalidArgumentError(f"{name} has no option `{field}`; {hint}") from None
-        raise InvalidArgumentError(f"{name}: {field} = {first['input']!r}: {first['msg']}") from None
+        return settings_of(model, values)
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{name}: {error}") from None
