@@ -222,7 +222,7 @@ def test_pictures_are_asked_for_by_id(pairs, tmp_path):
     runner = CliRunner()
     out = tmp_path / "p.svg"
     done = runner.invoke(
-        app, ["controlled", "picture", str(pairs), "task-3", "--out", str(out)], catch_exceptions=False
+        app, ["controlled", "picture", str(pairs), "--task", "task-3", "--out", str(out)], catch_exceptions=False
     )
     assert done.exit_code == 0
     assert "task-3" in out.read_text(encoding="utf-8")
