@@ -12,8 +12,8 @@ from evonav.drawing.files import write_picture
 from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.drawing.layers import Box, boxes_layer, cells_layer, path_layer, points_layer, pose_layer
 from evonav.drawing.plan import plan_of
-from evonav.drawing.style import file_css
-from evonav.drawing.svg import Point, escape
+from evonav.drawing.style import map_file
+from evonav.drawing.svg import Point
 from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
 
@@ -40,12 +40,8 @@ class Picture:
         width = min(float(WIDTH_PX), MAX_HEIGHT_PX * frame.width / frame.height)
         self.size_px = (round(width), round(width * frame.height / frame.width))
         self._title = title
-        self.svg = (
-            f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="{frame.view_box}" '
-            f'width="{self.size_px[0]}" height="{self.size_px[1]}" role="img"><title>{escape(title)}</title>'
-            f"<style>{file_css(_RULES)}</style>"
-            f'<rect class="page" x="{frame.left}" y="{frame.top}" width="100%" height="100%"/>{drawing}</svg>\n'
-        )
+        page = f'<rect class="page" x="{frame.left}" y="{frame.top}" width="100%" height="100%"/>'
+        self.svg = map_file(title, self.size_px, page + drawing, view_box=frame.view_box, more_css=_RULES)
 
     def save(self, path: str | Path) -> Path:
         """Write the picture.

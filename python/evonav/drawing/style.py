@@ -1,9 +1,11 @@
-"""Provide the colours and fonts of maps, light and dark, as CSS."""
+"""Provide the colours and fonts of maps, light and dark, as CSS, and the SVG files that have them."""
 
 import re
 from importlib.resources import files
 
 from markupsafe import Markup
+
+from evonav.drawing.svg import escape
 
 
 def map_css() -> Markup:
@@ -26,6 +28,19 @@ def light_css(more: str = "") -> str:
     """Return the colours of a light page written out, with further rules that may have custom properties, too."""
     light, _, rules = str(map_css()).split("/* --- */")
     return _inlined(rules + more, light + more)
+
+
+def map_file(
+    title: str, size_px: tuple[int, int], content: str, *, view_box: str = "", description: str = "", more_css: str = ""
+) -> str:
+    """Return a drawing as an SVG file of its own; `view_box` is the part that is shown, by default a unit a pixel."""
+    width_px, height_px = size_px
+    said = f"<desc>{escape(description)}</desc>" if description else ""
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="{view_box or f"0 0 {width_px} {height_px}"}" '
+        f'width="{width_px}" height="{height_px}" role="img"><title>{escape(title)}</title>{said}'
+        f"<style>{file_css(more_css)}</style>{content}</svg>\n"
+    )
 
 
 def _inlined(rules: str, properties: str) -> str:

@@ -49,7 +49,6 @@ def write_recording(
 
     Args:
         maps: Floor plans of the task, by stage.
-        path: `.rrd` file.
         success_radius_m: Radius of the ring around the target.
 
     Raises:

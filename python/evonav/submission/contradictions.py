@@ -41,12 +41,7 @@ def target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:
 
 
 def change_findings(record: StageRecord, stage: StageSpec, protocol: ProtocolConfig) -> Iterator[str]:
-    """Yield where a record's change during the stage is not the task's, or cannot have taken place as recorded.
-
-    Args:
-        stage: The task's stage.
-        protocol: The run's protocol.
-    """
+    """Yield where a record's change during the stage is not the task's, or cannot have taken place as recorded."""
     found, change = record.during, stage.change
     if found is None or change is None:
         if found is not None or change is not None:
@@ -88,7 +83,6 @@ def path_findings(record: StageRecord, before: StageRecord | None, protocol: Pro
 
     Args:
         before: The record of the stage before, at whose end this one has to begin; `None` for stage 1.
-        protocol: The run's protocol.
     """
     if record.state is EndState.GUIDED:
         return  # a guided stage has no score

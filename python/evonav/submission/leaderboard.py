@@ -108,7 +108,6 @@ def rank(
     """Verify packed runs, and sort their agents into tables.
 
     Args:
-        files: Packed runs.
         task_sets: Sets of tasks. An entry has all tasks of one of them.
         scores_only: Compute scores from the recorded paths instead of executing the actions again.
         num_workers: Number of processes; 0 runs in this one.

@@ -32,9 +32,6 @@ _SPLITS = ("relocated", "not_relocated")
 def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
     """Write the page, and return its path.
 
-    Args:
-        board: Verified runs.
-
     Raises:
         StoreError: It cannot be written.
     """

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.drawing.floor_plan import Frame
-from evonav.drawing.style import file_css
+from evonav.drawing.style import map_file
 from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.report.maps.legend import legend_row
@@ -15,12 +15,9 @@ def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, 
     legend, legend_px = legend_row(width_px - 2 * margin_px)
     height_px = top_px + legend_px + foot_px
     below = f'<g transform="translate({margin_px} {top_px + legend_px})">{foot}</g>' if foot else ""
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" '
-        f'width="{width_px}" height="{height_px}" role="img"><title>{escape(title)}</title><style>{file_css()}</style>'
-        f'<rect class="page" width="100%" height="100%" rx="10"/>{content}'
-        f'<g transform="translate({margin_px} {top_px})">{legend}</g>{below}</svg>\n'
-    )
+    page = f'<rect class="page" width="100%" height="100%" rx="10"/>{content}'
+    key = f'<g transform="translate({margin_px} {top_px})">{legend}</g>'
+    return map_file(title, (width_px, height_px), page + key + below)
 
 
 def panel(

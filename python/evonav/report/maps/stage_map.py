@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
-from evonav.drawing.style import file_css
-from evonav.drawing.svg import escape, slug
+from evonav.drawing.style import map_file
+from evonav.drawing.svg import slug
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.report.maps.trajectory import change, course
@@ -26,12 +26,8 @@ def stage_svg(
     height_px = round(STAGE_WIDTH_PX * frame.height / frame.width)
     drawing = stage_drawing(record, maps, frame, success_radius_m, has_item_names=True)
     name = f"{record.task_id}, stage {record.stage}, {record.agent}"
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="{frame.view_box}" '
-        f'width="{STAGE_WIDTH_PX}" height="{height_px}" role="img"><title>{escape(name)}</title>'
-        f"<desc>{escape(record.goal.instruction)} {escape(sentence(record))}</desc><style>{file_css()}</style>"
-        f"{drawing}</svg>\n"
-    )
+    said = f"{record.goal.instruction} {sentence(record)}"
+    return map_file(name, (STAGE_WIDTH_PX, height_px), drawing, view_box=frame.view_box, description=said)
 
 
 def map_name(record: StageRecord) -> str:

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from evonav.counted import counted
 from evonav.drawing.files import check_picture, write_picture
 from evonav.drawing.floor_plan import Frame
-from evonav.drawing.style import file_css, map_css
+from evonav.drawing.style import map_css, map_file
 from evonav.drawing.svg import escape, join, slug
 from evonav.parallel.folders import write_atomically
 from evonav.report.maps.legend import TASK_ENTRIES, legend
@@ -128,14 +128,10 @@ def stage_svg(drawing: TaskDrawing, stage: int) -> str:
             f'viewBox="{frame.view_box}">{content}</svg>'
         )
         left_px += width_px
-    height_px = CAPTION_PX + PLAN_HEIGHT_PX
+    name = f"{drawing.task.task_id}, stage {stage}"
     changed = change_sentence(drawing.maps[stage], drawing.task.oracle(stage).evolution)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {left_px} {height_px}" width="{left_px}" '
-        f'height="{height_px}" role="img"><title>{escape(drawing.task.task_id)}, stage {stage}</title>'
-        f"<desc>{escape(changed)}</desc><style>{file_css()}</style><defs>{definitions(drawing)}</defs>"
-        f'<rect class="page" width="100%" height="100%"/>{join(panels)}</svg>\n'
-    )
+    page = f'<defs>{definitions(drawing)}</defs><rect class="page" width="100%" height="100%"/>{join(panels)}'
+    return map_file(name, (left_px, CAPTION_PX + PLAN_HEIGHT_PX), page, description=changed)
 
 
 def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None = None) -> str:
