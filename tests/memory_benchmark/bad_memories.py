@@ -8,7 +8,7 @@ from typing import Any
 
 from hand_made import entry
 
-from evonav.memory_benchmark.protocol import MemoryEntry, Place
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry
 
 GOOD = entry(1, 1.0)
 
@@ -28,8 +28,8 @@ class Good:
     def entries(self) -> Sequence[MemoryEntry]:
         return [GOOD]
 
-    def locate(self, text: str, k: int) -> Sequence[Place]:
-        return [Place((1.0, 1.0, 0.0), 1.0)]
+    def locate(self, text: str, k: int) -> Sequence[FoundPlace]:
+        return [FoundPlace((1.0, 1.0, 0.0), 1.0)]
 
     def num_bytes(self) -> int:
         return 1000

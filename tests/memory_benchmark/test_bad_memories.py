@@ -11,7 +11,7 @@ from hand_made import HandMade, Shot, body, entry
 
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import MemoryFailedError, read_entries, read_num_bytes, read_places
-from evonav.memory_benchmark.protocol import Place
+from evonav.memory_benchmark.protocol import FoundPlace
 from evonav.memory_benchmark.run import NO_DETECTIONS, MeasureSettings, measure, measure_all
 
 FILE = Path(bad_memories.__file__)
@@ -169,15 +169,15 @@ def test_answers_that_are_no_entries(answer: object) -> None:
 
 
 def test_places_and_sizes_are_checked() -> None:
-    place = Place((1.0, 2.0, 3.0), 0.5)
+    place = FoundPlace((1.0, 2.0, 3.0), 0.5)
     assert read_places([place], 1) == [place]
-    best = Place((0.0, 0.0, 0.0), 0.9)
+    best = FoundPlace((0.0, 0.0, 0.0), 0.9)
     assert read_places([place, best], 2) == [best, place]
     for answer, message in [
         ([place, place], "2 places, must be at most 1"),
-        ([3], "must be a Place"),
-        ([Place((1.0, float("nan"), 0.0), 1.0)], "must be finite"),
-        (None, "must be a sequence of Place"),
+        ([3], "must be a FoundPlace"),
+        ([FoundPlace((1.0, float("nan"), 0.0), 1.0)], "must be finite"),
+        (None, "must be a sequence of FoundPlace"),
     ]:
         with pytest.raises(MemoryFailedError, match=message):
             read_places(answer, 1)

@@ -25,7 +25,7 @@ from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
 from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
 from evonav.memory_benchmark.metrics.staleness import kaplan_meier
 from evonav.memory_benchmark.metrics.updates import BeliefSnapshot, ChangeCounts, change_counts
-from evonav.memory_benchmark.protocol import Place
+from evonav.memory_benchmark.protocol import FoundPlace
 from evonav.world.simulator import SceneObject
 
 COORDINATE = st.integers(0, 12).map(lambda step: step * 0.1 + 0.013)
@@ -146,7 +146,7 @@ def test_belief_scores() -> None:
 
 def test_rank_of_the_true_place() -> None:
     mug = body("mug", 1.0)
-    far, near = Place((5.0, 1.0, 0.0), 0.9), Place((2.0, 1.0, 0.0), 0.1)  # 0.9 m from the box
+    far, near = FoundPlace((5.0, 1.0, 0.0), 0.9), FoundPlace((2.0, 1.0, 0.0), 0.1)  # 0.9 m from the box
     assert true_rank([mug], [far, near]) == 2
     assert true_rank([mug], [far]) is None
     queries = Queries()

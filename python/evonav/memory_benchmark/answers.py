@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from evonav.counted import counted
 from evonav.errors import EvonavError
-from evonav.memory_benchmark.protocol import MemoryEntry, Place
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry
 
 MAX_ENTRIES = 100_000
 """Largest number of entries of an answer."""
@@ -138,14 +138,14 @@ def checked(entries: CheckedEntries) -> CheckedEntries:
     return entries
 
 
-def read_places(answer: object, k: int) -> list[Place]:
+def read_places(answer: object, k: int) -> list[FoundPlace]:
     """Return a memory's answer to `locate`, by falling score; of equal scores, the first one comes first.
 
     Raises:
         MemoryFailedError: It is no sequence of at most `k` finite places.
     """
     if not isinstance(answer, Sequence) or isinstance(answer, str | bytes):
-        raise _wrong("locate()", answer, "must be a sequence of Place")
+        raise _wrong("locate()", answer, "must be a sequence of FoundPlace")
     if len(answer) > k:
         raise MemoryFailedError("answer", f"locate(): {len(answer)} places, must be at most {k}")
     places = []
@@ -154,10 +154,10 @@ def read_places(answer: object, k: int) -> list[Place]:
             x_m, y_m, z_m = (float(coordinate) for coordinate in place.position_m)
             score = float(place.score)
         except (AttributeError, TypeError, ValueError):
-            raise _wrong(f"locate()[{index}]", place, "must be a Place") from None
+            raise _wrong(f"locate()[{index}]", place, "must be a FoundPlace") from None
         if not all(map(math.isfinite, (x_m, y_m, z_m, score))):
             raise _wrong(f"locate()[{index}]", place, "must be finite")
-        places.append(Place((x_m, y_m, z_m), score))
+        places.append(FoundPlace((x_m, y_m, z_m), score))
     return sorted(places, key=lambda place: -place.score)
 
 

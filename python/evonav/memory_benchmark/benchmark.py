@@ -18,7 +18,7 @@ from evonav.drawing.svg import slug
 from evonav.errors import InvalidArgumentError
 from evonav.memory.forgetting import RULES
 from evonav.memory_benchmark.protocol import Memory
-from evonav.memory_benchmark.records import BenchmarkResult, Header, MemoryResult, StreamResult
+from evonav.memory_benchmark.records import BenchmarkResult, MemoryHeader, MemoryResult, StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, MemorySource, measure_all
 from evonav.memory_benchmark.streams import StreamSpec, make_stream
 from evonav.memory_benchmark.streams.export.recording import RecordingSpec
@@ -173,7 +173,7 @@ def _begun(memories: Sequence[NamedMemory], out: Path, settings: MeasureSettings
     identity = {"evonav": __version__, "settings": asdict(settings)}
     path, known = out / HEADER_NAME, dict[str, Any]()
     if path.exists():
-        there = read_model(Header, path, "expected a header of `evonav bench memory`")
+        there = read_model(MemoryHeader, path, "expected a header of `evonav bench memory`")
         check_same_run(there.identity, identity, out)
         known.update(there.memories)
     for memory in memories:
@@ -182,7 +182,7 @@ def _begun(memories: Sequence[NamedMemory], out: Path, settings: MeasureSettings
             for record in (out / RECORD_DIR / slug(memory.name)).glob("*.json"):
                 record.unlink(missing_ok=True)
         known[memory.name] = its
-    write_atomically(path, Header(identity=identity, memories=known).model_dump_json(indent=2) + "\n")
+    write_atomically(path, MemoryHeader(identity=identity, memories=known).model_dump_json(indent=2) + "\n")
     return list(known)
 
 

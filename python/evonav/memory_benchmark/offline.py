@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from evonav.errors import StoreError
 from evonav.memory_benchmark.answers import MAX_SHOWN, CheckedEntries, Hosting, MemoryFailedError, read_entries
 from evonav.memory_benchmark.hosting.local import Cost
-from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, judge_memories
 from evonav.memory_benchmark.truth import Stream
@@ -104,7 +104,7 @@ class _Answers:
             raise StoreError(f"{self._path}, line {line}: frame = {answer.frame}: the last frame is {self._last}")
         return self._num_bytes
 
-    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+    def locate(self, text: str, k: int) -> tuple[list[FoundPlace], Cost]:
         """Refuse: files hold no answers to questions."""
         raise NotImplementedError
 

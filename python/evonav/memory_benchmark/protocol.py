@@ -67,7 +67,7 @@ class MemoryEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FoundPlace:
     """One answer to the question where something is."""
 
     position_m: Point3
@@ -94,7 +94,7 @@ class Memory(Protocol):
 class CanLocate(Protocol):
     """A memory that can be asked where something is."""
 
-    def locate(self, text: str, k: int) -> Sequence[Place]:
+    def locate(self, text: str, k: int) -> Sequence[FoundPlace]:
         """Return at most `k` places of what `text` names, the best first; this is timed."""
 
 

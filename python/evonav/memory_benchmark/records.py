@@ -115,7 +115,7 @@ class BenchmarkResult(MeasurementRecord):
         raise InvalidArgumentError(f"memory = {name!r}: the result has {known}")
 
 
-class Header(MeasurementRecord):
+class MemoryHeader(MeasurementRecord):
     """The settings that records of one folder share, and its memories."""
 
     identity: dict[str, Any]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evonav.memory import forgetting
 from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
-from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, Point3, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, Point3, StreamInfo
 from evonav.world.camera import unproject
 
 SEEN_BYTES = 150
@@ -88,11 +88,11 @@ class ObjectMapMemory:
             last_seen_s=last_s,
         )
 
-    def locate(self, text: str, k: int) -> list[Place]:
+    def locate(self, text: str, k: int) -> list[FoundPlace]:
         """Return the entries with this label, those most probably present first, of equals those seen last."""
         found = [entry for entry in self.map.entries if entry.label == text]
         ranked = sorted(found, key=lambda entry: (-self._score(entry), -self._seen_s[entry.id][1], entry.id))
-        return [Place(entry.centre_m, self._score(entry)) for entry in ranked[:k]]
+        return [FoundPlace(entry.centre_m, self._score(entry)) for entry in ranked[:k]]
 
     def _score(self, entry: ObjectEntry) -> float:
         p = self.rule.p_present(entry.id)
@@ -172,11 +172,11 @@ class NumpyList:
             for index, (label, box_m) in enumerate(zip(self._labels, self._boxes_m, strict=True))
         ]
 
-    def locate(self, text: str, k: int) -> list[Place]:
+    def locate(self, text: str, k: int) -> list[FoundPlace]:
         """Return the places with this label, those seen last first."""
         found = [index for index, label in enumerate(self._labels) if label == text]
         found.sort(key=lambda index: (-self._seen_s[index][1], index))
-        return [Place(_point(self._boxes_m[index].mean(axis=0)), self._confidences[index]) for index in found[:k]]
+        return [FoundPlace(_point(self._boxes_m[index].mean(axis=0)), self._confidences[index]) for index in found[:k]]
 
     def num_bytes(self) -> int:
         """Return the bytes of the boxes and labels, and about those of the numbers beside them."""

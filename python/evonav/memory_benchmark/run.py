@@ -16,7 +16,7 @@ from evonav.memory_benchmark.hosting.local import Cost, LocalMemory
 from evonav.memory_benchmark.hosting.process import RemoteMemory
 from evonav.memory_benchmark.metrics import costs
 from evonav.memory_benchmark.metrics.retrieval import NUM_PLACES
-from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, Memory, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import BeliefScore, MemoryFailure, Speed, StreamResult
 from evonav.memory_benchmark.scoring import Judge
 from evonav.memory_benchmark.truth import FrameTruth, Stream
@@ -91,7 +91,7 @@ class HostedMemory(Protocol):
     def num_bytes(self, num_entries: int) -> int | None:
         """Return the size that the memory tells; `None` if it tells none."""
 
-    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+    def locate(self, text: str, k: int) -> tuple[list[FoundPlace], Cost]:
         """Ask where something is."""
 
     def close(self) -> None:

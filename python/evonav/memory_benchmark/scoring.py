@@ -17,7 +17,7 @@ from evonav.memory_benchmark.metrics.retrieval import Queries
 from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
 from evonav.memory_benchmark.metrics.tracked_change import TrackedChange, tracked
 from evonav.memory_benchmark.metrics.updates import EVIDENCE_PX, BeliefSnapshot, PlaceKey, UpdateCounts, change_counts
-from evonav.memory_benchmark.protocol import MemoryFrame, Place, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import SceneObject
@@ -158,7 +158,7 @@ class Judge:
             }
         )
 
-    def take_places(self, label: str, places: Sequence[Place]) -> None:
+    def take_places(self, label: str, places: Sequence[FoundPlace]) -> None:
         """Take the answer to `locate(label, k)`, the best place first."""
         scene = self._scene
         assert scene is not None, "a frame comes first"

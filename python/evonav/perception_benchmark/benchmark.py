@@ -21,8 +21,8 @@ from evonav.perception_benchmark.memory import JudgedMemory
 from evonav.perception_benchmark.picture import side_by_side
 from evonav.perception_benchmark.records import (
     NUM_CHECKPOINTS,
-    Header,
     MemoryState,
+    PerceptionHeader,
     TaskRecord,
     complete_tasks,
     read_header,
@@ -154,7 +154,7 @@ def _begun(
     out: Path,
     config: TourConfig,
     simulator: Component[Simulator],
-) -> Header:
+) -> PerceptionHeader:
     """Claim the folder; records of tasks that are others now are dropped."""
     identity = {"evonav": __version__, "tour": asdict(config), **simulator.identity("simulator")}
     there = read_header(out)
@@ -172,7 +172,7 @@ def _begun(
                 for name in there.perceptions:
                     record_path(out, name, task_id).unlink(missing_ok=True)
         digests = {**there.digests, **digests}
-    return Header(
+    return PerceptionHeader(
         identity=identity,
         perceptions=perceptions,
         options=options,
@@ -182,7 +182,7 @@ def _begun(
     )
 
 
-def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path) -> None:
+def _claim_models(header: PerceptionHeader, specs: Sequence[PerceptionSpec], out: Path) -> None:
     """Record hashes of weights and versions of libraries before the first view, or check that they are the folder's."""
     for spec in specs:
         found = Backend(perception=spec.component).check_perception([AGENT])

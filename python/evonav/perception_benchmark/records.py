@@ -157,7 +157,7 @@ class TaskRecord(MeasurementRecord):
     """JPEG in base64: truth and detections of one view, side by side."""
 
 
-class Header(MeasurementRecord):
+class PerceptionHeader(MeasurementRecord):
     """Request that a folder was made for."""
 
     identity: dict[str, Any]
@@ -197,17 +197,17 @@ def read_record(path: Path) -> TaskRecord:
     return read_model(TaskRecord, path, "delete it and run the command again")
 
 
-def read_header(folder: Path) -> Header | None:
+def read_header(folder: Path) -> PerceptionHeader | None:
     """Return the header of a folder, `None` for a new one.
 
     Raises:
         StoreError: It cannot be read.
     """
     path = folder / HEADER_NAME
-    return read_model(Header, path, "expected a header of `evonav perception`") if path.exists() else None
+    return read_model(PerceptionHeader, path, "expected a header of `evonav perception`") if path.exists() else None
 
 
-def write_header(folder: Path, header: Header) -> None:
+def write_header(folder: Path, header: PerceptionHeader) -> None:
     """Write the header.
 
     Raises:
@@ -232,7 +232,7 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
     }
 
 
-def complete_tasks(folder: Path, header: Header) -> list[str]:
+def complete_tasks(folder: Path, header: PerceptionHeader) -> list[str]:
     """Return the tasks last requested that have a record of every perception."""
     names = header.perceptions
     return [task for task in header.tasks if all(record_path(folder, name, task).exists() for name in names)]

@@ -17,7 +17,7 @@ from evonav.memory_benchmark.answers import (
     read_num_bytes,
     read_places,
 )
-from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, Memory, MemoryFrame, StreamInfo
 
 PACKAGE = "evonav.memory_benchmark"
 T = TypeVar("T")
@@ -82,7 +82,7 @@ class LocalMemory:
         memory: Any = self._memory
         return read_num_bytes(self._timed("num_bytes", memory.num_bytes)[0], num_entries)
 
-    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+    def locate(self, text: str, k: int) -> tuple[list[FoundPlace], Cost]:
         """Ask where something is."""
         memory: Any = self._memory
         answer, cost = self._timed("locate", lambda: memory.locate(text, k))

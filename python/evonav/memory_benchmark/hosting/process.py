@@ -24,7 +24,7 @@ from evonav.memory_benchmark.answers import (
     checked,
 )
 from evonav.memory_benchmark.hosting.local import Cost
-from evonav.memory_benchmark.protocol import Memory, MemoryFrame, Place, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, Memory, MemoryFrame, StreamInfo
 
 _KINDS: dict[ErrorKind, FailureKind] = {ErrorKind.TIMEOUT: "hung", ErrorKind.CRASH: "died"}
 
@@ -98,10 +98,10 @@ class RemoteMemory:
             self.peak_rss_bytes = round(float(parts["peak_mb"]) * (1 << 20))
         return None if parts["num_bytes"] is None else int(parts["num_bytes"])
 
-    def locate(self, text: str, k: int) -> tuple[list[Place], Cost]:
+    def locate(self, text: str, k: int) -> tuple[list[FoundPlace], Cost]:
         """Ask where something is."""
         parts = self._ask("locate", text, k)
-        return [Place(tuple(position_m), score) for position_m, score in parts["places"]], Cost(**parts["cost"])
+        return [FoundPlace(tuple(position_m), score) for position_m, score in parts["places"]], Cost(**parts["cost"])
 
     def close(self) -> None:
         """End the process."""

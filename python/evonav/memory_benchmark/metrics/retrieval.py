@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from evonav.evaluation.episode.staleness import distance_to_box_m
-from evonav.memory_benchmark.protocol import Place
+from evonav.memory_benchmark.protocol import FoundPlace
 from evonav.world.simulator import SceneObject
 
 HIT_M = 1.0
@@ -36,7 +36,7 @@ class Queries:
         default_factory=lambda: {"before": QueryCounts(), "after": QueryCounts(), "after_evidence": QueryCounts()}
     )
 
-    def take(self, objects: Sequence[SceneObject], places: Sequence[Place], state: QueryState) -> None:
+    def take(self, objects: Sequence[SceneObject], places: Sequence[FoundPlace], state: QueryState) -> None:
         """Add the answer to a question.
 
         Args:
@@ -52,7 +52,7 @@ class Queries:
             counts.reciprocal_ranks += 1.0 / rank
 
 
-def true_rank(objects: Sequence[SceneObject], places: Sequence[Place]) -> int | None:
+def true_rank(objects: Sequence[SceneObject], places: Sequence[FoundPlace]) -> int | None:
     """Return the 1-based rank of the first place within `HIT_M` of an object; `None` if there is none."""
     for rank, place in enumerate(places, start=1):
         if any(distance_to_box_m(place.position_m, body) <= HIT_M for body in objects):

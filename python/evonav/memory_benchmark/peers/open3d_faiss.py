@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from evonav.component import optional_module
 from evonav.memory import ObjectMapConfig
-from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, Place, Point3, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, Point3, StreamInfo
 from evonav.sensors.observation import View
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
@@ -199,10 +199,10 @@ class Open3DFaissMemory:
             )
         return found
 
-    def locate(self, text: str, k: int) -> list[Place]:
+    def locate(self, text: str, k: int) -> list[FoundPlace]:
         """Return the entries with this label, those seen last first."""
         found = [(one.last_seen_s or 0.0, one) for one in self.entries() if one.label == text]
-        return [Place(one.centre_m, time_s) for time_s, one in sorted(found, key=lambda pair: -pair[0])[:k]]
+        return [FoundPlace(one.centre_m, time_s) for time_s, one in sorted(found, key=lambda pair: -pair[0])[:k]]
 
     def num_bytes(self) -> int:
         """Return the bytes of the points, which Open3D keeps as three doubles, and about those of the numbers."""
