@@ -73,14 +73,14 @@ def test_an_image_has_the_name_of_its_shape_and_values() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "error"),
     [
-        (b'"attempt":3', b'"attempt":-1', "attempt: Input should be greater than or equal to 0"),
+        (b'"attempt":3', b'"attempt":-1', "attempt = -1: Input should be greater than or equal to 0"),
         (b'"otherwise":1', b'"otherwise":2', "otherwise = 2: of 2 prompts"),
         (b"[5,2]", b"[5,3]", f"images: expected {126 + len(FILE.source)} bytes, got {111 + len(FILE.source)}"),
-        (b"[5,2]", b"[0,2]", "images.0.0: Input should be greater than or equal to 1"),
+        (b"[5,2]", b"[0,2]", "images.0.0 = 0: Input should be greater than or equal to 1"),
         (b'[0,"or",', b'[3,"or",', "parts: image 3 of 3"),
         (b'[0,"or",', b'[-1,"or",', "parts: image -1 of 3"),
         (b"\xff\xd8\xff", b"\xff\xd7\xff", "jpeg: no image"),
-        (b'"role":"user"', b'"role":"evaluator"', "prompts.0.turns.1.role: Input should be"),
+        (b'"role":"user"', b'"role":"evaluator"', "prompts.0.turns.1.role = 'evaluator': Input should be"),
         (b"\n", b"", "Invalid JSON"),
     ],
 )

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from evonav.evaluation.records.floor_plan_json import FloorPlanReader
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint
+from evonav.drawing.plan import ObjectFootprint
+from evonav.evaluation.records.floor_plans import FloorPlan, FloorPlanReader
 
 SQUARE = ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))
 
@@ -43,7 +43,7 @@ def plan(*objects: ObjectFootprint, at_end: tuple[ObjectFootprint, ...] = ()) ->
     [
         plan(),
         plan(footprint("a")),
-        plan(footprint("a"), footprint('],"reference_image":'), footprint(',{"object_id":')),
+        plan(footprint("a"), footprint('],"schema_version":'), footprint(',{"object_id":')),
         plan(footprint("a"), footprint("b"), at_end=(footprint("b"), footprint("a"))),
     ],
 )

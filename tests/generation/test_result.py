@@ -11,8 +11,8 @@ import pytest
 from evonav import _core
 from evonav.generation.result import Anchor, GenerationResult, Given, GivenStage
 from evonav.house import House, bundled_houses
+from evonav.records import Record
 from evonav.tasks.parameters import DuringStage, Extensions, GenerationParameters, Occurrence, Schedule
-from evonav.tasks.records import Record
 
 SMALL = {"reference_image_px": 32, "reference_min_visible_px": 1}
 OFTEN = Occurrence(probability=1.0, max_count=8)

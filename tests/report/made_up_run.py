@@ -3,19 +3,17 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from evonav.drawing.plan import ObjectFootprint, OpeningFootprint, RoomFootprint
 from evonav.evaluation.records.changes import Relocation, TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
+from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import (
     ActionRecord,
     EndState,
     EntryRecord,
     ErrorKind,
-    FloorPlan,
     GoalRecord,
-    ObjectFootprint,
-    Opening,
     PoseRecord,
-    RoomFootprint,
     RoundRecord,
     StageError,
     StageRecord,
@@ -62,8 +60,8 @@ def floor_plan(task_id: str, stage: int) -> FloorPlan:
             ((5, 4), (5, 0)),
         ),
         openings=(
-            Opening(kind="door", from_m=(5, 1), to_m=(5, 2)),
-            Opening(kind="window", from_m=(0, 1), to_m=(0, 2)),
+            OpeningFootprint(kind="door", from_m=(5, 1), to_m=(5, 2)),
+            OpeningFootprint(kind="window", from_m=(0, 1), to_m=(0, 2)),
         ),
         objects=(
             box("fridge", "Fridge", (0.5, 0.9, 3.5), 0.8, 0.8),

@@ -7,7 +7,8 @@ import pytest
 from made_up_run import NEW_TABLE_M, OLD_TABLE_M, box, floor_plan, stage_record
 
 from evonav.evaluation.records.changes import DuringRecord, Relocation, TransitionRecord
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.types import ReplayedRound, ReplayedStage
 from evonav.replay.video_frames import episode_frame, stage_frames

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.drawing.floor_plan import Frame, item_labels, label_point
+from evonav.drawing.plan import ObjectFootprint
 from evonav.drawing.svg import cm
-from evonav.evaluation.records.schema import ObjectFootprint
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
 from evonav.report.tasks.floor_plans import TaskDrawing, _groups, change_frame, task_drawing
@@ -221,7 +221,7 @@ def test_the_command_draws_a_task_a_stage_and_a_gallery(task: Task, tmp_path: Pa
         (["{set}", "--task", "../x"], "holds no task"),
         (["{root}", "--stage", "4"], "no stage 4; it has stages 1 to 3"),
         (["{set}/nothing"], "holds no task"),
-        (["{broken}"], "task.json: field"),
+        (["{broken}"], 'task.json: missing "task_id"'),
     ],
 )
 def test_wrong_input_is_a_line_that_names_it(task: Task, tmp_path: Path, arguments: list[str], message: str) -> None:

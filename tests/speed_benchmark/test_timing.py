@@ -108,7 +108,7 @@ def test_a_file_that_is_none_is_named(tmp_path):
         read_speeds(tmp_path / "nowhere.json")
     file = tmp_path / "other.json"
     file.write_text("{}")
-    with pytest.raises(StoreError, match=r"other.json: section: Field required; expected a speed.json"):
+    with pytest.raises(StoreError, match=r'other.json: missing "section"; expected a speed.json'):
         read_speeds(file)
 
 

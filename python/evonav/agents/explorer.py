@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evonav.agents.grid import eroded
-from evonav.decision.candidates import Point2
 from evonav.memory import Frontier, FrontierConfig, OccupancyMap
 from evonav.memory.occupancy import UNKNOWN
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, Observation
 
 

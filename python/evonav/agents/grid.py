@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.memory import Frontier
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame
 
 COARSE_M = 0.25

@@ -12,7 +12,7 @@ import numpy as np
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture, crop_of, picture_of
 from evonav.decision.text.language import canonical
 from evonav.memory import ObjectMap, ObjectMapConfig, forgetting
@@ -20,6 +20,7 @@ from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry, ObjectUpdate
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 
 DAY_S = 86400.0

@@ -17,13 +17,14 @@ from evonav.agents.agent import (
 )
 from evonav.agents.explanation import entry_belief, frontier_beliefs
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
-from evonav.decision.candidates import FrontierCandidate, Point2
+from evonav.decision.candidates import FrontierCandidate
 from evonav.decision.goal_input import goal_as_given
 from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.rules import TextMatch
 from evonav.memory import Frontier
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

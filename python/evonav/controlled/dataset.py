@@ -19,6 +19,7 @@ from evonav.house.files import HouseCompletion, HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
+from evonav.records import Record
 from evonav.tasks.dataset import (
     DatasetRecord,
     SourceFile,
@@ -28,7 +29,7 @@ from evonav.tasks.dataset import (
 from evonav.tasks.files import read_house
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import Task, TaskHeader
-from evonav.tasks.records import Record, parse_record, read_file
+from evonav.tasks.records import parse_record, read_file
 
 WORK = "evonav.controlled.dataset:make_worker"
 

@@ -18,10 +18,10 @@ from evonav.errors import InvalidArgumentError
 from evonav.generation.pipeline import TaskRejectedError, generate_task
 from evonav.generation.result import GivenStage
 from evonav.house import House
+from evonav.records import Record
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Control, Task
 from evonav.tasks.parameters import GenerationParameters
-from evonav.tasks.records import Record
 
 NUM_ATTEMPTS = 8
 """Draws of goals and changes before a house is given up."""

@@ -11,10 +11,11 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 
 from evonav.errors import TaskError
 from evonav.parallel.folders import write_atomically
+from evonav.records import Record
 from evonav.tasks.dataset import HouseRejection, SourceFile
 from evonav.tasks.manifest import TaskId
 from evonav.tasks.parameters import GenerationParameters
-from evonav.tasks.records import Id, Probability, Record, parse_record, read_file, record_bytes
+from evonav.tasks.records import Id, Probability, parse_record, read_file, record_bytes
 
 FILE_NAME = "controlled.json"
 

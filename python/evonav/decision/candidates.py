@@ -5,11 +5,7 @@ from typing import Literal
 
 from evonav.decision.pictures import Picture
 from evonav.memory.colours import Layout
-
-Point2 = tuple[float, float]
-"""`(x, z)` in metres."""
-Point3 = tuple[float, float, float]
-"""`(x, y, z)` in metres."""
+from evonav.records import Point2, Point3
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evonav import _core
-from evonav.drawing.plan import ObjectPlan, Plan, RoomPlan
+from evonav.drawing.plan import HousePlan, ObjectFootprint, RoomFootprint
 from evonav.drawing.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
 
@@ -80,7 +80,7 @@ class Frame:
         return Frame(left, top, max(xs) + MARGIN_CM - left, max(ys) + MARGIN_CM - top)
 
 
-def frame_of(maps: Iterable[Plan]) -> Frame:
+def frame_of(maps: Iterable[HousePlan]) -> Frame:
     """Return the frame that all stages of a task share."""
     maps = list(maps)
     points: list[Point] = [point for m in maps for room in m.rooms for point in room.polygon_m]
@@ -88,7 +88,7 @@ def frame_of(maps: Iterable[Plan]) -> Frame:
     return Frame.around(points)
 
 
-def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
+def moving_ids(maps: Sequence[HousePlan]) -> frozenset[str]:
     """Return the ids of objects that do not stand in the same place in all of the stages."""
     first: dict[str, Sequence[Point]] = {}
     seen: Counter[str] = Counter()
@@ -107,13 +107,13 @@ def moving_ids(maps: Sequence[Plan]) -> frozenset[str]:
     return frozenset(name for name, num in seen.items() if name in moved or num != len(maps))
 
 
-def ground(floor_plan: Plan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
+def ground(floor_plan: HousePlan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
     """Draw floors, furniture, walls and openings; `without` names objects to leave out."""
     items = furniture([item for item in floor_plan.objects if item.object_id not in without], frame)
     return floors(floor_plan) + items + structure(floor_plan, frame)
 
 
-def floors(floor_plan: Plan) -> str:
+def floors(floor_plan: HousePlan) -> str:
     """Draw rooms, coloured by type."""
     return join(
         f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
@@ -121,7 +121,7 @@ def floors(floor_plan: Plan) -> str:
     )
 
 
-def structure(floor_plan: Plan, frame: Frame) -> str:
+def structure(floor_plan: HousePlan, frame: Frame) -> str:
     """Draw walls, doors and windows."""
     u = frame.unit
     doors = [(o.from_m, o.to_m) for o in floor_plan.openings if o.kind == "door"]
@@ -134,14 +134,14 @@ def structure(floor_plan: Plan, frame: Frame) -> str:
     )
 
 
-def furniture(items: Iterable[ObjectPlan], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
+def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
     """Draw footprints, lower ones first, each with its category as tooltip; `has_parts` draws large ones in detail."""
     ordered = sorted(items, key=lambda item: (item.centre_m[1] + item.size_m[1] / 2, item.object_id))
     drawn = join(_footprint(item, has_parts=has_parts) for item in ordered)
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
-def labels(floor_plan: Plan, frame: Frame) -> str:
+def labels(floor_plan: HousePlan, frame: Frame) -> str:
     """Write the names of rooms where there is least furniture."""
     u = frame.unit
     taken = [_box(item) for item in floor_plan.objects if item.category not in FLAT_CATEGORIES]
@@ -150,7 +150,7 @@ def labels(floor_plan: Plan, frame: Frame) -> str:
 
 
 def item_labels(
-    items: Iterable[ObjectPlan], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
+    items: Iterable[ObjectFootprint], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
 ) -> str:
     """Write the names of the furniture that is large enough to hold them, none over another.
 
@@ -183,7 +183,7 @@ def label_point(
     return _core.label_point(polygon_m, num, taken_m=taken_m, size_m=size_m)
 
 
-def _footprint(item: ObjectPlan, *, has_parts: bool) -> str:
+def _footprint(item: ObjectFootprint, *, has_parts: bool) -> str:
     css = "item flat" if item.category in FLAT_CATEGORIES else "item"
     if max(item.size_m[0], item.size_m[2]) < SMALL_M:
         css = "item small"
@@ -197,7 +197,7 @@ def _footprint(item: ObjectPlan, *, has_parts: bool) -> str:
     return f'<path class="{css}" d="{outline(item.polygon_m)}">{hint}</path>'
 
 
-def _shape(item: ObjectPlan, css: str, hint: str, *, has_parts: bool) -> str:
+def _shape(item: ObjectFootprint, css: str, hint: str, *, has_parts: bool) -> str:
     """Draw all parts as one outline, and in a large object the parts themselves, higher ones over lower ones."""
     parts = _core.outlines(item.outlines_m)
     # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
@@ -207,7 +207,7 @@ def _shape(item: ObjectPlan, css: str, hint: str, *, has_parts: bool) -> str:
     return union + join(f'<path class="part" d="{part}"/>' for part in dict.fromkeys(parts))
 
 
-def _room_label(room: RoomPlan, unit: float, taken_m: Sequence[Box]) -> str:
+def _room_label(room: RoomFootprint, unit: float, taken_m: Sequence[Box]) -> str:
     if len(room.polygon_m) < 3:
         return ""
     name = noun_of(room.room_type)
@@ -222,7 +222,7 @@ def _room_label(room: RoomPlan, unit: float, taken_m: Sequence[Box]) -> str:
     return f'<text{size} x="{x}" y="{y + 0.3 * font_cm:.0f}">{escape(name)}</text>'
 
 
-def _item_label(item: ObjectPlan, font_cm: float) -> tuple[Box, str] | None:
+def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None:
     """Return box and text of a label that fits into the largest part of an object."""
     x0, z0, x1, z1 = max((_box_of(part) for part in item.outlines_m), key=_area_m2, default=_box(item))
     name = noun_of(item.category)
@@ -239,7 +239,7 @@ def _item_label(item: ObjectPlan, font_cm: float) -> tuple[Box, str] | None:
     return None
 
 
-def _box(item: ObjectPlan) -> Box:
+def _box(item: ObjectFootprint) -> Box:
     """Return the box around an object, in metres."""
     (x, _, z), (width_m, _, depth_m) = item.centre_m, item.size_m
     return (x - width_m / 2, z - depth_m / 2, x + width_m / 2, z + depth_m / 2)

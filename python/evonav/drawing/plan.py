@@ -1,84 +1,28 @@
 """Describe a house from above: rooms, walls, openings and the exact outlines of objects.
 
-Drawings take anything with these attributes: a house's own `HousePlan`, and the floor plans in the records of runs.
+Drawings take a house's own `HousePlan`, and the floor plans in the records of runs, which are `HousePlan`s, too.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from collections.abc import Iterator
+from typing import Literal
 
 from evonav._core import House, Wall, object_outlines
 from evonav._core import Opening as HouseOpening
+from evonav.records import Point2, Point3, Record
 
-Point2 = tuple[float, float]
-"""`(x, z)` in metres."""
-Point3 = tuple[float, float, float]
-"""`(x, y, z)` in metres."""
 OpeningKind = Literal["door", "window"]
 
 
-class RoomPlan(Protocol):
-    """A room's floor."""
-
-    @property
-    def room_type(self) -> str: ...  # noqa: D102
-    @property
-    def polygon_m(self) -> Sequence[Point2]: ...  # noqa: D102
-
-
-class ObjectPlan(Protocol):
-    """An object seen from above; `outlines_m`, if there are any, are drawn instead of `polygon_m`."""
-
-    @property
-    def object_id(self) -> str: ...  # noqa: D102
-    @property
-    def category(self) -> str: ...  # noqa: D102
-    @property
-    def centre_m(self) -> Point3: ...  # noqa: D102
-    @property
-    def size_m(self) -> Point3: ...  # noqa: D102
-    @property
-    def polygon_m(self) -> Sequence[Point2]: ...  # noqa: D102
-    @property
-    def outlines_m(self) -> Sequence[Sequence[Point2]]: ...  # noqa: D102
-
-
-class OpeningPlan(Protocol):
-    """A door or window from above."""
-
-    @property
-    def kind(self) -> OpeningKind: ...  # noqa: D102
-    @property
-    def from_m(self) -> Point2: ...  # noqa: D102
-    @property
-    def to_m(self) -> Point2: ...  # noqa: D102
-
-
-class Plan(Protocol):
-    """A house from above."""
-
-    @property
-    def rooms(self) -> Sequence[RoomPlan]: ...  # noqa: D102
-    @property
-    def walls(self) -> Sequence[tuple[Point2, Point2]]: ...  # noqa: D102
-    @property
-    def openings(self) -> Sequence[OpeningPlan]: ...  # noqa: D102
-    @property
-    def objects(self) -> Sequence[ObjectPlan]: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True)
-class HouseRoom:
+class RoomFootprint(Record, strict=False):
     """A room's floor."""
 
     room_id: str
     room_type: str
-    polygon_m: Sequence[Point2]
+    polygon_m: tuple[Point2, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class HouseFootprint:
+class ObjectFootprint(Record, strict=False):
     """An object seen from above."""
 
     object_id: str
@@ -86,30 +30,28 @@ class HouseFootprint:
     centre_m: Point3
     size_m: Point3
     """Size of the axis-aligned box."""
-    polygon_m: Sequence[Point2]
+    polygon_m: tuple[Point2, ...]
     """Corners of the object's box, to the millimetre."""
-    outlines_m: Sequence[Sequence[Point2]]
-    """Convex outlines of its parts to the millimetre, each once, lower ones first."""
+    outlines_m: tuple[tuple[Point2, ...], ...] = ()
+    """Convex outlines of its parts to the millimetre, each once, lower ones first; drawn instead of `polygon_m`."""
 
 
-@dataclass(frozen=True, slots=True)
-class HouseHole:
-    """A door or window from above."""
+class OpeningFootprint(Record):
+    """A door, doorway or window from above."""
 
     kind: OpeningKind
     from_m: Point2
     to_m: Point2
 
 
-@dataclass(frozen=True, slots=True)
-class HousePlan:
+class HousePlan(Record):
     """A house from above."""
 
-    rooms: tuple[HouseRoom, ...]
+    rooms: tuple[RoomFootprint, ...]
     walls: tuple[tuple[Point2, Point2], ...]
     """Wall segments, each once; open-plan ones left out."""
-    openings: tuple[HouseHole, ...]
-    objects: tuple[HouseFootprint, ...]
+    openings: tuple[OpeningFootprint, ...]
+    objects: tuple[ObjectFootprint, ...]
 
 
 def plan_of(house: House) -> HousePlan:
@@ -120,7 +62,10 @@ def plan_of(house: House) -> HousePlan:
     """
     walls = {wall.id: wall for wall in house.walls}
     return HousePlan(
-        rooms=tuple(HouseRoom(room.id, room.room_type, room.polygon_m) for room in house.rooms),
+        rooms=tuple(
+            RoomFootprint(room_id=room.id, room_type=room.room_type, polygon_m=tuple(room.polygon_m))
+            for room in house.rooms
+        ),
         # Every wall has two sides at the same place: one is enough for a picture.
         walls=tuple(sorted({(min(w.from_m, w.to_m), max(w.from_m, w.to_m)) for w in walls.values() if not w.is_empty})),
         openings=tuple(
@@ -129,7 +74,18 @@ def plan_of(house: House) -> HousePlan:
             for hole in holes
             if hole.wall_ids[0] in walls
         ),
-        objects=tuple(HouseFootprint(*values) for values in object_outlines(house)),
+        # The core's values need no check, which would take twice as long as all else.
+        objects=tuple(
+            ObjectFootprint.model_construct(
+                object_id=object_id,
+                category=category,
+                centre_m=centre_m,
+                size_m=size_m,
+                polygon_m=tuple(polygon_m),
+                outlines_m=tuple(map(tuple, outlines_m)),
+            )
+            for object_id, category, centre_m, size_m, polygon_m, outlines_m in object_outlines(house)
+        ),
     )
 
 
@@ -146,7 +102,7 @@ def _openings(house: House) -> Iterator[tuple[OpeningKind, list[HouseOpening]]]:
     yield "window", house.windows
 
 
-def _hole(kind: OpeningKind, hole: HouseOpening, wall: Wall) -> HouseHole:
+def _hole(kind: OpeningKind, hole: HouseOpening, wall: Wall) -> OpeningFootprint:
     """Return the two sides of a door or window; its hole is in the wall's frame."""
     (x0, z0), (x1, z1) = wall.from_m, wall.to_m
     length_m = math.hypot(x1 - x0, z1 - z0) or 1.0
@@ -154,4 +110,4 @@ def _hole(kind: OpeningKind, hole: HouseOpening, wall: Wall) -> HouseHole:
         (x0 + (x1 - x0) * along_m / length_m, z0 + (z1 - z0) * along_m / length_m)
         for along_m in (hole.hole_min_m[0], hole.hole_max_m[0])
     )
-    return HouseHole(kind, near, far)
+    return OpeningFootprint(kind=kind, from_m=near, to_m=far)

@@ -15,8 +15,9 @@ from pydantic import NonNegativeInt, ValidationError
 from evonav.errors import StoreError
 from evonav.parallel.folders import check_same_run, write_atomically
 from evonav.parallel.pool import FailureKind
+from evonav.records import Record
 from evonav.tasks.dataset import HouseRejection, RejectReason, TaskEntry
-from evonav.tasks.records import Record, Sha256
+from evonav.tasks.records import Sha256
 
 NAME = "journal.jsonl"
 

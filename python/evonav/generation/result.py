@@ -4,9 +4,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeInt
 
+from evonav.records import Record
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.oracle import OracleFields
-from evonav.tasks.records import Id, Record
+from evonav.tasks.records import Id
 
 
 class Anchor(Record):

@@ -13,11 +13,11 @@ from evonav.generation.pipeline import TaskRejectedError, generate_task, short_n
 from evonav.house import House
 from evonav.parallel.folders import put_folder, sha256_of_file
 from evonav.parallel.pool import Answer
+from evonav.records import Record
 from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Task
 from evonav.tasks.parameters import GenerationParameters
-from evonav.tasks.records import Record
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.records import sentence_of
 from evonav.world.appearance import Change, Colors, Lighting, Materials
 from evonav.world.simulator import Action, SimulatorConfig, Style, vertical_fov_deg
 
@@ -106,9 +107,7 @@ class NavConfig(BaseModel):
         try:
             super().__init__(**settings)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            message = f"argument `{first['loc'][0]}` is {first['input']!r}: {first['msg']}"
-            raise InvalidArgumentError(message) from None
+            raise InvalidArgumentError(f"argument {sentence_of(error)}") from None
 
     @property
     def simulator(self) -> SimulatorConfig:

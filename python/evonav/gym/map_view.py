@@ -14,9 +14,10 @@ from PIL import Image, ImageDraw
 
 from evonav._core import House
 from evonav.drawing.floor_plan import Frame, frame_of
-from evonav.drawing.plan import Plan, Point2, plan_of
+from evonav.drawing.plan import HousePlan, plan_of
 from evonav.gym.config import NavConfig
 from evonav.gym.worlds import StageWorld
+from evonav.records import Point2
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -142,7 +143,7 @@ def _rendered(simulator: EmbeddedSimulator, scale: _Scale) -> Picture:
     return images.rgb
 
 
-def _draw_structure(pen: ImageDraw.ImageDraw, plan: Plan, scale: _Scale) -> None:
+def _draw_structure(pen: ImageDraw.ImageDraw, plan: HousePlan, scale: _Scale) -> None:
     """Draw walls, doors and windows, which are thinner than a pixel in the rendering."""
     width = WALL_PX * scale.unit
     lines = [(*wall, WALL, width) for wall in plan.walls]

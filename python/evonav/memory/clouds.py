@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
+from evonav.records import Point3
 from evonav.sensors.observation import View
 
-Point3 = tuple[float, float, float]
 Box = tuple[Point3, Point3]
 """Centre and edges of an axis-aligned box, in metres."""
 

@@ -8,12 +8,13 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_confi
 from pydantic.dataclasses import dataclass
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.answers import MAX_SHOWN, CheckedEntries, Hosting, MemoryFailedError, read_entries
+from evonav.memory_benchmark.answers import CheckedEntries, Hosting, MemoryFailedError, read_entries
 from evonav.memory_benchmark.hosting.local import Cost
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, judge_memories
 from evonav.memory_benchmark.truth import Stream
+from evonav.records import sentence_of
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 with_config(_STRICT)(MemoryEntry)
@@ -128,8 +129,4 @@ def _read(path: Path, number: int, line: bytes) -> FrameAnswer:
     try:
         return _ANSWER.validate_json(line, strict=True)
     except ValidationError as error:
-        problem = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(map(str, problem["loc"]))
-        value = repr(problem["input"])[:MAX_SHOWN]
-        shown = f'missing "{place}"' if problem["type"] == "missing" else f"{place} = {value}: {problem['msg']}"
-        raise StoreError(f"{path}, line {number}: {shown.removeprefix(' = ')}") from None
+        raise StoreError(f"{path}, line {number}: {sentence_of(error)}") from None

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from evonav.records import Point3
 from evonav.sensors.observation import View
 from evonav.world.simulator import Intrinsics
 
@@ -40,9 +41,6 @@ def read_only(frame: MemoryFrame) -> MemoryFrame:
         if array is not None:
             array.flags.writeable = False
     return frame
-
-
-Point3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)

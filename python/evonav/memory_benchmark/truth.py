@@ -10,7 +10,6 @@ from typing import Literal, Protocol
 from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.world.simulator import SceneObject
 
-Point3 = tuple[float, float, float]
 ChangeKind = Literal["moved", "removed", "added"]
 
 

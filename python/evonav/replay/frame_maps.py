@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.layers import cells_layer, sector
 from evonav.drawing.svg import cm, cross, escape, join, polyline
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import StageRecord
 from evonav.replay.types import ReplayedEntry, ReplayedRound, ReplayedStage
 from evonav.report.maps.stage_map import house_drawing
 from evonav.report.maps.trajectory import ring, start_mark, target_mark

@@ -19,7 +19,8 @@ from evonav.agents.agent import FrontierBelief, PlaceBelief
 from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.svg import clean, cm, polyline, simplified
-from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, RoundRecord, StageRecord
 from evonav.replay.types import (
     ReplayedEntry,
     ReplayedMap,

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from evonav.drawing.floor_plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.drawing.svg import cm
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import FloorPlan
+from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage

@@ -22,7 +22,8 @@ from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.staleness import entry_record, matched_object
 from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.records.convert import pose_record
-from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.replay.types import (
     BLOCKED,
     EXPLORED,

@@ -21,8 +21,9 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec, opaque_task_id
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.record_diff import record_differences
-from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
+from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.evaluation.run.run import NAMES_KEY, agent_seed, perception_seed

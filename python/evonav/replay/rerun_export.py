@@ -15,7 +15,7 @@ from PIL import Image
 from evonav.component import optional_module
 from evonav.drawing.files import check_suffix
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records.schema import FloorPlan
+from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.parallel.folders import replacing
 from evonav.replay.page_data import describe_truth
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import FrontierBelief, PlaceBelief
-from evonav.evaluation.records.base import Point2, Point3
-from evonav.evaluation.records.schema import EntryRecord, FloorPlan, PoseRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EntryRecord, PoseRecord, RoundRecord, StageRecord
+from evonav.records import Point2, Point3
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `ReplayedMap.cells`; explored cells are free ones that were seen from close by."""

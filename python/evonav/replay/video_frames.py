@@ -10,7 +10,8 @@ from evonav.drawing.files import png_of
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.style import light_css
 from evonav.drawing.svg import escape, join, text_lines
-from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, RoundRecord
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import describe_truth
 from evonav.replay.types import ReplayedRound, ReplayedStage

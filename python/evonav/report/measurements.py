@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from evonav.errors import StoreError
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
+from evonav.records import sentence_of
 
 MAX_SHOWN = 120
 """Longest value in a message, in characters."""
@@ -70,10 +71,7 @@ def read_model(model: type[M], path: Path, advice: str) -> M:
         data = path.read_bytes()
         return model.model_validate_json(gzip.decompress(data) if path.suffix == ".gz" else data)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(map(str, first["loc"])) or "the file"
-        shown = "" if first["type"] in ("missing", "json_invalid") else f" = {repr(first['input'])[:MAX_SHOWN]}"
-        raise StoreError(f"{path}: {place}{shown}: {first['msg']}; {advice}") from None
+        raise StoreError(f"{path}: {sentence_of(error)}; {advice}") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror or error}; {advice}") from error
     except (EOFError, zlib.error) as error:

@@ -12,9 +12,11 @@ from evonav.errors import StoreError
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
-from evonav.evaluation.records.base import BeliefRecord, Point3
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageError, StageRecord
+from evonav.evaluation.records.base import BeliefRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
+from evonav.records import Point3
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import FailureCause
 

@@ -14,9 +14,9 @@ from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
 from evonav.evaluation.episode.stage_house import changed_ids
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.base import Point2, Point3
 from evonav.evaluation.records.convert import pose_record, sensor_config
 from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
+from evonav.records import Point2, Point3
 
 TOLERANCE = 1e-9
 """Allowed difference of a claimed score, since other machines may round sums differently."""

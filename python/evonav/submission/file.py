@@ -11,11 +11,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.schema import StageRecord
 from evonav.parallel.folders import replacing
+from evonav.records import Record, sentence_of
 from evonav.tasks.manifest import TaskId
 from evonav.tasks.records import Sha256
 
@@ -42,11 +43,7 @@ def _printable(text: str) -> str:
 _Name = Annotated[str, Field(min_length=1, max_length=1000), AfterValidator(_printable)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class PackedTask(_Part):
+class PackedTask(Record):
     """A task of the run."""
 
     task_id: TaskId
@@ -55,7 +52,7 @@ class PackedTask(_Part):
     """SHA-256 of `task.json`, which holds the checksums of all other files of the task."""
 
 
-class About(_Part):
+class About(Record):
     """Statements of the submitters, which cannot be checked."""
 
     title: str = ""
@@ -65,7 +62,7 @@ class About(_Part):
     description: str = ""
 
 
-class Submission(_Part):
+class Submission(Record):
     """The header of a packed run."""
 
     format_version: Literal[1] = 1
@@ -125,14 +122,6 @@ def read_records(path: Path) -> Iterator[tuple[StageRecord, bytes]]:
         yield _parsed(where, line, StageRecord), line
 
 
-def first_problem(error: ValidationError) -> str:
-    """Return the first wrong field and what is wrong with it."""
-    problem = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(str(step)[:100] for step in problem["loc"][:10])
-    message = problem["msg"][:300]
-    return f"{place}: {message}" if place else message
-
-
 def _lines(path: Path) -> Iterator[tuple[str, bytes]]:
     """Yield the lines of a file without their ends, each after its file and number, as errors name it."""
     where, num_bytes, most = str(path), 0, MAX_HEADER_BYTES
@@ -164,7 +153,7 @@ def _parsed(where: str, line: bytes, model: type[_Line]) -> _Line:
     try:
         value = model.model_validate_json(line)
     except ValidationError as error:
-        raise SubmissionError(f"{where}: {first_problem(error)}") from error
+        raise SubmissionError(f"{where}: {sentence_of(error)}") from error
     if value.model_dump_json().encode() != line:
         raise SubmissionError(f"{where}: not as evonav writes it")
     return value

@@ -13,15 +13,7 @@ from evonav.errors import InvalidArgumentError, TaskError
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.records import (
-    field_error,
-    parse_record,
-    read_file,
-    read_gzip,
-    record_bytes,
-    sha256_of,
-    write_gzip,
-)
+from evonav.tasks.records import field_error, parse_record, read_file, read_gzip, record_bytes, sha256_of, write_gzip
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:

@@ -9,7 +9,8 @@ from pydantic import (
     PositiveInt,
 )
 
-from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256, Version
+from evonav.records import Point2, Point3, Record
+from evonav.tasks.records import Id, PoseRecord, Probability, Sha256, Version
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
 """Modification of a room (paper, Sec. 3.2)."""

@@ -6,7 +6,8 @@ from typing import Annotated, Any
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from evonav import _core
-from evonav.tasks.records import Probability, Record
+from evonav.records import Record
+from evonav.tasks.records import Probability
 from evonav.world.simulator import Style
 
 # The core holds the default values, see `Parameters` in `evonav_core::generation`.

@@ -11,31 +11,22 @@ from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from evonav.errors import TaskError
+from evonav.records import Point3, Record, sentences_of, wrong_value
 from evonav.world.pose import Pose
 
 MAX_FILE_BYTES = 64 * 2**20
 """Uncompressed size beyond which a task file is refused; a 10-room house takes 0.3 MB."""
 
-Point2 = tuple[float, float]
-"""`(x, z)` in metres."""
-Point3 = tuple[float, float, float]
-"""`(x, y, z)` in metres, or Unity Euler angles in degrees."""
 Id = Annotated[str, Field(min_length=1, max_length=256)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Version = Annotated[int, Field(ge=1, le=1)]
 """The schema version of a file, of which there is one so far. `Literal[1]` would take `true` for it."""
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-
-
-class Record(BaseModel):
-    """A part of a task file: frozen, without coercion, unknown keys, infinity or NaN."""
-
-    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 class PoseRecord(Record):
@@ -71,7 +62,7 @@ def descriptions(model: type[Record]) -> dict[str, str]:
 def described_schema(model: type[Record]) -> dict[str, Any]:
     """Return the JSON Schema of a record, in which fields have their descriptions."""
     schema = model.model_json_schema(mode="validation")
-    models = {one.__name__: one for one in _kinds(Record)}
+    models = {one.__name__: one for one in _records_in(model)}
     for title, part in {model.__name__: schema, **schema.get("$defs", {})}.items():
         for field, text in descriptions(models[title]).items():
             known = part["properties"][field]
@@ -79,10 +70,14 @@ def described_schema(model: type[Record]) -> dict[str, Any]:
     return schema
 
 
-def _kinds(model: type[Record]) -> Iterator[type[Record]]:
-    for one in model.__subclasses__():
-        yield one
-        yield from _kinds(one)
+def _records_in(annotation: Any) -> Iterator[type[Record]]:  # noqa: ANN401 - a type hint
+    """Yield the records that a type consists of, and all that they consist of."""
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        yield annotation
+        for field in annotation.model_fields.values():
+            yield from _records_in(field.annotation)
+    for part in get_args(annotation):
+        yield from _records_in(part)
 
 
 RecordT = TypeVar("RecordT", bound=Record)
@@ -108,18 +103,12 @@ def record_errors(model: type[RecordT], data: bytes, path: Path) -> tuple[Record
     try:
         return model.model_validate_json(data), []
     except ValidationError as error:
-        found = error.errors(include_url=False, include_context=False)
-    places = [".".join(str(part) for part in one["loc"]) or "(whole file)" for one in found]
-    return None, [
-        field_error(path, place, one.get("input"), one["msg"]) for place, one in zip(places, found, strict=True)
-    ]
+        return None, [TaskError(f"{path}: {sentence}") for sentence in sentences_of(error)]
 
 
 def field_error(path: Path, place: str, value: Any, message: str) -> TaskError:  # noqa: ANN401
     """Return a `TaskError` in the form of all task files."""
-    shown = repr(value)
-    shown = shown if len(shown) <= 80 else shown[:77] + "..."
-    return TaskError(f"{path}: field `{place}`: {message} (found {shown})")
+    return TaskError(f"{path}: {wrong_value(place, value, message)}")
 
 
 def read_file(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:

@@ -12,10 +12,11 @@ from types import MappingProxyType
 from typing import Any
 
 from evonav.errors import TaskError
+from evonav.records import Record
 from evonav.tasks.dataset import DatasetRecord
 from evonav.tasks.manifest import PublicStage, TaskHeader
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.records import Record, described_schema
+from evonav.tasks.records import described_schema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

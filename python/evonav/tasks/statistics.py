@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, NonNegativeInt
 
 from evonav.errors import InvalidArgumentError
+from evonav.records import Record
 from evonav.statistics import effective_size
-from evonav.tasks.records import Record
 
 Range = tuple[float, float]
 

@@ -8,9 +8,9 @@ from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.agent import FrontierUpdateConfig
 from evonav.agents.frontier_update.own_exploration import OwnExploration, Place
 from evonav.agents.navigator import Navigator, NavigatorConfig
-from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectMap, ObjectUpdate
+from evonav.records import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

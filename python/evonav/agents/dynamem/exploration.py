@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import Point2
 from evonav.memory.occupancy import BLOCKED, FREE, OccupancyMap
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, View
 
 NEVER = -1

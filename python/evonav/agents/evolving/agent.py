@@ -16,12 +16,13 @@ from evonav.agents.furniture import is_furniture
 from evonav.agents.grid import NO_GROUP, CoarseFrame, owners_of
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.proactive.priors import room_ratios
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 

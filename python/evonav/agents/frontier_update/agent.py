@@ -11,13 +11,14 @@ from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.navigator_agent import NavigatorAgent
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import is_structure
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.memory.objects import ObjectEntry
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 

@@ -10,11 +10,11 @@ from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateCo
 from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion, identity_question
 from evonav.agents.frontier_update.relook import FirstLook, RelookConfig, place_from_another_side
 from evonav.agents.navigator import Target
-from evonav.decision.candidates import Point2, Point3
 from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence
+from evonav.records import Point2, Point3
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from evonav.agents.navigator import Navigator
-from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
@@ -15,6 +15,7 @@ from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
+from evonav.records import Point2
 from evonav.tasks.public import Goal
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)

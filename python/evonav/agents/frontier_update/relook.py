@@ -7,10 +7,10 @@ import numpy as np
 
 from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import places_around
-from evonav.decision.candidates import Point2
 from evonav.decision.pictures import Picture
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
+from evonav.records import Point2
 from evonav.sensors.observation import View
 from evonav.world.pose import Pose
 

@@ -41,6 +41,7 @@ from evonav.agents.agent import (
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.errors import InvalidArgumentError
+from evonav.records import sentence_of
 from evonav.world.simulator import Action
 
 MAX_DIAGNOSTICS_BYTES = 1_000_000
@@ -107,7 +108,7 @@ class Part(Generic[T]):
         try:
             return self._adapter.validate_json(self.checked(text), strict=True)
         except ValidationError as error:
-            raise InvalidArgumentError(_first_problem(error, self._name)) from None
+            raise InvalidArgumentError(sentence_of(error, self._name)) from None
 
     def checked(self, text: bytes) -> bytes:
         """Return a JSON text that is not too large.
@@ -132,16 +133,6 @@ def _plain(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is no JSON")
-
-
-def _first_problem(error: ValidationError, name: str = "") -> str:
-    problem = error.errors(include_url=False, include_context=False)[0]
-    place = ".".join(part for part in (name, *map(str, problem["loc"])) if part)
-    if problem["type"] == "missing":
-        return f'missing "{place}"'
-    value = repr(problem["input"])
-    shown = value if len(value) <= MAX_VALUE else f"{value[:MAX_VALUE]} ..."
-    return f"{place} = {shown}: {problem['msg']}" if place else f"{problem['msg']}, got {shown}"
 
 
 # Actions

@@ -20,11 +20,12 @@ from evonav.agents.msgnav.scene_graph import Subgraph
 from evonav.agents.msgnav.viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.agents.navigator import NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.pictures import picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

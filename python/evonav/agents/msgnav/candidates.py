@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.pictures import Picture
+from evonav.records import Point2
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,13 +14,14 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesNoQuestion, first_line, lines_of
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher, gap_m
 from evonav.decision.text.ranking import rank_entries
+from evonav.records import Point2
 from evonav.tasks.public import Goal
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import Point2
 from evonav.memory.objects import ObjectMap, SightConfig
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame
 
 

@@ -34,12 +34,12 @@ from evonav.agents.proactive.standing import (
     place_by,
     places_before,
 )
-from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 

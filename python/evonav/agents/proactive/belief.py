@@ -14,10 +14,11 @@ from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
 from evonav.agents.proactive.search import unknown_cells, walls_of
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.sightings import Sightings
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame
 
 FRONTIER_REACH_M = 4.0

@@ -17,10 +17,11 @@ from evonav.agents.proactive.priors import room_ratios
 from evonav.agents.proactive.rooms import NO_ROOM
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.sightings import Sighting
-from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
+from evonav.records import Point2
 
 AT_DOOR_M = 0.75
 """Largest distance between a frontier and the box of a door that leads to what is behind it."""

@@ -8,8 +8,8 @@ import numpy as np
 from evonav.agents.grid import CoarseFrame
 from evonav.agents.proactive.posterior import Posterior, Surroundings
 from evonav.agents.proactive.search import Option, shown_from, window_sums
-from evonav.decision.candidates import Point2
 from evonav.memory.occupancy import OccupancyMap
+from evonav.records import Point2
 
 Placed = Sequence[tuple[Point2, float]]
 """Places and their weights."""

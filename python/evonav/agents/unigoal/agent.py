@@ -28,12 +28,12 @@ from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
-from evonav.decision.candidates import Point2
 from evonav.decision.goal_input import goal_as_given
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.rules import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.decision.candidates import Point2
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, View
 
 Cells = NDArray[np.int32]

@@ -20,11 +20,11 @@ from evonav.agents.unigoal.scene_questions import (
     RelationLinesQuestion,
     RoomQuestion,
 )
-from evonav.decision.candidates import Point2
 from evonav.decision.pictures import Picture
 from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
+from evonav.records import Point2
 from evonav.sensors.observation import View
 from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CODE_CATEGORIES, FALLBACK_CATEGORY, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY

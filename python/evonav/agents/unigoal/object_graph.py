@@ -10,8 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from evonav.decision.candidates import ObjectCandidate, Point2, Point3
+from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
+from evonav.records import Point2, Point3
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import LABEL_TRANSLATION, relabelled
 

@@ -14,11 +14,11 @@ from typing import Any, ClassVar, TypeVar
 from evonav.agents.unigoal.goal_graph import GoalGraph, relation_kind
 from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.agents.unigoal.questions import parse_relation, relation_line
-from evonav.decision.candidates import Point2
 from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
+from evonav.records import Point2
 from evonav.tasks.public import Goal
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"

@@ -13,10 +13,10 @@ from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.relatedness import Relatedness
 from evonav.agents.value_maps.label_map import LabelMap, LabelMapConfig, clusters_of
 from evonav.agents.value_maps.pursuit import SAME_M, Pursuit
-from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectMap, ObjectUpdate
+from evonav.records import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

@@ -10,9 +10,9 @@ from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.relatedness import Relatedness
 from evonav.agents.value_maps.cone_map import ConeMap, ConeMapConfig, largest_within
 from evonav.agents.value_maps.pursuit import Pursuit
-from evonav.decision.candidates import Point2
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectMap, ObjectUpdate
+from evonav.records import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

@@ -7,11 +7,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.question import AnswerError
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
+from evonav.records import Point2
 from evonav.tasks.public import Goal
 
 _DECIMALS = 4

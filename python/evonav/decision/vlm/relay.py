@@ -21,6 +21,7 @@ from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
+from evonav.records import sentence_of
 
 RELAYED = "evonav.decision.backends:vlm"
 """Import path of the decision model that can be asked so."""
@@ -173,8 +174,7 @@ def read_request(message: bytes, known: Known | None = None) -> tuple[list[Promp
     try:
         request = _request().validate_json(text, strict=True)
     except ValidationError as error:
-        problem = error.errors(include_url=False, include_input=False)[0]
-        raise InvalidArgumentError(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}") from error
+        raise InvalidArgumentError(sentence_of(error)) from error
     if request.otherwise >= len(request.prompts):
         raise InvalidArgumentError(f"otherwise = {request.otherwise}: of {len(request.prompts)} prompts")
     sizes = [*((height, width, 3 * height * width) for height, width in request.images)]

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
+from evonav.records import Point2
 from evonav.world.pose import Pose, moved, turned
 from evonav.world.simulator import Action, OccupancyGrid, Simulator
-
-Point2 = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ The evaluator's stages and Gymnasium's environments end and score by this one st
 
 from dataclasses import dataclass
 
-from evonav.evaluation.metrics.scoring import Point2, StageScore, score_stage
+from evonav.evaluation.metrics.scoring import StageScore, score_stage
+from evonav.records import Point2
 
 
 @dataclass(slots=True)

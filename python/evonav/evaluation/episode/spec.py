@@ -8,18 +8,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from evonav.evaluation.records.base import Point2, Point3
 from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
-from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
+from evonav.evaluation.records.floor_plans import FloorPlan, floor_plan_of, image_uri
 from evonav.evaluation.records.oracle import during_record, target_record, transition_record
-from evonav.evaluation.records.schema import (
-    EndState,
-    FloorPlan,
-    GoalRecord,
-    StageRecord,
-    TargetRecord,
-)
+from evonav.evaluation.records.schema import EndState, GoalRecord, StageRecord, TargetRecord
 from evonav.house import House
+from evonav.records import Point2, Point3
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import Goal

@@ -22,6 +22,7 @@ from evonav.evaluation.records.convert import action_record, pose_record, sensin
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import EndState, ErrorKind, MemoryRecord, RoundRecord, StageRecord
 from evonav.perception import Perception, StageScene
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
@@ -177,7 +178,7 @@ class Stage:
         self._protocol.check(sensors)
         return sensors
 
-    def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
+    def _begin(self, budget: int, reference_m: Sequence[Point2]) -> StageProgress:
         """Count steps from here; without a reference path, the stage has no score."""
         pose = self._simulator.pose
         x_m, _, z_m = self._stage.target.position_m
@@ -327,9 +328,7 @@ class Stage:
                 details=dict(diagnostics.details),
             )
 
-    def _measured(
-        self, progress: StageProgress, reference_m: Sequence[motion.Point2], stop_reason: str | None
-    ) -> StageRecord:
+    def _measured(self, progress: StageProgress, reference_m: Sequence[Point2], stop_reason: str | None) -> StageRecord:
         end, radius_m = self._simulator.pose, progress.success_radius_m
         score = progress.score((end.x_m, end.z_m))
         with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):

@@ -8,8 +8,8 @@ from evonav.errors import SimulationError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.base import Point3
 from evonav.evaluation.records.changes import DuringRecord
+from evonav.records import Point2, Point3
 from evonav.world.change_around import change_around
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
@@ -40,7 +40,7 @@ class StageHouse:
         """Return whether a pose is in a room; never in `None`."""
         return room_id is not None and self._spec.parsed_house(self._number).room_of(pose.x_m, pose.z_m) == room_id
 
-    def path_to_target_m(self) -> list[motion.Point2]:
+    def path_to_target_m(self) -> list[Point2]:
         """Return the planner's path from the agent to the target; empty if there is none."""
         x_m, _, z_m = self.target_m
         house = self._spec.parsed_house(self._number)  # the rooms stay the same when the house changes

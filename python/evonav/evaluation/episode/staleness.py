@@ -17,9 +17,10 @@ import numpy as np
 
 from evonav import _core
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.records.base import BeliefRecord, Point3
+from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.changes import Relocation
 from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, StaleEntryRecord
+from evonav.records import Point3
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
 from evonav.world.pose import Pose

@@ -3,35 +3,21 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from evonav.records import Point2, Real, Record
 
 CheckedT = TypeVar("CheckedT", bound="CheckedRecord")
 
-Real = Annotated[float, Field(ge=-1e9, le=1e9)]
-"""Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
 Whole = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 """A count or number of a record: 64 bits."""
-Point2 = tuple[Real, Real]
-"""`(x, z)`."""
-Point3 = tuple[Real, Real, Real]
-"""`(x, y, z)`."""
 
 
-class Record(BaseModel):
-    """A frozen record that rejects unknown fields."""
-
-    # Parts of a record are validated again with the whole: `model_copy` does not validate.
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        ser_json_inf_nan="null",
-        revalidate_instances="always",
-        allow_inf_nan=False,
-        defer_build=True,
-    )
+class WholeRecord(Record, revalidate_instances="always"):
+    """A record whose parts are validated again with the whole: `model_copy` does not validate."""
 
 
-class CheckedRecord(Record, revalidate_instances="never"):
+class CheckedRecord(Record):
     """A part of a record that is validated when it is made or copied, and not again: a stage has hundreds."""
 
     def model_copy(self: CheckedT, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> CheckedT:
@@ -48,7 +34,7 @@ class PlacesRecord(CheckedRecord):
     probabilities: tuple[Real, ...]
 
 
-class BeliefRecord(Record):
+class BeliefRecord(WholeRecord):
     """The probabilities that an agent stated as a stage began."""
 
     presence: tuple[tuple[Real, bool], ...] = ()

@@ -2,10 +2,11 @@
 
 from typing import Literal
 
-from evonav.evaluation.records.base import Point3, Real, Record, Whole
+from evonav.evaluation.records.base import Whole, WholeRecord
+from evonav.records import Point3, Real
 
 
-class Relocation(Record):
+class Relocation(WholeRecord):
     """One object moved in a change. Oracle."""
 
     object_id: str
@@ -14,7 +15,7 @@ class Relocation(Record):
     to_m: Point3
 
 
-class TransitionRecord(Record):
+class TransitionRecord(WholeRecord):
     """A change of the house: between the previous stage and this one, or during this one. Oracle."""
 
     mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
@@ -43,7 +44,7 @@ DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
 """Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
 
 
-class DuringRecord(Record):
+class DuringRecord(WholeRecord):
     """The change of the house during the stage (docs/extensions.md). Oracle."""
 
     round: Whole

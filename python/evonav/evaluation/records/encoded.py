@@ -8,10 +8,9 @@ from pydantic import ValidationError
 
 from evonav.evaluation.metrics.stage_metrics import encode_metrics
 from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageFailure, StageRecord
-
-MAX_VALUE = 100
-"""Longest wrong value in `invalid_record`, in characters."""
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, StageFailure, StageRecord
+from evonav.records import sentence_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +94,9 @@ def invalid_record(text: str, error: ValidationError) -> str:
     Args:
         error: The error of the model that read it.
     """
-    problem = error.errors(include_url=False, include_context=False)[0]
-    place = ".".join(map(str, problem["loc"]))
-    value = repr(problem["input"])
-    what = f"{place} = {value[:MAX_VALUE]}: {problem['msg']}" if place else problem["msg"]
     try:
         key = json.loads(text)
         name = f"the record of {key['agent']}, {key['task_id']}, stage {key['stage']}"
     except (ValueError, TypeError, KeyError):
         name = "a record"
-    return f"{name} is not valid: {what}"
+    return f"{name} is not valid: {sentence_of(error)}"

@@ -11,8 +11,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Point2, Point3, Real, Record, Whole
+from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Whole, WholeRecord
 from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
+from evonav.records import Point2, Point3, Real
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
@@ -82,7 +83,7 @@ _PHRASES = {
 }
 
 
-class StageError(Record):
+class StageError(WholeRecord):
     """The reason why a stage is errored or was not run."""
 
     kind: ErrorKind
@@ -110,7 +111,7 @@ class PoseRecord(CheckedRecord):
     horizon_rad: Real
 
 
-class GoalRecord(Record):
+class GoalRecord(WholeRecord):
     """The goal that the agent received, without the image."""
 
     category: str
@@ -119,7 +120,7 @@ class GoalRecord(Record):
     basic_instruction: str
 
 
-class TargetRecord(Record):
+class TargetRecord(WholeRecord):
     """The instance to be found. Oracle."""
 
     object_id: str
@@ -146,7 +147,7 @@ class EntryRecord(CheckedRecord):
     """The entry is stale, as `evonav.evaluation.episode.staleness` defines it."""
 
 
-class MemoryRecord(Record):
+class MemoryRecord(WholeRecord):
     """The agent's entries compared with the stage's house."""
 
     num_entries: Whole
@@ -162,7 +163,7 @@ class MemoryRecord(Record):
     """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
 
 
-class StaleEntryRecord(Record):
+class StaleEntryRecord(WholeRecord):
     """An entry that was stale at the start, the round from which this was evident, and the round of its correction."""
 
     label: str
@@ -173,7 +174,7 @@ class StaleEntryRecord(Record):
     """The round, from the evident one on, after which the entry is gone or corrected."""
 
 
-class MovedObjectRecord(Record):
+class MovedObjectRecord(WholeRecord):
     """An object moved in the transition before the stage, far enough that an entry of it would be stale."""
 
     object_id: str
@@ -197,7 +198,7 @@ class ActionRecord(CheckedRecord):
     """The reason of a `stop`."""
 
 
-class SensingRecord(Record):
+class SensingRecord(WholeRecord):
     """The sensing and motion that the agent was granted in a stage, without colours.
 
     Together with the actions, this is enough to carry them out again (`evonav.submission.rescore`).
@@ -234,7 +235,7 @@ class RoundRecord(CheckedRecord):
     details: dict[str, Any]
 
 
-class StageRecord(Record):
+class StageRecord(WholeRecord):
     """One stage of one agent's episode. Metrics are `None` unless the state is success or failure."""
 
     schema_version: Literal[1] = 1
@@ -328,59 +329,3 @@ class StageRecord(Record):
         """The target's position as the stage ends, by which success is judged."""
         during = self.during
         return self.target.position_m if during is None or not during.target_position_m else during.target_position_m
-
-
-class RoomFootprint(Record):
-    """A room's floor."""
-
-    room_id: str
-    room_type: str
-    polygon_m: tuple[Point2, ...]
-
-
-class ObjectFootprint(Record):
-    """An object seen from above."""
-
-    object_id: str
-    category: str
-    centre_m: Point3
-    size_m: Point3
-    """Size of the axis-aligned box."""
-    polygon_m: tuple[Point2, ...]
-    """Corners of the object's box."""
-    outlines_m: tuple[tuple[Point2, ...], ...] = ()
-    """Convex outlines of its parts, lower ones first, where they are known: drawn instead of `polygon_m`."""
-
-
-OpeningKind = Literal["door", "window"]
-
-
-class Opening(Record):
-    """A door, doorway or window from above."""
-
-    kind: OpeningKind
-    from_m: Point2
-    to_m: Point2
-
-
-class FloorPlan(Record):
-    """A stage's house from above, the background of maps. It is the same for all agents."""
-
-    schema_version: Literal[1] = 1
-    task_id: str
-    house: str
-    stage: Whole
-    rooms: tuple[RoomFootprint, ...]
-    walls: tuple[tuple[Point2, Point2], ...]
-    """Wall segments on the floor plan; open-plan ones left out."""
-    openings: tuple[Opening, ...]
-    objects: tuple[ObjectFootprint, ...]
-    reference_image: str | None = None
-    """The image that the agent was shown, made small, as a `data:` URI."""
-    objects_at_end: tuple[ObjectFootprint, ...] = ()
-    """The objects after the change during the stage; empty without one."""
-
-    @property
-    def at_end(self) -> "FloorPlan":
-        """The floor plan after the change during the stage; itself without one."""
-        return self.model_copy(update={"objects": self.objects_at_end}) if self.objects_at_end else self

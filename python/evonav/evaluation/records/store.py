@@ -21,8 +21,8 @@ from pydantic import ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.encoded import EncodedStage, invalid_record
-from evonav.evaluation.records.floor_plan_json import FloorPlanReader
-from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan, FloorPlanReader
+from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
 
 FILE_NAME = "records.sqlite"

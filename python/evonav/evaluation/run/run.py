@@ -17,7 +17,8 @@ from evonav.evaluation.hosting.process import LOG_NAME
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
-from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, check_agent_names, check_sandbox
 from evonav.evaluation.run.summary import MODELS_KEY, note_session, write_summary

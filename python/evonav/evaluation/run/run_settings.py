@@ -18,7 +18,7 @@ from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, Isol
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
-from evonav.tasks.records import Record
+from evonav.records import Record
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price

@@ -38,7 +38,8 @@ from evonav.evaluation.hosting.isolation import NO_SETUP, AgentHosting, ProcessS
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
-from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.parallel.local import EndedError
 from evonav.sensors.observation import Observation

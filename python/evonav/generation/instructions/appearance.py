@@ -12,9 +12,9 @@ import numpy as np
 
 from evonav import _core
 from evonav.generation.result import Appearance, Tint
+from evonav.records import Point3
 from evonav.tasks.colours import colour_word
 from evonav.tasks.language import MATERIALS, NUMBERS, plural_of, with_article
-from evonav.tasks.records import Point3
 
 SECOND_COLOUR_SHARE = 0.25
 """Smallest share of the target's visible pixels at which a second colour is named."""

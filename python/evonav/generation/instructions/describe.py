@@ -7,8 +7,8 @@ instructions are derived from the renderer and the asset catalogue, so that task
 
 from evonav.generation.instructions.appearance import adjectives_of, details_of
 from evonav.generation.result import Anchor, Appearance, Relations
+from evonav.records import Point3
 from evonav.tasks.language import listed, noun_of, plural_of, with_article
-from evonav.tasks.records import Point3
 
 WRITER = "evonav-describer 1"
 """Writer of these instructions; the number changes with the wording."""

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from evonav.errors import TaskError
 from evonav.generation.validation.problems import Problem, ProblemKind
+from evonav.records import Record
 from evonav.tasks.files import decode_png, inconsistencies, read_house
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
-from evonav.tasks.records import Record, read_file, record_errors
+from evonav.tasks.records import read_file, record_errors
 
 _Anything = TypeVar("_Anything")
 _Record = TypeVar("_Record", bound=Record)

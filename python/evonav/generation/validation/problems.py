@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import NonNegativeInt
 
-from evonav.tasks.records import Record
+from evonav.records import Record
 
 ProblemKind = Literal[
     "file",

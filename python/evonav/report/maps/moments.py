@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from evonav.counted import counted
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import StageRecord
 from evonav.report.maps.text import describe_change
 
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.style import map_file
 from evonav.drawing.svg import escape, join, text_lines
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import StageRecord
 from evonav.report.maps.legend import legend_row
 from evonav.report.maps.text import describe_outcome
 

@@ -6,7 +6,8 @@ from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labe
 from evonav.drawing.style import map_file
 from evonav.drawing.svg import slug
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import StageRecord
 from evonav.report.maps.trajectory import change, course
 from evonav.report.tables.causes import sentence
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from evonav.drawing.files import check_picture, write_picture
 from evonav.drawing.svg import escape, join, text_lines
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
 from evonav.report.maps.stage_map import stage_drawing, success_radius_of, task_frame

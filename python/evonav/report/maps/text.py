@@ -8,7 +8,8 @@ from collections.abc import Mapping
 
 from evonav.counted import counted
 from evonav.evaluation.metrics.navigation import Stage
-from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
+from evonav.evaluation.records.floor_plans import FloorPlan
+from evonav.evaluation.records.schema import EndState, RoundRecord, StageRecord
 from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 

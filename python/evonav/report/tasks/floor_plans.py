@@ -17,11 +17,10 @@ from evonav.drawing.floor_plan import (
     outline,
     structure,
 )
-from evonav.drawing.plan import door_ends
+from evonav.drawing.plan import ObjectFootprint, RoomFootprint, door_ends
 from evonav.drawing.svg import Point, cm, join, polyline, title
-from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
+from evonav.evaluation.records.floor_plans import FloorPlan, floor_plan_of, image_uri
 from evonav.evaluation.records.oracle import target_record, transition_record
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
 from evonav.house import House
 from evonav.report.maps.trajectory import relocation_arrows, start_mark, target_mark
 from evonav.tasks import Task

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from evonav.counted import counted
-from evonav.evaluation.records.schema import FloorPlan
+from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.report.tables.table import mode_words
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from evonav.memory_benchmark.truth import TrueChange
-from evonav.tasks.records import Record
+from evonav.records import Record
 from evonav.world.simulator import SceneObject
 
 LayoutName = Literal["tum", "replica"]

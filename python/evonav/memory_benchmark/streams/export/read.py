@@ -23,8 +23,8 @@ from evonav.memory_benchmark.streams.export.layouts import (
 )
 from evonav.memory_benchmark.streams.rendered import NO_OCCUPANCY
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
+from evonav.records import Record, sentence_of
 from evonav.sensors.observation import Detections, View
-from evonav.tasks.records import Record
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
 
@@ -195,6 +195,4 @@ def _record(kind: type[R], path: Path, text: str) -> R:
     try:
         return kind.model_validate_json(text)
     except ValidationError as error:
-        problem = error.errors()[0]
-        place = ".".join(map(str, problem["loc"])) or "JSON"
-        raise StoreError(f"{path}: field `{place}`: {problem['msg']}; it is in {text[:200]!r}") from error
+        raise StoreError(f"{path}: {sentence_of(error)}; it is in {text[:200]!r}") from error

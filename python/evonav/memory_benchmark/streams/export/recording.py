@@ -22,8 +22,8 @@ from evonav.memory_benchmark.streams.export.layouts import FRAMES_FILE, LAYOUTS,
 from evonav.memory_benchmark.streams.export.read import no_truth, read_detections, read_frame_lines
 from evonav.memory_benchmark.streams.rendered import NO_OCCUPANCY
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
+from evonav.records import Record
 from evonav.sensors.observation import Detections, View
-from evonav.tasks.records import Record
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 

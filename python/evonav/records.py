@@ -1,0 +1,50 @@
+"""Define strict records, the parts of files and messages, and say what is wrong in one."""
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+MAX_SHOWN = 100
+"""Longest wrong value in a sentence, in characters."""
+
+Real = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
+Point2 = tuple[Real, Real]
+"""`(x, z)` in metres."""
+Point3 = tuple[Real, Real, Real]
+"""`(x, y, z)` in metres, or Unity Euler angles in degrees."""
+
+
+class Record(BaseModel):
+    """A part of a file: frozen, without coercion, unknown keys, infinity or NaN."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+
+def sentence_of(error: ValidationError, name: str = "") -> str:
+    """Return the first problem that pydantic found as a sentence with the wrong field and its value.
+
+    Args:
+        name: What was read, which begins the field's path.
+    """
+    return sentences_of(error, name)[0]
+
+
+def sentences_of(error: ValidationError, name: str = "") -> list[str]:
+    """Return all problems that pydantic found, each as a sentence with the wrong field and its value."""
+    return [_sentence(problem, name) for problem in error.errors(include_url=False, include_context=False)]
+
+
+def _sentence(problem: Any, name: str) -> str:  # noqa: ANN401 - pydantic's `ErrorDetails`
+    place = ".".join(str(part)[:MAX_SHOWN] for part in (name, *problem["loc"][:10]) if part != "")
+    if problem["type"] == "missing":
+        return f'missing "{place}"'
+    return wrong_value(place, problem.get("input"), problem["msg"])
+
+
+def wrong_value(place: str, value: Any, message: str) -> str:  # noqa: ANN401
+    """Return the sentence for a wrong value of a field; without a place, it is the whole that is wrong."""
+    shown = repr(value)
+    shown = shown if len(shown) <= MAX_SHOWN else f"{shown[:MAX_SHOWN]} ..."
+    message = message[:300]
+    return f"{place} = {shown}: {message}" if place else f"{message}, got {shown}"
