@@ -16,9 +16,6 @@ from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.records import sentence_of
 
-MAX_SHOWN = 120
-"""Longest value in a message, in characters."""
-
 J = TypeVar("J")
 M = TypeVar("M", bound=BaseModel)
 
