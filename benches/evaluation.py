@@ -99,7 +99,7 @@ def run() -> str:
 
 
 def row(agent: str, num_workers: int, done: Measured, alone: Measured | None) -> str:
-    """A run's line; efficiency is beside one worker's."""
+    """A run's line; efficiency is compared with one worker."""
     if alone is None or alone is done:
         shares = "|"
     else:

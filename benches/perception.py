@@ -1,4 +1,4 @@
-"""Perception: simulated errors and the mini detector, beside SciPy, NumPy, and the rendering of the same views."""
+"""Perception: simulated errors and the mini detector, compared with SciPy, NumPy, and rendering the same views."""
 
 import math
 from collections.abc import Callable, Sequence

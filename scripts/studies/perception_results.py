@@ -3,8 +3,8 @@
     python scripts/studies/perception_results.py --out out/perception --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val
 
 evaluates the agents on a subset of the tasks under every perception and writes curves, and what the paper says of
-perception beside what is found here. Run it again to resume; `--write-only` runs nothing. A folder of results holds one
-version of the code.
+perception next to what is found here. Run it again to resume; `--write-only` runs nothing. A folder of results holds
+one version of the code.
 """
 
 import argparse
@@ -35,7 +35,7 @@ PERCEPTIONS = (
     "noisy:poor",
     "predicted:mini",
 )
-"""The curves are of the first ones; what a learned detector gives stands beside them in the tables."""
+"""The curves are of the first ones; what a learned detector gives stands next to them in the tables."""
 IMAGES = ROOT / "docs" / "images"
 
 Keep = Callable[[StageMetrics], bool]
@@ -98,7 +98,7 @@ def rate_table(runs: Mapping[str, RecordedRun], measure: str) -> Table:
 
 
 def claim_table(runs: Mapping[str, RecordedRun]) -> Table:
-    """Differences in SR between agents under every perception, with the paper's two settings beside them."""
+    """Differences in SR between agents under every perception, and the paper's in its two settings."""
     rows = []
     for title, a, b, keep in CLAIMS:
         paper = tuple(_paper_difference(PAPER[half][a], PAPER[half][b], title) for half in ("gt", "prediction"))

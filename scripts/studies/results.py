@@ -1,4 +1,4 @@
-"""Agents against each other and beside the paper: runs them, and writes the marked parts of the pages of results.
+"""Agents compared with each other and with the paper: runs them, and writes the marked parts of the pages of results.
 
     python scripts/studies/results.py --out out/results --tasks TASKS/hard TASKS/tiny-val:10 --small TASKS/attr
 

@@ -180,7 +180,7 @@ class NumpyList:
         return [FoundPlace(_point(self._boxes_m[index].mean(axis=0)), self._confidences[index]) for index in found[:k]]
 
     def num_bytes(self) -> int:
-        """Return the bytes of the boxes and labels, and about those of the numbers beside them."""
+        """Return the bytes of the boxes and labels, and about those of the numbers that go with them."""
         return self._boxes_m.nbytes + sum(map(len, self._labels)) + 2 * SEEN_BYTES * len(self._labels)
 
 

@@ -186,7 +186,7 @@ class CocoPerception(DetectorPerception):
         self._models = models
 
     def check(self, agents: Sequence[str]) -> dict[str, Any]:
-        """Return what decides results beside options: the checksum of the weights, and numpy's version.
+        """Return what decides results besides options: the checksum of the weights, and numpy's version.
 
         Args:
             agents: Agents that will use it; they all see the same.

@@ -51,7 +51,7 @@ class MiniPerception(DetectorPerception):
         super().__init__(MiniDetector(min_confidence=min_confidence, min_cells=min_cells), filters)
 
     def check(self, agents: Sequence[str]) -> dict[str, Any]:
-        """Return what decides results beside options: the checksum of the weights.
+        """Return what decides results besides options: the checksum of the weights.
 
         Args:
             agents: Agents that will use it; they all see the same.

@@ -196,7 +196,7 @@ def modules_of(stack: StackName) -> tuple[str, ...]:
 
 
 def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[str, Any]:
-    """Return what decides a stack's results beside its options: hashes of weights and versions of libraries.
+    """Return what decides a stack's results besides its options: hashes of weights and versions of libraries.
 
     Raises:
         PerceptionError: A library or a file is missing, or a file is not what it should be.
@@ -291,7 +291,7 @@ class StackPerception:
             agents: Agents that will use it.
 
         Returns:
-            What decides results beside options: by stack, hashes of weights and versions of libraries.
+            What decides results besides options: by stack, hashes of weights and versions of libraries.
 
         Raises:
             PerceptionError: Something is missing; the message says what to do.

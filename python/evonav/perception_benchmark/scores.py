@@ -217,7 +217,7 @@ class _Scorer:
         ]
 
     def _average_precisions(self) -> tuple[list[float], dict[str, dict[str, Estimate]]]:
-        """Return the mean curve, and AP by category; "" is their mean, beside AP of places alone."""
+        """Return the mean curve, and AP by category; "" has their mean, and AP of places alone."""
         houses, draws = self.houses, self.houses.draws[:NUM_AP_RESAMPLES]
         names = sorted(set(self.truth_category.tolist()))
         if not names:

@@ -1,1 +1,1 @@
-"""Measure how long parts of evonav take, beside other libraries on the same inputs in the same run."""
+"""Measure how long parts of evonav take, compared with other libraries on the same inputs in the same run."""

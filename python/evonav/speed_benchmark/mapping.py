@@ -1,4 +1,4 @@
-"""Updates of a map, frame by frame on a walk: agents' occupancy beside volumes of OctoMap and Open3D."""
+"""Updates of a map, frame by frame on a walk: agents' occupancy compared with volumes of OctoMap and Open3D."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

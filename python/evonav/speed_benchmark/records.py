@@ -13,7 +13,7 @@ MARKDOWN_NAME = "speed.md"
 
 
 class Row(MeasurementRecord):
-    """One operation, alone or beside one peer."""
+    """One operation, alone or compared with one peer."""
 
     operation: str
     ms: float = Field(ge=0, allow_inf_nan=False)

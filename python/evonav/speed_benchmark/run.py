@@ -1,4 +1,4 @@
-"""Run a section and show its figures: as a table, as Markdown, and beside those of an earlier run."""
+"""Run a section and show its figures: as a table, as Markdown, and compared with an earlier run."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

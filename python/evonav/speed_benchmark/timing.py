@@ -168,8 +168,8 @@ def rows_of(
     for name, times_ms in peers_ms.items():
         ratios = [peer / max(our, least_ms) for peer, our in zip(times_ms, ours_ms, strict=True)]
         ratio = bootstrap.median(ratios)
-        beside = {"peer": name, "peer_ms": float(np.median(times_ms)), "ratio": ratio.value, "ratio_ci95": ratio.ci95}
-        rows.append(alone.model_copy(update=beside))
+        compared = {"peer": name, "peer_ms": float(np.median(times_ms)), "ratio": ratio.value, "ratio_ci95": ratio.ci95}
+        rows.append(alone.model_copy(update=compared))
     return rows or [alone]
 
 

@@ -1,4 +1,4 @@
-"""`evonav bench`: how fast evonav is on this machine, beside other libraries."""
+"""`evonav bench`: how fast evonav is on this machine, compared with other libraries."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -80,8 +80,8 @@ def speed(
         typer.Option(
             "--peer",
             metavar="NAME",
-            help="Peer to run beside evonav, or none. Repeat the option for more, or separate them by commas. Default: "
-            "all that are installed; the extra `bench` installs them.",
+            help="Peer to compare evonav with, or none. Repeat the option for more, or separate them by commas. "
+            "Default: all that are installed; the extra `bench` installs them.",
         ),
     ] = None,
     houses: Annotated[
@@ -104,7 +104,7 @@ def speed(
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Folder to write JSON and Markdown to.")] = None,
     against: Against = None,
 ) -> None:
-    """Measure evonav's speed on this machine, beside other libraries.
+    """Measure evonav's speed on this machine, compared with other libraries.
 
     render: an image (peers: embreex, moderngl). navigation: a shortest path (pyastar2d, scikit-image, scipy). mapping:
     a map's update (octomap, open3d). gym: an environment's step (sync and async, which are Gymnasium's own; embreex,

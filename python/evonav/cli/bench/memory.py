@@ -48,7 +48,7 @@ Oracle = Annotated[
     Path | None,
     typer.Option(
         metavar="FOLDER",
-        help="Folder of the truth, to keep it from the system that is measured. Default: beside the frames.",
+        help="Folder of the truth, to keep it from the system that is measured. Default: that of the frames.",
     ),
 ]
 ResultOut = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder of the records and the report.")]

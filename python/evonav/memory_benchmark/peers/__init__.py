@@ -1,1 +1,1 @@
-"""Memories of other libraries, run beside ours (extra `bench`)."""
+"""Memories of other libraries, to compare ours with (extra `bench`)."""

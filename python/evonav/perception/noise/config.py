@@ -36,7 +36,7 @@ class NoiseConfig:
     half_distance_m: float = 0.0
     """>= 0: mean depth at which half of the near ones are found; 0: distance has no effect.
 
-    It acts beside size, which distance makes small."""
+    It acts in addition to size, which distance makes small."""
     distance_slope: float = 4.0
     """> 0: exponent of `1 / (1 + (distance / half)^slope)`."""
     half_visible: float = 0.0
@@ -68,7 +68,7 @@ class NoiseConfig:
     """0..1: detections below are dropped."""
 
     mask_margin_px: float = 0.0
-    """-20..20: mean margin of masks in an image 300 pixels high; positive: they bleed into what is beside."""
+    """-20..20: mean margin of masks in an image 300 pixels high; positive: they bleed into what is next to them."""
     mask_margin_spread_px: float = 0.0
     """0..20: deviation of the margin."""
     box_jitter: float = 0.0

@@ -176,9 +176,9 @@ def _far_table(run: RecordedRun) -> Table:
                 (far if moved_m > FAR_M else near).append(outcome.row)
         rows.append((agent, _with_interval(rates(far)), _with_interval(rates(near))))
     note = (
-        "SR % of the moved targets of Table 2, by the distance on the ground plane from the place in stage 1. Who "
-        f"stops at the old place of a target that moved less than the success radius of {FAR_M:g} m may still succeed. "
-        "The paper has no such split."
+        "SR % of the moved targets of Table 2, by the distance on the ground plane from the place in stage 1. An "
+        f"agent that stops at the old place of a target that moved less than the success radius of {FAR_M:g} m may "
+        "still succeed. The paper has no such split."
     )
     columns = ("Agent", f"moved more than {FAR_M:g} m", "moved less")
     return Table("Table 2 by how far the target moved", columns, tuple(rows), (note,))
