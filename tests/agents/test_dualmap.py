@@ -107,7 +107,7 @@ def test_the_anchor_stays_and_everything_else_is_forgotten_when_it_is_out_of_the
     assert watching.known == ([label], [])
     watching.see(GONE)
     assert watching.known == ([], anchors)
-    told = [one.label for one in watching.agent.entries()]
+    told = [one.label for one in watching.agent.explain().entries()]
     assert told == anchors
 
 
@@ -128,7 +128,7 @@ def told_by(agent, *stages):
 
     def noting(observation):
         action = act(observation)
-        told.append((numbers[-1], agent.diagnostics()))
+        told.append((numbers[-1], agent.explain()))
         return action
 
     agent.act, agent.begin_stage = noting, lambda goal: numbers.append(goal.stage) or begin_stage(goal)

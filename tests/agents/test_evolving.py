@@ -179,7 +179,7 @@ def test_its_belief_is_told_and_sites_of_furniture_are_inspected():
     _, rounds = rounds_of(agent, stage_case(1, "Mug|1"))
     details = [diagnostics.details for _, _, diagnostics, _ in rounds]
     assert all(0.0 <= one["p_unknown"] <= 1.0 for one in details)
-    assert all(0.0 < one.p_present <= 1.0 for one in agent.entries())
+    assert all(0.0 < one.p_present <= 1.0 for one in agent.explain().entries())
     assert rounds[-1][2].counters["sites_inspected"] > 0
 
 

@@ -1,11 +1,11 @@
 """An agent that hands its map and its objects over is recorded and drawn like those that come with evonav."""
 
 import numpy as np
-from toy_episode import run
+from toy_episode import belief_of, run
 from toy_house import stage_case
 
 from evonav import Agent, Explanation, NavigateTo, ObjectMap, OccupancyMap, Stop
-from evonav.agents.explanation import explaining, inspectable
+from evonav.agents.explanation import explains
 
 
 class Explained(Agent):
@@ -25,7 +25,7 @@ class Explained(Agent):
             self.map.update(view)
             self.objects.update(view)
         self.map.update_frontiers((observation.pose.x_m, observation.pose.z_m))
-        self.beliefs.append(inspectable(self).belief())
+        self.beliefs.append(belief_of(self))
         self.chosen = next(iter(self.objects.entries), None)
         if self.chosen is None or observation.has_arrived:
             return Stop()
@@ -51,17 +51,47 @@ def test_an_explanation_becomes_records_and_beliefs():
 
 
 def test_parts_of_an_explanation_may_be_missing():
-    class Silent(Agent):
-        def explain(self):
-            return Explanation(choice="wait")
+    silent = Explanation(choice="wait")
+    assert silent.map_belief() is None
+    assert silent.entries() == []
+    said = silent.diagnostics(is_first=True)
+    assert (said.choice, said.chosen_entry, said.num_entries, said.num_frontiers) == ("wait", None, 0, 0)
 
-    belief = inspectable(Silent()).belief()
-    assert not belief.cells.any()
-    assert belief.entries == []
-    assert explaining(Silent()).diagnostics().choice == "wait"
-    assert explaining(Silent()).entries() == []
+
+def test_functions_are_called_only_where_their_value_is_needed():
+    called = []
+    lazy = Explanation(
+        map=lambda: called.append("map"),
+        objects=lambda: called.append("objects") or [],
+        places=lambda: called.append("places"),
+    )
+    lazy.diagnostics(is_first=False)
+    assert called == []
+    lazy.diagnostics(is_first=True)
+    lazy.entries()
+    lazy.map_belief()
+    assert called == ["places", "objects", "map"]
 
 
 def test_an_agent_without_explanation_has_none():
-    assert explaining(Agent) is None
-    assert inspectable(object()) is None
+    assert not explains(Agent)
+    assert not explains(object())
+
+
+class Helpful(Explained):
+    """Has helper methods whose names say nothing to the evaluator."""
+
+    def belief(self, place):
+        raise AssertionError("not the evaluator's")
+
+    def entries(self, label):
+        raise AssertionError("not the evaluator's")
+
+    def diagnostics(self, verbose):
+        raise AssertionError("not the evaluator's")
+
+
+def test_helper_methods_of_any_name_change_nothing():
+    records = [run(agent, stage_case(1, "Mug|1"))[0] for agent in (Explained(), Helpful())]
+    assert records[0] == records[1]
+    assert records[0].entries

@@ -111,7 +111,7 @@ def test_the_agent_does_not_go_to_what_is_voted_absent_and_keeps_it_with_its_dat
     assert gone
     kept = {str(entry.id) for entry in agent._navigator.objects.entries}
     assert gone & kept
-    told = {str(entry.entry_id) for entry in agent.entries()}
+    told = {str(entry.entry_id) for entry in agent.explain().entries()}
     assert not told & set(details[-1]["disappeared"])
     assert records[-1].state == "success"
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scripted_model import Scripted
-from toy_episode import START, run
+from toy_episode import START, belief_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.agent import NavigateTo
@@ -175,7 +175,7 @@ class Noting(MsgNav):
 
     def act(self, observation):
         action = super().act(observation)
-        self.rounds.append((observation, action, self.belief()))
+        self.rounds.append((observation, action, belief_of(self)))
         return action
 
     @property

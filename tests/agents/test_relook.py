@@ -149,7 +149,7 @@ def hide_arrivals(agent, stage, num):
         return replace(view, depth_m=np.full_like(view.depth_m, 0.3), detections=nothing)
 
     def act_hidden(observation):
-        if stages[-1] >= stage and observation.has_arrived and agent.diagnostics().choice.startswith("object"):
+        if stages[-1] >= stage and observation.has_arrived and agent.explain().choice.startswith("object"):
             if len(poses) < num:
                 observation = replace(observation, views=tuple(map(hidden, observation.views)))
             poses.append(observation.pose)

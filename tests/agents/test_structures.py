@@ -77,7 +77,7 @@ def after(name: str, look: tuple[Observation, TaskInfo]) -> tuple[Agent, list[Qu
 
 @pytest.mark.parametrize("name", ["fu", "stage-reset", "ftu", "3d-mem", "3d-mem+"])
 def test_agents_with_3d_mems_background_remember_windows_and_no_doors(name: str, look) -> None:
-    labels = {entry.label for entry in after(name, look)[0].entries()}
+    labels = {entry.label for entry in after(name, look)[0].explain().entries()}
     assert labels >= WINDOWS
     assert not DOORS & labels
 
@@ -85,7 +85,7 @@ def test_agents_with_3d_mems_background_remember_windows_and_no_doors(name: str,
 @pytest.mark.parametrize("name", ["msgnav", "msgnav+"])
 def test_msgnav_remembers_doors_and_windows(name: str, look) -> None:
     agent, _ = after(name, look)
-    labels = {entry.label for entry in agent.entries()}
+    labels = {entry.label for entry in agent.explain().entries()}
     assert labels >= WINDOWS
     assert "Doorway" in labels
 
@@ -97,7 +97,7 @@ def test_the_list_is_each_agents_own(look) -> None:
     agent.begin_task(look[1])
     agent.begin_stage(Goal(1, "Mug", GOAL, GOAL, GOAL, np.zeros((1, 1, 3), np.uint8)))
     agent.act(look[0])
-    assert not {*STRUCTURE_TYPES, "Chair"} & {entry.label for entry in agent.entries()}
+    assert not {*STRUCTURE_TYPES, "Chair"} & {entry.label for entry in agent.explain().entries()}
 
 
 @pytest.mark.parametrize("name", ["fu", "ftu"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import toy_episode
 from scripted_model import Scripted
-from toy_episode import START
+from toy_episode import START, belief_of
 from toy_house import CHAIR_AWAY, OBJECTS, stage_case
 
 from evonav.agents.agent import NavigateTo
@@ -30,7 +30,7 @@ class Watched(ThreeDMem):
 
     def act(self, observation):
         action = super().act(observation)
-        belief = self.belief()
+        belief = belief_of(self)
         self.rounds.append(
             {
                 "action": action,
@@ -105,7 +105,7 @@ def test_the_entry_stays_after_it_was_not_there(moved):
 def test_a_moved_object_becomes_another_entry(moved):
     """Detections and entries are matched by label and place: simulator ids would have moved the old entry."""
     agent, _ = moved
-    chairs = [entry for entry in agent.entries() if entry.label == "Chair"]
+    chairs = [entry for entry in agent.explain().entries() if entry.label == "Chair"]
     places = [ground(OBJECTS["Chair|1"][1]), ground(CHAIR_AWAY["Chair|1"])]
     assert len(chairs) == 2
     for chair, place in zip(sorted(chairs, key=lambda entry: entry.entry_id), places, strict=True):
@@ -198,7 +198,7 @@ def test_only_what_the_prefilter_kept_is_shown():
     assert {name for entry in record.trace for name in entry.details["prefilter"]} >= set(kept)
     assert all(len(entry.details["prefilter"]) <= 2 for entry in record.trace)
     # The memory holds more than is shown.
-    assert {entry.label for entry in agent.entries()} - set(kept)
+    assert {entry.label for entry in agent.explain().entries()} - set(kept)
 
 
 def test_without_an_answer_to_the_prefilter_only_frontiers_are_left():
@@ -286,7 +286,7 @@ def test_a_clean_up_that_drops_the_chosen_entry_does_not_end_the_commitment(monk
 
     def dropping(self, view):
         found = update(self, view)
-        kind, _, entry_id = agent.diagnostics().choice.partition(" ")
+        kind, _, entry_id = agent.explain().choice.partition(" ")
         if kind != "object" or not self.remove(int(entry_id)):
             return found
         return replace(found, removed=(*found.removed, int(entry_id)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import toy_episode
 from scripted_model import scripted
-from toy_episode import START
+from toy_episode import START, belief_of
 from toy_house import OBJECTS, stage_case
 
 from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished, UniGoalConfig
@@ -45,7 +45,7 @@ class Watched(UniGoal):
 
     def act(self, observation):
         action = super().act(observation)
-        self.rounds.append((observation, self.belief(), self.diagnostics()))
+        self.rounds.append((observation, belief_of(self), self.explain()))
         return action
 
 
@@ -74,7 +74,7 @@ def test_the_goal_in_view_is_approached_confirmed_and_stopped_at():
     assert set(seen[:first]) == {"exploration"}
     assert seen[-1] == "confirmed detection"
     assert set(seen[first:-1]) <= {"temporary detection", "confirmed detection"}
-    assert agent.diagnostics().details["distance_m"] < 0.25
+    assert agent.explain().details["distance_m"] < 0.25
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def in_vain():
 
 def test_a_category_without_a_word_never_triggers_and_the_budget_is_500_actions(in_vain):
     agent, record = in_vain
-    assert agent.diagnostics().details["category"] is None
+    assert agent.explain().details["category"] is None
     assert len(record.trace) == 500
     assert not record.has_stopped
     assert set(choices(record)) <= {"exploration", "stuck", "none"}
@@ -112,7 +112,7 @@ def test_as_released_six_categories_are_known_as_published_all_that_are_mapped()
     for kind, category in ((UniGoal, "chair"), (UniGoalAsPublished, "refrigerator")):
         agent = kind()
         run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_actions=1))
-        assert agent.diagnostics().details["category"] == category
+        assert agent.explain().details["category"] == category
 
 
 def test_as_released_the_category_is_a_chair_after_ten_answers_that_name_none():
@@ -175,7 +175,7 @@ def test_an_obstacle_stays_when_it_is_gone_and_seals_nothing_else():
     class Remembering(UniGoal):
         def begin_stage(self, goal):
             if goal.stage == 2:
-                before.append(self.belief())
+                before.append(belief_of(self))
             super().begin_stage(goal)
 
     agent = Remembering()
@@ -184,7 +184,7 @@ def test_an_obstacle_stays_when_it_is_gone_and_seals_nothing_else():
     stages = (stage_case(1, "Chair|1"), stage_case(2, "Bed|1", moves=TABLE_AWAY, mode="FULL_SHUFFLE"))
     _, second = run(agent, *stages, start=start, protocol=ProtocolConfig())
     obstacles = blocked_m(before[0])
-    assert obstacles <= blocked_m(agent.belief())  # nothing is taken back
+    assert obstacles <= blocked_m(belief_of(agent))  # nothing is taken back
     x_m, _, z_m = OBJECTS["DiningTable|1"][1]
     assert any(abs(x_cm - 100 * x_m) < 50 and abs(z_cm - 100 * z_m) < 35 for x_cm, z_cm in obstacles)
     assert second.state is EndState.SUCCESS
@@ -195,9 +195,9 @@ def test_the_scene_graph_stays_and_the_goal_graph_goes():
 
     class Noting(UniGoal):
         def begin_stage(self, goal):
-            before = self.entries() if goal.stage == 2 else []
+            before = self.explain().entries() if goal.stage == 2 else []
             super().begin_stage(goal)
-            noted.append((before, self.entries()))
+            noted.append((before, self.explain().entries()))
 
     model = scripted()
     first, second = run(Noting(decision=model), stage_case(1, "GarbageCan|1"), stage_case(2, "Bed|1"))
@@ -219,7 +219,7 @@ def test_a_wrong_number_of_relation_lines_drops_the_edges():
     (bad,), (good,) = (run(agent, stage_case(1, "GarbageCan|1")) for agent in (wrong, right))
     assert good.trace[-1].counters["edges"] >= 1
     assert bad.trace[-1].counters["edges"] == 0
-    assert wrong.entries() == right.entries()
+    assert wrong.explain().entries() == right.explain().entries()
     num_asked = sum(isinstance(question, RelationLinesQuestion) for question in models[0].questions)
     assert bad.trace[-1].counters["invalid_answers"] == num_asked  # no second try
 
@@ -236,7 +236,7 @@ def test_as_released_the_score_is_nothing_or_a_half():
         agent = UniGoal(decision=scripted(category="none"))
         (record,) = run(agent, stage_case(1, "Chair|1", instruction=goal))
         assert {(e.details["match"], e.details["score"]) for e in record.trace} == {("zero", score)}
-        assert len(agent.entries()) >= 2
+        assert len(agent.explain().entries()) >= 2
 
 
 def test_as_published_a_node_found_whole_is_walked_to():

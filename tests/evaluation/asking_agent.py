@@ -4,7 +4,8 @@ import os
 import socket
 from pathlib import Path
 
-from evonav.agents.agent import RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import SensorConfig, Stop
+from evonav.agents.explanation import Explanation
 from evonav.decision.prompts import Prompt
 from evonav.errors import DecisionError, InvalidArgumentError
 
@@ -46,11 +47,8 @@ class Asking:
     def act(self, observation):
         return Stop()
 
-    def diagnostics(self):
-        return RoundDiagnostics(details=self._found)
-
-    def entries(self):
-        return []
+    def explain(self):
+        return Explanation(details=self._found)
 
 
 def _tried(action):

@@ -5,7 +5,8 @@ import random
 import sys
 import time
 
-from evonav.agents.agent import EntryBelief, Move, RoundDiagnostics, SensorConfig, ViewSchedule
+from evonav.agents.agent import EntryBelief, Move, SensorConfig, ViewSchedule
+from evonav.agents.explanation import Explanation
 from evonav.world.simulator import Action
 
 
@@ -26,8 +27,8 @@ class Turning:
     def act(self, observation):
         return Move(self.random.choice([Action.TURN_LEFT, Action.TURN_RIGHT]))
 
-    def diagnostics(self):
-        return RoundDiagnostics(choice="turn")
+    def explain(self):
+        return Explanation(choice="turn", objects=self.entries)
 
     def entries(self):
         return [EntryBelief(1, self.category, self.corner_m, (1.0, 1.0, 1.0), 1)]
@@ -88,8 +89,8 @@ class Wordless(Turning):
 
 
 class Opaque(Turning):
-    def diagnostics(self):
-        return RoundDiagnostics(details={"self": self})
+    def explain(self):
+        return Explanation(details={"self": self}, objects=self.entries)
 
 
 class Senseless(Turning):

@@ -8,7 +8,8 @@ import numpy as np
 import toy_house
 from toy_agents import Explorer
 
-from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
+from evonav.agents.agent import EntryBelief, Move, NavigateTo, SensorConfig, Stop, ViewSchedule
+from evonav.agents.explanation import Explanation
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.entries import Entries
 from evonav.errors import DecisionError
@@ -83,21 +84,21 @@ ACTIONS = {
     "none": (None, "None is no action"),
 }
 DIAGNOSTICS = {
-    "nan": (RoundDiagnostics(counters={"a": math.nan}), "diagnostics.counters.a = nan"),
-    "half": (RoundDiagnostics(counters={"a": 1.5}), "diagnostics.counters.a = 1.5"),
-    "large": (RoundDiagnostics(counters={"a": 2**63}), "counters.a must be -1000000000000000 to 1000000000000000"),
-    "number": (RoundDiagnostics(num_entries=10**50), "num_entries must be 0 to 1000000000000000"),
-    "negative": (RoundDiagnostics(num_frontiers=-1), "num_frontiers must be 0 to 1000000000000000"),
-    "many": (RoundDiagnostics(counters={str(i): i for i in range(2000)}), "counters must be at most 1000"),
-    "entry": (RoundDiagnostics(chosen_entry=entry(centre_m=(math.nan, 0.0, 0.0))), "chosen_entry.centre_m.0 = nan"),
-    "far": (RoundDiagnostics(chosen_entry=entry(centre_m=(1e308, 0.0, 0.0))), "centre_m must be within 1e+06 m"),
-    "digits": (RoundDiagnostics(details={"a": 10**5000}), "Invalid JSON"),
-    "bytes": (RoundDiagnostics(details={"a": b"\xff"}), "diagnostics: not JSON-ready"),
-    "cycle": (RoundDiagnostics(details={"a": CYCLE}), "diagnostics: not JSON-ready: Circular reference"),
-    "key": (RoundDiagnostics(details={"\ud800": 1}), "diagnostics: not JSON-ready"),
-    "text": ("none", "diagnostics = 'none'"),
-    "long": (RoundDiagnostics(choice="x" * 900_000), None),
-    "anything": (RoundDiagnostics(details={"a": math.nan, "b": [-math.inf], math.nan: {None: True}}), None),
+    "nan": (Explanation(counters={"a": math.nan}), "diagnostics.counters.a = nan"),
+    "half": (Explanation(counters={"a": 1.5}), "diagnostics.counters.a = 1.5"),
+    "large": (Explanation(counters={"a": 2**63}), "counters.a must be -1000000000000000 to 1000000000000000"),
+    "number": (Explanation(num_entries=10**50), "num_entries must be 0 to 1000000000000000"),
+    "negative": (Explanation(num_frontiers=-1), "num_frontiers must be 0 to 1000000000000000"),
+    "many": (Explanation(counters={str(i): i for i in range(2000)}), "counters must be at most 1000"),
+    "entry": (Explanation(chosen_entry=entry(centre_m=(math.nan, 0.0, 0.0))), "chosen_entry.centre_m.0 = nan"),
+    "far": (Explanation(chosen_entry=entry(centre_m=(1e308, 0.0, 0.0))), "centre_m must be within 1e+06 m"),
+    "digits": (Explanation(details={"a": 10**5000}), "Invalid JSON"),
+    "bytes": (Explanation(details={"a": b"\xff"}), "diagnostics: not JSON-ready"),
+    "cycle": (Explanation(details={"a": CYCLE}), "diagnostics: not JSON-ready: Circular reference"),
+    "key": (Explanation(details={"\ud800": 1}), "diagnostics: not JSON-ready"),
+    "text": ("none", "explain = 'none'"),
+    "long": (Explanation(choice="x" * 900_000), None),
+    "anything": (Explanation(details={"a": math.nan, "b": [-math.inf], math.nan: {None: True}}), None),
 }
 STAGES = [
     (kind, value, message)
@@ -166,15 +167,18 @@ class Saying(Explorer):
     def begin_stage(self, goal):
         super().begin_stage(goal)
         self.kind, self.value, _ = STAGES[goal.stage - 1]
+        self.has_acted = False
 
     def act(self, observation):
+        self.has_acted = True
         return self.value if self.kind == "act" else super().act(observation)
 
     def entries(self):
         return self.value if self.kind == "entries" else []
 
-    def diagnostics(self):
-        return self.value if self.kind == "diagnostics" else RoundDiagnostics()
+    def explain(self):
+        has_acted = self.kind == "diagnostics" and self.has_acted
+        return self.value if has_acted else Explanation(objects=self.entries)
 
 
 class Raising(Explorer):
@@ -198,11 +202,8 @@ class Talkative(Explorer):
     def act(self, observation):
         return Move(Action.TURN_LEFT)
 
-    def diagnostics(self):
-        return RoundDiagnostics(details={"thoughts": "x" * 999_000} if self.stage == 1 else {})
-
-    def entries(self):
-        return []
+    def explain(self):
+        return Explanation(details={"thoughts": "x" * 999_000} if self.stage == 1 else {})
 
 
 def raw_entry(text):
@@ -238,11 +239,8 @@ class Forging(Explorer):
             name, text, _ = RAW[goal.stage - 1]
             getattr(wire, name).__dict__["write"] = lambda value: text
 
-    def entries(self):
-        return []
-
-    def diagnostics(self):
-        return RoundDiagnostics()
+    def explain(self):
+        return Explanation()
 
 
 def load_long(path, num_stages):

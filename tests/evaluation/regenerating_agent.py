@@ -5,7 +5,8 @@ import itertools
 import re
 
 import evonav
-from evonav.agents.agent import NavigateTo, RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import NavigateTo, SensorConfig, Stop
+from evonav.agents.explanation import Explanation
 from evonav.generation.pipeline import generate_task
 
 NUM_SEEDS = 20
@@ -58,8 +59,5 @@ class Regenerating:
         x_m, _, z_m = self.task.oracle(self.stage).target.position_m
         return Stop() if observation.has_arrived and next(self.rounds) else NavigateTo((x_m, z_m))
 
-    def diagnostics(self):
-        return RoundDiagnostics(choice=self.name)
-
-    def entries(self):
-        return []
+    def explain(self):
+        return Explanation(choice=self.name)

@@ -11,7 +11,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from evonav.agents.agent import Move, RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import Move, SensorConfig, Stop
+from evonav.agents.explanation import Explanation
 from evonav.world.simulator import Action
 
 PROJECT = Path(__file__).parent
@@ -155,8 +156,5 @@ class Spy:
             return Move(Action.TURN_LEFT)
         return Stop()
 
-    def diagnostics(self):
-        return RoundDiagnostics(details=self.found)
-
-    def entries(self):
-        return []
+    def explain(self):
+        return Explanation(details=self.found)

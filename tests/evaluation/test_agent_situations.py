@@ -40,7 +40,7 @@ class Fragile(NearestFrontier):
         self.raise_if(not observation.is_action_success, "failed action")
         self.raise_if(is_first and sees_nothing, "nothing there")
         action = super().act(observation)
-        self.raise_if(not is_first and self.diagnostics().num_frontiers == 0, "no frontier")
+        self.raise_if(not is_first and self.explain().num_frontiers == 0, "no frontier")
         self.raise_if(observation.num_rounds_left == 1, "no rounds left")
         return action
 

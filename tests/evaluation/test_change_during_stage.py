@@ -7,7 +7,8 @@ from toy_change import changing_stage
 from toy_episode import run
 from toy_house import OBJECTS, stage_case
 
-from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import EntryBelief, Move, NavigateTo, SensorConfig, Stop
+from evonav.agents.explanation import Explanation
 from evonav.evaluation.metrics.stage_metrics import metrics_of
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
@@ -39,8 +40,8 @@ class Walker:
             self.left_m.pop(0)
         return NavigateTo(self.left_m[0]) if self.left_m else Stop("there")
 
-    def diagnostics(self):
-        return RoundDiagnostics(choice="none", chosen_entry=self.entries()[0], num_entries=1, num_frontiers=0)
+    def explain(self):
+        return Explanation(choice="none", chosen_entry=self.entries()[0], num_entries=1, objects=self.entries)
 
     def entries(self):
         return (EntryBelief(entry_id=1, label="Chair", centre_m=CHAIR, size_m=(0.5, 0.9, 0.5), num_detections=3),)

@@ -86,7 +86,10 @@ class Deadly(FrontierUpdate):
 class Reticent(FrontierUpdate):
     """Cannot say what it holds true."""
 
-    def belief(self):
+    def explain(self):
+        return replace(super().explain(), map=self._map)
+
+    def _map(self):
         raise KeyError("belief")
 
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
+from evonav.agents.agent import EntryBelief, Move, NavigateTo, SensorConfig, Stop, ViewSchedule
+from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.entries import Entries
 from evonav.errors import InvalidArgumentError

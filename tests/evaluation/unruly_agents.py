@@ -8,12 +8,14 @@ import os
 import socket
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from toy_agents import Explorer
 
-from evonav.agents.agent import EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop, ViewSchedule
+from evonav.agents.agent import EntryBelief, NavigateTo, SensorConfig, Stop, ViewSchedule
+from evonav.agents.explanation import Explanation
 from evonav.errors import DecisionError, SimulatorLostError
 
 
@@ -152,14 +154,17 @@ class Telling(Explorer):
 
     @property
     def said(self):
-        return RoundDiagnostics()
+        return Explanation()
 
-    def diagnostics(self):
-        return self.said if self.stage == 2 else RoundDiagnostics()
+    def explain(self):
+        return replace(self.said if self.stage == 2 else Explanation(), objects=self.entries)
+
+    def entries(self):
+        return []
 
 
 class Verbose(Telling):
-    said = RoundDiagnostics(details={"thoughts": "x" * 2_000_000})
+    said = Explanation(details={"thoughts": "x" * 2_000_000})
 
 
 class Deep(Telling):
@@ -168,19 +173,19 @@ class Deep(Telling):
         inner = []
         for _ in range(100):
             inner = [inner]
-        return RoundDiagnostics(details={"inner": inner})
+        return Explanation(details={"inner": inner})
 
 
 class Secretive(Telling):
-    said = RoundDiagnostics(details={"model": object()})
+    said = Explanation(details={"model": object()})
 
 
 class Mistaken(Telling):
-    said = RoundDiagnostics(num_entries="many")
+    said = Explanation(num_entries="many")
 
 
 class Misplaced(Telling):
-    said = RoundDiagnostics(chosen_entry=EntryBelief(1, "Mug", (0.0, math.nan, 0.0), (1.0, 1.0, 1.0), 1))
+    said = Explanation(chosen_entry=EntryBelief(1, "Mug", (0.0, math.nan, 0.0), (1.0, 1.0, 1.0), 1))
 
 
 class Unlimited(Telling):
@@ -209,7 +214,7 @@ class Farthest(Explorer):
 class Exotic(Telling):
     """All of this can be kept."""
 
-    said = RoundDiagnostics(
+    said = Explanation(
         choice="half a pair: \ud800, \U0001f600, \x00",
         counters={"counts": np.int64(3)},
         details={"nan": math.nan, "float32": np.float32(0.1), 3: (1, 2), "large": 10**30, "inf": -math.inf},
@@ -257,8 +262,8 @@ class Echo:
         ]
         return Stop(f"{len(observation.views)} views")
 
-    def diagnostics(self):
-        return RoundDiagnostics(details={"seen": self.seen})
+    def explain(self):
+        return Explanation(details={"seen": self.seen}, objects=self.entries)
 
     def entries(self):
         return []
@@ -281,6 +286,9 @@ class Counting(Echo):
 
 
 class Amnesiac(Explorer):
+    def explain(self):
+        return Explanation(objects=self.entries)
+
     def entries(self):
         if self.stage == 2:
             raise RuntimeError("who am I?")

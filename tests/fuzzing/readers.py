@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from mutation import json_bytes, mutated_bytes, mutated_json
 
-from evonav.agents.agent import EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig
+from evonav.agents.agent import EntryBelief, NavigateTo, SensorConfig
+from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting import wire
 from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.vlm.answer import read_answer, read_response, usage_of

@@ -1,5 +1,7 @@
 """Episodes of an agent in the toy house."""
 
+from types import SimpleNamespace
+
 from toy_house import ToySimulator
 
 from evonav.evaluation.episode.episode import Episode
@@ -22,14 +24,30 @@ def run(agent, *stages, start=START, protocol=None, perception=None, seed=7, siz
     return records
 
 
+def belief_of(agent):
+    """Return what an agent believes now: values that do not change with it."""
+    found = agent.explain()
+    drawn = found.map_belief()
+    return SimpleNamespace(
+        entries=found.entries(),
+        candidate_ids=found.candidate_ids,
+        queries=found.questions,
+        places=found.place_belief(),
+        cells=drawn.cells,
+        map_frame=drawn.map_frame,
+        frontiers=list(drawn.frontiers),
+        explored=drawn.explored,
+    )
+
+
 def rounds_of(agent, *stages):
-    """Return the records, and each round's stage, belief, diagnostics and action."""
+    """Return the records, and each round's stage, belief, explanation and action."""
     rounds, numbers = [], []
     act, begin_stage = agent.act, agent.begin_stage
 
     def noting(observation):
         action = act(observation)
-        rounds.append((numbers[-1], agent.belief(), agent.diagnostics(), action))
+        rounds.append((numbers[-1], belief_of(agent), agent.explain(), action))
         return action
 
     agent.act = noting

@@ -1,14 +1,9 @@
 """The agent contract: what evonav evaluates, and every answer that an agent may give."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from evonav.decision.query import QueryLogEntry
-from evonav.sensors.observation import MapFrame, Observation
+from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Action
 
@@ -152,74 +147,3 @@ class PlaceBelief:
     """Middles of the squares, `(x, z)`."""
     probabilities: tuple[float, ...]
     """Probability of each square, 0 to 1."""
-
-
-@dataclass(frozen=True, slots=True)
-class RoundDiagnostics:
-    """A round as the agent describes it."""
-
-    choice: str = ""
-    """The agent's choice, for example `object 12`, `frontier 3`, `none`."""
-    chosen_entry: EntryBelief | None = None
-    num_entries: int = 0
-    num_frontiers: int = 0
-    counters: dict[str, int] = field(default_factory=dict)
-    """Cumulative counts, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
-    details: dict[str, Any] = field(default_factory=dict)
-    """Further JSON-ready values."""
-    places: PlaceBelief | None = None
-    """Belief of where the target is. That of a stage's first round is recorded and scored."""
-
-
-@runtime_checkable
-class ExplainingAgent(Protocol):
-    """An agent that can report its beliefs; for records and pictures, never for scoring."""
-
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return what the agent chose in the last round, and its counters."""
-        ...
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory.
-
-        It is called when a stage begins, when it ends, and between rounds when an observed change may have changed it.
-        """
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class FrontierBelief:
-    """A frontier in the agent's map."""
-
-    frontier_id: int
-    position_m: tuple[float, float]
-    direction_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """Everything that an agent believes in a round."""
-
-    entries: Sequence[EntryBelief]
-    candidate_ids: tuple[int, ...]
-    """Ids of the entries that the last question offered."""
-    frontiers: Sequence[FrontierBelief]
-    cells: NDArray[np.uint8]
-    """`(R, C)`: 0 unknown, 1 free, 2 blocked."""
-    map_frame: MapFrame
-    """Frame of `cells`; it may differ from the task's own."""
-    queries: tuple[QueryLogEntry, ...]
-    """The questions of the round with their answers."""
-    explored: NDArray[np.bool_] | None = None
-    """`(R, C)`: cells that were seen from close by, if the agent distinguishes them."""
-    places: PlaceBelief | None = None
-    """Belief of where the target is."""
-
-
-@runtime_checkable
-class InspectableAgent(Protocol):
-    """An agent whose rounds can be inspected (`evonav view`); never used in an evaluation."""
-
-    def belief(self) -> Belief:
-        """Return what the agent believes after `act`."""
-        ...

@@ -1,37 +1,71 @@
-"""Let an agent explain itself by handing over its map and its object memory."""
+"""Let an agent explain itself: what it knows and chose, for records and pictures, never for scoring."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from evonav.agents.agent import (
-    Belief,
-    EntryBelief,
-    ExplainingAgent,
-    FrontierBelief,
-    InspectableAgent,
-    PlaceBelief,
-    RoundDiagnostics,
-)
+from evonav.agents.agent import EntryBelief, PlaceBelief
+from evonav.decision.query import QueryLogEntry
+from evonav.errors import InvalidArgumentError
 from evonav.sensors.observation import MapFrame
 
 if TYPE_CHECKING:
     from evonav.memory.objects import ObjectEntry, ObjectMap
     from evonav.memory.occupancy import OccupancyMap
 
-_NO_MAP = MapFrame(rows=1, cols=1, cell_m=0.05, corner_m=(0.0, 0.0))
+
+@dataclass(frozen=True, slots=True)
+class RoundDiagnostics:
+    """What records state of a round: the part of an explanation that is asked for in every one."""
+
+    choice: str = ""
+    """The agent's choice, for example `object 12`, `frontier 3`, `none`."""
+    chosen_entry: EntryBelief | None = None
+    num_entries: int = 0
+    num_frontiers: int = 0
+    counters: dict[str, int] = field(default_factory=dict)
+    """Cumulative counts, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """Further JSON-ready values."""
+    places: PlaceBelief | None = None
+    """Belief of where the target is, in a stage's first round: it is recorded and scored."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierBelief:
+    """A frontier in the agent's map."""
+
+    frontier_id: int
+    position_m: tuple[float, float]
+    direction_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class MapBelief:
+    """An agent's map as `evonav view` draws it."""
+
+    cells: NDArray[np.uint8]
+    """`(R, C)`: 0 unknown, 1 free, 2 blocked."""
+    map_frame: MapFrame
+    """Frame of `cells`; it may differ from the task's own."""
+    frontiers: Sequence[FrontierBelief] = ()
+    explored: NDArray[np.bool_] | None = None
+    """`(R, C)`: cells that were seen from close by, if the agent distinguishes them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """Answer of an agent's method `explain`, which is called after every `act`: what the agent knows and chose.
+    """Answer of an agent's method `explain`: what the agent knows, and what it chose in the last round.
 
-    Records then contain the object entries, and `evonav view` draws them with the map. Nothing of it is scored.
+    The method is called after every `act`, and when a stage begins and ends. Records then contain the object entries,
+    and `evonav view` draws them with the map. Nothing of it is scored, except `places` and the entries' `p_present`.
+    A function in place of a value is called only where the value is needed.
 
     Examples:
         >>> from evonav import Agent, Explanation, ObjectMap, OccupancyMap
@@ -43,88 +77,92 @@ class Explanation:
         ...         return Explanation(map=self.map, objects=self.objects)
     """
 
-    map: OccupancyMap | None = None
+    map: OccupancyMap | Callable[[], MapBelief | None] | None = None
     """The agent's map, with its frontiers."""
-    objects: ObjectMap | None = None
+    objects: ObjectMap | Callable[[], Sequence[EntryBelief]] | None = None
     """The agent's object memory."""
     chosen_id: int | None = None
     """Id of the entry of `objects` that the agent chose; the evaluator notes whether it was stale."""
+    chosen_entry: EntryBelief | None = None
+    """That entry as it was when it was chosen; default: as it is in `objects` now."""
     choice: str = ""
     """The choice in a few words; default: `object ID` if `chosen_id` is given. `frontier ID` is marked on the map."""
     reason: str = ""
     """Reason for the choice."""
+    num_entries: int | None = None
+    """Number of entries when the agent chose; default: those of an `ObjectMap` now, else 0."""
+    num_frontiers: int | None = None
+    """Number of frontiers when the agent chose; default: those of an `OccupancyMap` now, else 0."""
     counters: Mapping[str, int] = field(default_factory=dict)
     """Cumulative counts, such as `conflicts`."""
-    places: PlaceBelief | None = None
+    places: PlaceBelief | Callable[[], PlaceBelief | None] | None = None
     """Belief of where the target is: `evonav view` draws it, and that of the first round is scored."""
     details: Mapping[str, Any] = field(default_factory=dict)
     """Further JSON-ready values."""
+    candidate_ids: Sequence[int] = ()
+    """Ids of the entries that the last question offered."""
+    questions: Sequence[QueryLogEntry] = ()
+    """The questions of the round with their answers."""
+
+    def entries(self) -> list[EntryBelief]:
+        """Return the object memory as records state it."""
+        if self.objects is None:
+            return []
+        return list(self.objects()) if callable(self.objects) else [entry_belief(one) for one in self.objects.entries]
+
+    def map_belief(self) -> MapBelief | None:
+        """Return the map as it is now."""
+        if self.map is None or callable(self.map):
+            return None if self.map is None else self.map()
+        frontiers = [FrontierBelief(one.id, one.position_m, one.direction_rad) for one in self.map.frontiers]
+        return MapBelief(self.map.cells, self.map.map_frame, frontiers, self.map.explored)
+
+    def place_belief(self) -> PlaceBelief | None:
+        """Return the belief of where the target is."""
+        return self.places() if callable(self.places) else self.places
+
+    def diagnostics(self, *, is_first: bool) -> RoundDiagnostics:
+        """Return what records state of the round.
+
+        Args:
+            is_first: Whether it is the first round of a stage.
+        """
+        objects = None if callable(self.objects) else self.objects
+        frontiers = () if self.map is None or callable(self.map) else self.map.frontiers
+        chosen = self.chosen_entry
+        if chosen is None and objects is not None and self.chosen_id is not None:
+            found = objects.entry(self.chosen_id)
+            chosen = None if found is None else entry_belief(found)
+        num_entries = 0 if objects is None else len(objects)
+        return RoundDiagnostics(
+            choice=self.choice or ("" if self.chosen_id is None else f"object {self.chosen_id}"),
+            chosen_entry=chosen,
+            num_entries=num_entries if self.num_entries is None else self.num_entries,
+            num_frontiers=len(frontiers) if self.num_frontiers is None else self.num_frontiers,
+            counters=dict(self.counters),
+            details={"reason": self.reason, **self.details} if self.reason else dict(self.details),
+            places=self.place_belief() if is_first else None,
+        )
 
 
-class _HasExplanation(Protocol):
-    def explain(self) -> Explanation: ...
+def explains(agent: object) -> bool:
+    """Return whether an agent has a method `explain`."""
+    return callable(getattr(agent, "explain", None))
 
 
-def explaining(agent: object) -> ExplainingAgent | None:
-    """Return an agent's diagnostics and entries: its own methods, or made from `explain`; `None` if it has neither."""
-    return agent if isinstance(agent, ExplainingAgent) else _from_explain(agent)
+def explanation_of(agent: Any) -> Explanation:  # noqa: ANN401 - any class may be an agent
+    """Return the explanation of an agent that `explains`.
 
-
-def inspectable(agent: object) -> InspectableAgent | None:
-    """Return an agent's belief: its own method, or made from `explain`; `None` if it has neither."""
-    return agent if isinstance(agent, InspectableAgent) else _from_explain(agent)
+    Raises:
+        InvalidArgumentError: The method returns something else.
+    """
+    found = agent.explain()
+    if not isinstance(found, Explanation):
+        raise InvalidArgumentError(f"explain = {str(found)[:100]!r}: must be an evonav.Explanation")
+    return found
 
 
 @lru_cache(maxsize=1024)  # an entry that has not changed is the same object as before
 def entry_belief(entry: ObjectEntry) -> EntryBelief:
     """Return an entry of an `ObjectMap` as records state it."""
     return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
-
-
-def frontier_beliefs(occupancy: OccupancyMap) -> list[FrontierBelief]:
-    """Return the frontiers of a map as pages show them."""
-    return [FrontierBelief(f.id, f.position_m, f.direction_rad) for f in occupancy.frontiers]
-
-
-def _from_explain(agent: Any) -> _ExplainAdapter | None:  # noqa: ANN401 - any class may be an agent
-    return _ExplainAdapter(agent) if callable(getattr(agent, "explain", None)) else None
-
-
-class _ExplainAdapter:
-    """Diagnostics, entries and belief of an agent with a method `explain`."""
-
-    def __init__(self, agent: _HasExplanation) -> None:
-        self._agent = agent
-
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return what the agent chose in the last round, and its counters."""
-        found = self._agent.explain()
-        chosen = None if found.objects is None or found.chosen_id is None else found.objects.entry(found.chosen_id)
-        return RoundDiagnostics(
-            choice=found.choice or ("" if found.chosen_id is None else f"object {found.chosen_id}"),
-            chosen_entry=None if chosen is None else entry_belief(chosen),
-            num_entries=0 if found.objects is None else len(found.objects),
-            num_frontiers=0 if found.map is None else len(found.map.frontiers),
-            counters=dict(found.counters),
-            places=found.places,
-            details={"reason": found.reason, **found.details} if found.reason else dict(found.details),
-        )
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory."""
-        objects = self._agent.explain().objects
-        return [] if objects is None else [entry_belief(entry) for entry in objects.entries]
-
-    def belief(self) -> Belief:
-        """Return entries, map and frontiers; the questions of the agent are not known."""
-        found = self._agent.explain()
-        return Belief(
-            entries=self.entries(),
-            candidate_ids=(),
-            frontiers=[] if found.map is None else frontier_beliefs(found.map),
-            cells=np.zeros((1, 1), np.uint8) if found.map is None else found.map.cells,
-            map_frame=_NO_MAP if found.map is None else found.map.map_frame,
-            queries=(),
-            explored=None if found.map is None else found.map.explored,
-            places=found.places,
-        )

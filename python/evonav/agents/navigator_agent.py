@@ -6,16 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from evonav.agents.agent import (
-    AgentAction,
-    Belief,
-    EntryBelief,
-    NavigateTo,
-    RoundDiagnostics,
-    SensorConfig,
-    Stop,
-)
-from evonav.agents.explanation import entry_belief, frontier_beliefs
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConfig, Stop
+from evonav.agents.explanation import Explanation, entry_belief
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import FrontierCandidate
 from evonav.decision.goal_input import goal_as_given
@@ -60,7 +52,8 @@ class NavigatorAgent(ABC):
         self._counters: Counter[str] = Counter()
         self._candidates: tuple[int, ...] = ()
         """Ids of the entries that the last question offered."""
-        self._diagnostics = RoundDiagnostics()
+        self._round = Explanation()
+        """The choice of the last round."""
 
     def forget_by(self, rule: str) -> None:
         """Choose the rule that decides which object entries are forgotten, before a task begins.
@@ -127,10 +120,10 @@ class NavigatorAgent(ABC):
         return Stop(reason)
 
     def _record_round(self, choice: str, reason: str, entry_id: int | None = None) -> None:
-        """Store what was chosen for `diagnostics`: the choice in the agent's own terms, and the chosen entry."""
+        """Store what was chosen for `explain`: the choice in the agent's own terms, and the chosen entry."""
         navigator = self._navigator
         entry = None if entry_id is None else navigator.objects.entry(entry_id)
-        self._diagnostics = RoundDiagnostics(
+        self._round = Explanation(
             choice=choice,
             chosen_entry=None if entry is None else entry_belief(entry),
             num_entries=len(navigator.objects),
@@ -147,23 +140,16 @@ class NavigatorAgent(ABC):
         """Return further values for the records of a round."""
         return {"reason": reason} if reason else {}
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice, the details and the counters of the last round."""
-        return self._diagnostics
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory."""
-        return [entry_belief(entry) for entry in self._navigator.objects.entries]
-
-    def belief(self) -> Belief:
-        """Return entries, map, frontiers, and the questions of the last round."""
-        explorer = self._navigator.explorer
-        return Belief(
-            entries=self.entries(),
+    def explain(self) -> Explanation:
+        """Return the choice of the last round, and how to describe the memory."""
+        return replace(
+            self._round,
+            map=self._navigator.explorer.map,
+            objects=self._entry_beliefs,
             candidate_ids=self._candidates,
-            frontiers=frontier_beliefs(explorer.map),
-            cells=explorer.map.cells,
-            map_frame=explorer.map.map_frame,
-            queries=tuple(self._queries.log),
-            explored=explorer.map.explored,
+            questions=tuple(self._queries.log),
         )
+
+    def _entry_beliefs(self) -> Sequence[EntryBelief]:
+        """Return the object memory as records state it."""
+        return [entry_belief(entry) for entry in self._navigator.objects.entries]

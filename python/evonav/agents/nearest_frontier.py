@@ -1,6 +1,7 @@
 """Exploration alone: the agent always goes to the nearest frontier."""
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, SensorConfig, Stop
+from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop
+from evonav.agents.explanation import Explanation
 from evonav.agents.explorer import Explorer, nearest_frontier
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -40,17 +41,13 @@ class NearestFrontier:
         position_m, face_m = explorer.go_to(frontier)
         return NavigateTo(position_m, face_m)
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice and the counters of the last round."""
+    def explain(self) -> Explanation:
+        """Return the choice and the counters of the last round; the agent remembers no objects."""
         explorer = self._explorer
         if explorer is None:
-            return RoundDiagnostics()
-        return RoundDiagnostics(
+            return Explanation()
+        return Explanation(
             choice=self._choice,
             num_frontiers=len(explorer.frontiers),
             counters={"conflicts": explorer.num_conflicts, "cells_cleared": explorer.num_cells_cleared},
         )
-
-    def entries(self) -> tuple[EntryBelief, ...]:
-        """Return no entries: the agent remembers no objects."""
-        return ()

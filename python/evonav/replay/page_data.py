@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import FrontierBelief, PlaceBelief
+from evonav.agents.agent import PlaceBelief
+from evonav.agents.explanation import FrontierBelief
 from evonav.counted import counted
 from evonav.drawing.floor_plan import Frame
 from evonav.drawing.svg import clean, cm, polyline, simplified

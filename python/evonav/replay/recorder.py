@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.agents.agent import Agent, Belief
-from evonav.agents.explanation import inspectable
+from evonav.agents.agent import Agent
+from evonav.agents.explanation import MapBelief, explains, explanation_of
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import with_notice
@@ -154,21 +154,21 @@ class Recorder:
         return ReplayedStage(outcome.record, floor_plan, tuple(rounds), "", (), self._fov_rad)
 
     def _with_belief(self, seen: ReplayedRound) -> ReplayedRound:
-        agent = inspectable(self.agent)
-        if agent is None:
+        if not explains(self.agent):
             return seen
         try:
-            belief = agent.belief()
+            found = explanation_of(self.agent)
+            believed = found.map_belief()
             _, bodies = self._places[-1]
-            entries = [entry_record(entry, bodies) for entry in belief.entries]
+            entries = [entry_record(entry, bodies) for entry in found.entries()]
             return replace(
                 seen,
                 entries=tuple(ReplayedEntry(entry, self._truth(entry.label, entry.centre_m)) for entry in entries),
-                candidate_ids=tuple(belief.candidate_ids),
-                frontiers=tuple(belief.frontiers),
-                map=_map_of(belief),
-                places=belief.places,
-                questions=tuple(self._question(entry) for entry in belief.queries),
+                candidate_ids=tuple(found.candidate_ids),
+                frontiers=() if believed is None else tuple(believed.frontiers),
+                map=None if believed is None else _map_of(believed),
+                places=found.place_belief(),
+                questions=tuple(self._question(entry) for entry in found.questions),
             )
         except Exception as error:  # a picture is not worth an episode: the page says what is missing
             return replace(seen, note=f"the agent's belief cannot be read: {type(error).__name__}: {error}")
@@ -228,7 +228,7 @@ def depth_png(depth_m: NDArray[np.float32]) -> bytes:
     return buffer.getvalue()
 
 
-def _map_of(belief: Belief) -> ReplayedMap:
+def _map_of(belief: MapBelief) -> ReplayedMap:
     cells = np.where(belief.cells == FREE, FREE, np.where(belief.cells == BLOCKED, BLOCKED, 0)).astype(np.uint8)
     if belief.explored is not None:
         cells[(cells == FREE) & belief.explored] = EXPLORED

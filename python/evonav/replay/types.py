@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import FrontierBelief, PlaceBelief
+from evonav.agents.agent import PlaceBelief
+from evonav.agents.explanation import FrontierBelief
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EntryRecord, PoseRecord, RoundRecord, StageRecord
 from evonav.records import Point2, Point3

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo, Stop
+from evonav.agents.agent import Agent, AgentAction, NavigateTo, Stop
+from evonav.agents.explanation import explains, explanation_of
 from evonav.agents.hosting.serving import peak_memory_mb
 from evonav.agents.registry import BUILT_IN
 from evonav.decision.question import DecisionModel, Question, Reply
@@ -78,7 +79,7 @@ class Led:
         action = self.agent.act(observation)
         self.round_ms.append(1e3 * (time.process_time() - start_s))
         gc.enable()
-        self.num_entries.append(len(self.agent.entries()) if isinstance(self.agent, ExplainingAgent) else 0)
+        self.num_entries.append(len(explanation_of(self.agent).entries()) if explains(self.agent) else 0)
         if self.never_stops and isinstance(action, Stop):
             pose = observation.pose
             return NavigateTo((pose.x_m + math.sin(pose.yaw_rad), pose.z_m + math.cos(pose.yaw_rad)))

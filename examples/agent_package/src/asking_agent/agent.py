@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass
 
 from evonav import Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, SensorConfig, Stop, TaskInfo
-from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics
+from evonav.agents.agent import AgentAction
+from evonav.agents.explanation import Explanation
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
@@ -104,15 +105,8 @@ class AskingAgent:
         chosen = nearest if answer is None else known[answer - 1].id
         return chosen, places[chosen]
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """What it goes to, and how the model did."""
+    def explain(self) -> Explanation:
+        """What it goes to, what it remembers, and how the model did."""
         choice = "none" if self.target is None else f"object {self.target[0]}"
         counters = {} if self.queries is None else dict(self.queries.counters)
-        return RoundDiagnostics(choice=choice, num_entries=len(self.objects), counters=counters)
-
-    def entries(self) -> list[EntryBelief]:
-        """What it remembers."""
-        return [
-            EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
-            for entry in self.objects.entries
-        ]
+        return Explanation(objects=self.objects, choice=choice, counters=counters)

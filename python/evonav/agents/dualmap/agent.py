@@ -165,9 +165,9 @@ class DualMap(FrontierUpdate):
         best = max(found, key=lambda one: (one[0], -one[1].id), default=None)
         return best[1] if best is not None and best[0] >= least else None
 
-    def entries(self) -> Sequence[EntryBelief]:
+    def _entry_beliefs(self) -> Sequence[EntryBelief]:
         """Return the local map, then the anchors that it does not have."""
-        local = list(super().entries())
+        local = list(super()._entry_beliefs())
         known = {one.entry_id for one in local}
         anchors = [one.candidate() for key, one in self._abstract.anchors.items() if key not in known]
         return [*local, *(_belief(one) for one in anchors)]

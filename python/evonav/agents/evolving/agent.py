@@ -183,9 +183,9 @@ class Evolving(FailThenUpdate):
         self._accepts_any = True
         return self._approach(self._target(entries[best]), "nothing else is left")
 
-    def entries(self) -> Sequence[EntryBelief]:
+    def _entry_beliefs(self) -> Sequence[EntryBelief]:
         """Return the object memory, with the probability that each object is still where it was last seen."""
-        return [replace(one, p_present=self._p_present(one.entry_id)) for one in super().entries()]
+        return [replace(one, p_present=self._p_present(one.entry_id)) for one in super()._entry_beliefs()]
 
     def _p_present(self, entry_id: int) -> float | None:
         """Return that probability: only looks at objects of the goal's name count in a stage."""

@@ -19,8 +19,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, Protocol
 
-from evonav.agents.agent import Agent, ExplainingAgent
-from evonav.agents.explanation import explaining
+from evonav.agents.agent import Agent
+from evonav.agents.explanation import explains, explanation_of
 from evonav.agents.hosting import sandbox, wire
 from evonav.agents.hosting.entries import Entries
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
@@ -138,7 +138,8 @@ class _Server:
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
-        self._explaining: ExplainingAgent | None = None
+        self._explains = False
+        self._is_first = True
         self._entries = Entries()
         self._decision: Metered | None = None
 
@@ -166,7 +167,7 @@ class _Server:
         self._agent = None
         self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
         self._agent = new_agent(self._factory, self._decision)
-        self._explaining = explaining(self._agent)
+        self._explains = explains(self._agent)
         return self._sensors()
 
     def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
@@ -176,6 +177,7 @@ class _Server:
 
     def do_begin_stage(self, goal: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Goal`
         """Begin a stage, and return the agent's object memory at once: it is always asked for then."""
+        self._is_first = True
         self.agent.begin_stage(goal)
         return {**self._sensors(), **_parts_or_failure("entries_failure", self.do_entries)}
 
@@ -189,8 +191,9 @@ class _Server:
 
     def do_entries(self) -> dict[str, bytes]:
         """Return the object memory, if the agent explains itself."""
-        agent = self._explaining
-        return {} if agent is None else {"entries": self._entries.write(list(agent.entries()))}
+        if not self._explains:
+            return {}
+        return {"entries": self._entries.write(explanation_of(self.agent).entries())}
 
     def do_costs(self) -> dict[str, bytes]:
         """Return the decision model's costs since it was made, and this process's peak memory."""
@@ -201,8 +204,10 @@ class _Server:
         return {"costs": wire.COSTS.write(costs)}
 
     def _diagnostics(self) -> dict[str, bytes]:
-        agent = self._explaining
-        return {} if agent is None else {"diagnostics": wire.DIAGNOSTICS.write(agent.diagnostics())}
+        if not self._explains:
+            return {}
+        is_first, self._is_first = self._is_first, False
+        return {"diagnostics": wire.DIAGNOSTICS.write(explanation_of(self.agent).diagnostics(is_first=is_first))}
 
     def _sensors(self) -> dict[str, bytes]:
         return {"sensors": wire.write_sensors(self.agent)}

@@ -33,11 +33,11 @@ from evonav.agents.agent import (
     Move,
     NavigateTo,
     PlaceBelief,
-    RoundDiagnostics,
     SensorConfig,
     Stop,
     ViewSchedule,
 )
+from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.errors import InvalidArgumentError

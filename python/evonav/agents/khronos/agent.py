@@ -44,7 +44,7 @@ class KhronosFrontierUpdate(FrontierUpdate):
     def _believed(self) -> Sequence[ObjectEntry]:
         return [entry for entry in super()._believed() if not self._votes.is_absent(entry.id)]
 
-    def entries(self) -> Sequence[EntryBelief]:
+    def _entry_beliefs(self) -> Sequence[EntryBelief]:
         """Return the object memory, without what is absent now."""
         return [entry_belief(entry) for entry in self._believed()]
 

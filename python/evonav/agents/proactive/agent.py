@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from evonav.agents.agent import AgentAction, Belief, EntryBelief, NavigateTo, PlaceBelief, RoundDiagnostics, Stop
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, PlaceBelief, Stop
+from evonav.agents.explanation import Explanation
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import identity_question
 from evonav.agents.navigator import Navigator
@@ -378,18 +379,14 @@ class Proactive(NavigatorAgent):
         now = self._posterior_now
         return None if now is None else place_belief(*now, self._belief.searched.coarse)
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice, the details and the counters of the last round, and in the first the belief of places."""
-        return replace(super().diagnostics(), places=self._places() if self._navigator.round == 0 else None)
+    def explain(self) -> Explanation:
+        """Return the choice, and how to describe the memory and the belief of where the target is."""
+        return replace(super().explain(), places=self._places)
 
-    def entries(self) -> Sequence[EntryBelief]:
+    def _entry_beliefs(self) -> Sequence[EntryBelief]:
         """Return the object memory, with the probability that each object is still there."""
         p_present = self._belief.presence.p_present
-        return [replace(entry, p_present=p_present(entry.entry_id)) for entry in super().entries()]
-
-    def belief(self) -> Belief:
-        """Return all that the agent believes after a round."""
-        return replace(super().belief(), places=self._places())
+        return [replace(entry, p_present=p_present(entry.entry_id)) for entry in super()._entry_beliefs()]
 
     def _round_counters(self) -> Mapping[str, int]:
         own = {"identity_checks": 0, "identities_denied": 0, "maps_forgotten": 0}

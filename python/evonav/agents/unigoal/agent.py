@@ -6,23 +6,13 @@ graph and scene graph attract exploration a little. An obstacle stays one for ev
 
 import math
 import random
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import (
-    AgentAction,
-    Belief,
-    EntryBelief,
-    FrontierBelief,
-    Move,
-    RoundDiagnostics,
-    SensorConfig,
-    Stop,
-    ViewSchedule,
-)
+from evonav.agents.agent import AgentAction, EntryBelief, Move, SensorConfig, Stop, ViewSchedule
+from evonav.agents.explanation import Explanation, FrontierBelief, MapBelief
 from evonav.agents.unigoal.bev import BevConfig, BevMap, Cells
 from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
@@ -68,7 +58,7 @@ class UniGoal:
         model: DecisionModel = decision or TextMatch()
         self._goal_input = model.goal_input
         self._queries = QuerySession(model, num_tries=self.config.num_tries)
-        self._diagnostics = RoundDiagnostics()
+        self._round = Explanation()
         self._task: TaskInfo | None = None
 
     def begin_task(self, task: TaskInfo) -> None:
@@ -188,7 +178,7 @@ class UniGoal:
         return len(self._planner.allowed(self._cells_of(self._bev, node))) == 0
 
     def _record_round(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
-        """Store a round for `diagnostics`."""
+        """Store the choice of a round for `explain`."""
         advice, goal = self._advice, watch.goal
         node = None if goal is None or goal.node_id is None else self._graphs.scene.node(goal.node_id)
         details: dict[str, object] = {"category": self._graphs.category, "step": step.goal}
@@ -199,7 +189,7 @@ class UniGoal:
             details |= {"goal": "temporary" if watch.confirmed is None else "confirmed", "goal_m": goal.centre_m}
         if step.distance_m is not None:
             details["distance_m"] = round(step.distance_m, 3)
-        self._diagnostics = RoundDiagnostics(
+        self._round = Explanation(
             choice=step.goal if goal is None else f"{details['goal']} {goal.source}",
             chosen_entry=None if node is None else self._entry(node),
             num_entries=len(self._graphs.scene.nodes),
@@ -213,32 +203,28 @@ class UniGoal:
             details=details,
         )
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the goal of the last action, the match of the graphs, and the counters."""
-        return self._diagnostics
+    def explain(self) -> Explanation:
+        """Return the goal of the last action, the match of the graphs, and how to describe the scene graph."""
+        node_id = None if self._watch is None or self._watch.goal is None else self._watch.goal.node_id
+        return replace(
+            self._round,
+            map=self._map_belief,
+            objects=lambda: [self._entry(node) for node in self._graphs.scene.nodes],
+            candidate_ids=() if node_id is None else (node_id,),
+            questions=tuple(self._queries.log),
+        )
+
+    def _map_belief(self) -> MapBelief | None:
+        """Return the map at half its resolution, and the exploration target."""
+        if self._bev is None:
+            return None
+        target_m = self._wander_m or self._planner.target_m
+        cells, frame = _coarser(self._bev.cells, self._bev.map_frame, _BELIEF_STRIDE)
+        return MapBelief(cells, frame, [] if target_m is None else [FrontierBelief(0, target_m, 0.0)])
 
     def _entry(self, node: SceneNode) -> EntryBelief:
         kind = self._graphs.scene.type_of(node.id)
         return EntryBelief(node.id, kind, node.centre_m, node.size_m, node.num_detections)
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the scene graph's nodes, by ProcTHOR's type."""
-        return [self._entry(node) for node in self._graphs.scene.nodes]
-
-    def belief(self) -> Belief:
-        """Return nodes, the map at half its resolution, and the exploration target."""
-        assert self._bev is not None, "there is a map after the first round"
-        target_m = self._wander_m or self._planner.target_m
-        node_id = None if self._watch is None or self._watch.goal is None else self._watch.goal.node_id
-        cells, frame = _coarser(self._bev.cells, self._bev.map_frame, _BELIEF_STRIDE)
-        return Belief(
-            entries=self.entries(),
-            candidate_ids=() if node_id is None else (node_id,),
-            frontiers=[] if target_m is None else [FrontierBelief(0, target_m, 0.0)],
-            cells=cells,
-            map_frame=frame,
-            queries=tuple(self._queries.log),
-        )
 
 
 def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[NDArray[np.uint8], MapFrame]:

@@ -104,8 +104,8 @@ def _diagnostics(probe: Probe) -> Check:
     if not probe.explains:
         finding = "no `explain()`: pages cannot show what the agent knows; return Explanation(map=..., objects=...)"
         return Check("diagnostics", "warn", finding)
-    if (error := probe.errors.get("diagnostics")) is not None:
-        return Check("diagnostics", "fail", f"{describe(error, caller=PACKAGE)}; see `RoundDiagnostics`")
+    if (error := probe.errors.get("explain") or probe.errors.get("diagnostics")) is not None:
+        return Check("diagnostics", "fail", f"{describe(error, caller=PACKAGE)}; see `evonav.Explanation`")
     return Check("diagnostics", "pass", f"JSON-ready, {probe.largest_diagnostics} bytes a round at most")
 
 

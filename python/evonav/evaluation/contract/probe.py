@@ -3,13 +3,14 @@
 import hashlib
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
-from evonav.agents.explanation import explaining
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, SensorConfig
+from evonav.agents.explanation import Explanation, explains, explanation_of
 from evonav.agents.hosting import wire
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
@@ -26,8 +27,8 @@ class Probe:
     def __init__(self, agent: Agent) -> None:
         """Wrap an agent."""
         self.agent = agent
-        self.explains = explaining(agent) is not None
-        self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "diagnostics": 0, "entries": 0}
+        self.explains = explains(agent)
+        self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "explain": 0, "diagnostics": 0, "entries": 0}
         self.errors: dict[str, BaseException] = {}
         self.seconds: list[float] = []
         self.largest_diagnostics = 0
@@ -70,24 +71,29 @@ class Probe:
         self.seconds.append(time.perf_counter() - began_s)
         return action
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the agent's diagnostics of the round, as they are after JSON."""
-        agent = explaining(self.agent)
-        if agent is None:
-            return RoundDiagnostics()
-        text = self._call("diagnostics", lambda: wire.DIAGNOSTICS.write(agent.diagnostics()))
+    def explain(self) -> Explanation:
+        """Return the agent's explanation; what is recorded of a round is checked as it is after JSON."""
+        if not self.explains:
+            return Explanation()
+        found = self._call("explain", lambda: explanation_of(self.agent))
+        if self.calls["act"] == 0:
+            return replace(found, objects=lambda: self._noted(found))
+        text = self._call("diagnostics", lambda: wire.DIAGNOSTICS.write(found.diagnostics(is_first=True)))
         self.largest_diagnostics = max(self.largest_diagnostics, len(text))
-        return self._call("diagnostics", lambda: wire.DIAGNOSTICS.read(text))
+        said = self._call("diagnostics", lambda: wire.DIAGNOSTICS.read(text))
+        return replace(
+            found,
+            objects=lambda: self._noted(found),
+            chosen_entry=said.chosen_entry,
+            num_entries=said.num_entries,
+        )
 
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the agent's object memory, as it is after JSON."""
-        agent = explaining(self.agent)
-        if agent is None:
-            return ()
-        found = self._call("entries", lambda: wire.ENTRIES.read(wire.ENTRIES.write(list(agent.entries()))))
-        self.num_entries += len(found)
-        self.outside += [problem for entry in found if (problem := self._misplaced(entry)) is not None]
-        return found
+    def _noted(self, found: Explanation) -> Sequence[EntryBelief]:
+        """Return the agent's object memory as it is after JSON."""
+        entries = self._call("entries", lambda: wire.ENTRIES.read(wire.ENTRIES.write(found.entries())))
+        self.num_entries += len(entries)
+        self.outside += [problem for entry in entries if (problem := self._misplaced(entry)) is not None]
+        return entries
 
     def changed(self) -> str:
         """Return the names of the arrays that the agent changed."""

@@ -7,7 +7,8 @@ names or inherits from `OracleBaseline`.
 import math
 from collections.abc import Sequence
 
-from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Stop
+from evonav.agents.agent import AgentAction, NavigateTo, Stop
+from evonav.agents.explanation import Explanation
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
@@ -63,13 +64,9 @@ class PerfectRecognition(OracleBaseline):
         is_near = math.dist((pose.x_m, pose.z_m), self._target_m) <= STOP_DISTANCE_M
         return Stop() if is_near else NavigateTo(self._target_m)
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the explorer's diagnostics."""
-        return self._explorer.diagnostics()
-
-    def entries(self) -> tuple[EntryBelief, ...]:
-        """Return no entries: it remembers no objects."""
-        return ()
+    def explain(self) -> Explanation:
+        """Return the explorer's choice."""
+        return self._explorer.explain()
 
 
 class OracleMemory(PerfectRecognition):

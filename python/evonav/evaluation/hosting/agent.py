@@ -4,8 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, RoundDiagnostics, SensorConfig
-from evonav.agents.explanation import explaining
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, SensorConfig
+from evonav.agents.explanation import RoundDiagnostics, explains, explanation_of
 from evonav.agents.hosting import wire
 from evonav.agents.hosting.entries import Entries
 from evonav.component import Component
@@ -83,7 +83,8 @@ class LocalAgent(HostedAgent):
     def __init__(self, agent: Agent) -> None:
         """Host an agent."""
         self._agent = agent
-        self._explaining = explaining(agent)
+        self._explains = explains(agent)
+        self._is_first = True
         self._entries = Entries()
         self._observations: list[Observation] = []
 
@@ -98,7 +99,7 @@ class LocalAgent(HostedAgent):
 
     def begin_stage(self, goal: Goal) -> None:
         """Start the search for a new goal."""
-        self._num_bytes = 0
+        self._num_bytes, self._is_first = 0, True
         self._agent.begin_stage(goal)
 
     def look(self, observation: Observation, *, wants_entries: bool = False) -> None:
@@ -111,15 +112,17 @@ class LocalAgent(HostedAgent):
 
     def diagnostics(self) -> RoundDiagnostics:
         """Return what the agent said of the last round, right after it."""
-        if self._explaining is None:
+        if not self._explains:
             return RoundDiagnostics()
-        return self._read_diagnostics(wire.DIAGNOSTICS.write(self._explaining.diagnostics()))
+        is_first, self._is_first = self._is_first, False
+        said = explanation_of(self._agent).diagnostics(is_first=is_first)
+        return self._read_diagnostics(wire.DIAGNOSTICS.write(said))
 
     def entries(self) -> Sequence[EntryBelief] | None:
         """Return the object memory; None if the agent does not explain itself."""
-        if self._explaining is None:
+        if not self._explains:
             return None
-        return self._entries.read(self._entries.write(list(self._explaining.entries())))
+        return self._entries.read(self._entries.write(explanation_of(self._agent).entries()))
 
 
 class RemoteAgent(HostedAgent):
