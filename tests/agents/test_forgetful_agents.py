@@ -15,12 +15,7 @@ FORGETFUL = (
     "fu",
     "stage-reset",
     "ftu",
-    "ftu-relook",
-    "ftu-identity",
-    "ftu-early-stop",
     "pro",
-    "pro-blind",
-    "pro-oracle-theta",
     "evolving",
     "dynamem",
     "dualmap",
@@ -28,9 +23,7 @@ FORGETFUL = (
     "vlfm",
     "onemap",
     "3d-mem",
-    "3d-mem+",
     "msgnav",
-    "msgnav+",
 )
 
 

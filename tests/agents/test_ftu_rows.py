@@ -5,16 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evonav_studies.variants import EARLY_STOP_M, FailThenUpdateEarlyStop, FailThenUpdateIdentity
 from scripted_model import Scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.frontier_update.fail_then_update import (
-    EARLY_STOP_M,
     FailThenUpdate,
     FailThenUpdateConfig,
-    FailThenUpdateEarlyStop,
-    FailThenUpdateIdentity,
 )
 from evonav.agents.frontier_update.questions import IdentityQuestion
 from evonav.decision.appearance.matcher import AppearanceMatcher

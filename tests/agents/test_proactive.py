@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from evonav_studies.variants import ProactiveBlind
 from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
@@ -19,7 +20,6 @@ from evonav.agents.proactive.presence import PresenceBelief, _Entry
 from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
 from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
 from evonav.agents.proactive.searched import SearchedCells
-from evonav.agents.proactive.variants import ProactiveBlind
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
 from evonav.evaluation.protocol import ProtocolConfig

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evonav_studies.variants import FailThenUpdateRelook
 from hypothesis import given
 from hypothesis import strategies as st
 from scripted_model import Scripted
 from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig, FailThenUpdateRelook
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.frontier_update.relook import RelookConfig, place_from_another_side
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import places_around

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import toy_episode
+from evonav_studies.variants import UniGoalAsPublished
 from scripted_model import scripted
 from toy_episode import START, belief_of
 from toy_house import OBJECTS, stage_case
 
-from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished, UniGoalConfig
+from evonav.agents.unigoal.agent import UniGoal, UniGoalConfig
 from evonav.agents.unigoal.bev import BevMap
 from evonav.agents.unigoal.graphs import GraphConfig
 from evonav.agents.unigoal.questions import CategoryQuestion

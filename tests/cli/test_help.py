@@ -59,7 +59,7 @@ def test_the_terminal_decides_where_lines_of_a_help_end():
 
 
 def test_agents_are_completed_also_after_a_comma():
-    assert completion.agents("ft") == ["ftu", "ftu-relook", "ftu-identity", "ftu-early-stop"]
+    assert completion.agents("ft") == ["ftu"]
     assert completion.agents("fu,stag") == ["fu,stage-reset"]
     assert "fu,fu" not in completion.agents("fu,")
     assert "shortest-path" in completion.agents("")

@@ -58,16 +58,13 @@ def test_the_example_is_better_than_chance(tmp_path):
     assert found[OWN]["sr"] > found["random-walk"]["sr"] + 0.1
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory):
-    """The package as an installer leaves it: its modules, and its entry points beside them."""
-    site = tmp_path_factory.mktemp("site")
-    package = EXAMPLES / "agent_package"
-    project = tomllib.loads((package / "pyproject.toml").read_text())
+def install(folder, name, site):
+    """Lay a package down as an installer leaves it: its modules, and its entry points beside them."""
+    project = tomllib.loads((EXAMPLES / folder / "pyproject.toml").read_text())
     (where,) = project["tool"]["setuptools"]["packages"]["find"]["where"]
-    (site / "asking_agent").symlink_to(package / where / "asking_agent")
+    (site / name).symlink_to(EXAMPLES / folder / where / name)
     facts = project["project"]
-    info = site / f"asking_agent-{facts['version']}.dist-info"
+    info = site / f"{name}-{facts['version']}.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {facts['name']}\nVersion: {facts['version']}\n")
     lines = []
@@ -75,6 +72,35 @@ def installed(tmp_path_factory):
         lines += [f"[{group}]", *(f"{name} = {value}" for name, value in entries.items())]
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
     return site
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    return install("agent_package", "asking_agent", tmp_path_factory.mktemp("site"))
+
+
+def test_variants_and_ablations_are_a_plug_in(tmp_path_factory, tmp_path):
+    """All of its names can be made, and one is run by its name, also in a process of its own."""
+    site = install("studies", "evonav_studies", tmp_path_factory.mktemp("studies"))
+    code = """
+from importlib.metadata import entry_points
+from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
+found = [one.name for one in entry_points(group="evonav.agents") if one.value.startswith("evonav_studies")]
+assert not set(found) & set(BUILT_IN)
+print(*(f"{name}={type(new_agent(agent_factory(name))).__name__}" for name in found))
+"""
+    variables = {**os.environ, "PYTHONPATH": str(site)}
+    made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=variables)
+    agents = dict(pair.split("=") for pair in made.stdout.split())
+    assert len(agents) == 20
+    assert agents["3d-mem+"] == "ThreeDMemPlus"
+    assert agents["pro-without-rooms"] == "Proactive"
+    listed = evonav("agents", PYTHONPATH=str(site)).stdout
+    assert "plug-in: evonav_studies.variants:FailThenUpdateRelook" in listed
+    options = ("--limit", 1, "--workers", 1, "--out", tmp_path)
+    done = evonav("evaluate", "--agent", "ftu-early-stop", *options, PYTHONPATH=str(site))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not results(tmp_path)["ftu-early-stop"]["is_incomplete"]
 
 
 def test_an_agent_of_a_package_has_a_name(installed):

@@ -30,29 +30,9 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.frontier_update.fail_then_update:FailThenUpdate",
         "Frontier-Update that checks its target on arrival",
     ),
-    "ftu-relook": (
-        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateRelook",
-        "Fail-then-Update with a second look from another side",
-    ),
-    "ftu-identity": (
-        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateIdentity",
-        "Fail-then-Update that sets aside what contradicts the goal",
-    ),
-    "ftu-early-stop": (
-        "evonav.agents.frontier_update.fail_then_update:FailThenUpdateEarlyStop",
-        "Fail-then-Update that stops 1.8 m from its target",
-    ),
     "pro": (
         "evonav.agents.proactive.agent:Proactive",
         "Belief-Weighted Search: goes where most of its posterior is found a metre",
-    ),
-    "pro-blind": (
-        "evonav.agents.proactive.variants:ProactiveBlind",
-        "Belief-Weighted Search that knows nothing of how homes change",
-    ),
-    "pro-oracle-theta": (
-        "evonav.agents.proactive.variants:ProactiveOracleTheta",
-        "Belief-Weighted Search that knows the probabilities of changes",
     ),
     "evolving": (
         "evonav.agents.evolving.agent:Evolving",
@@ -82,17 +62,11 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
     ),
-    "3d-mem+": (
-        "evonav.agents.three_d_mem.agent:ThreeDMemPlus",
-        "3D-Mem with our fallback for frontiers: it does not run out of them",
-    ),
     "msgnav": ("evonav.agents.msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
-    "msgnav+": ("evonav.agents.msgnav.agent:MsgNavPlus", "MSGNav with our fallback for frontiers"),
     "unigoal": (
         "evonav.agents.unigoal.agent:UniGoal",
         "UniGoal as released: single actions, detector, nearest frontiers",
     ),
-    "unigoal-paper": ("evonav.agents.unigoal.agent:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
     "stay-still": ("evonav.agents.stay_still:StayStill", "baseline: stops at once; its successes are free"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "baseline: walks in random directions"),
 }

@@ -15,10 +15,10 @@ from evonav.agents.agent import (
     EntryBelief,
     Move,
     NavigateTo,
-    RoundDiagnostics,
     SensorConfig,
     Stop,
 )
+from evonav.agents.explanation import RoundDiagnostics
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode

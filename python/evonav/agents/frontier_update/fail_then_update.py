@@ -18,8 +18,6 @@ from evonav.records import Point2, Point3
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 
-EARLY_STOP_M = 1.8
-"""Distance of `ftu-early-stop`: a little less than the success radius of 2.0 m, since boxes of parts are off-centre."""
 SAME_PLACE_M = 0.5
 """An entry whose middle is this near that of a rejected one with its label counts as the same."""
 
@@ -232,27 +230,6 @@ class FailThenUpdate(FrontierUpdate):
 
     def _is_set_aside(self, entry: ObjectEntry) -> bool:
         return any(self._navigator.views.resolve(entry_id) == entry.id for entry_id in self._set_aside)
-
-
-class FailThenUpdateRelook(FailThenUpdate):
-    """Fail-then-Update that looks once more, from another side, where its look on arrival does not tell."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(relook=RelookConfig()), decision)
-
-
-class FailThenUpdateIdentity(FailThenUpdate):
-    """Fail-then-Update that does not stop at an object that contradicts the goal."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(checks_identity=True), decision)
-
-
-class FailThenUpdateEarlyStop(FailThenUpdate):
-    """Fail-then-Update that stops as soon as it is near enough to an object that it sees."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(stop_within_m=EARLY_STOP_M), decision)
 
 
 def _here(observation: Observation) -> Point2:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
-from evonav.agents.explorer import AS_THREE_D_MEM, AS_THREE_D_MEM_PLUS, ExplorerConfig
+from evonav.agents.explorer import AS_THREE_D_MEM, ExplorerConfig
 from evonav.agents.msgnav.candidates import GraphObject, PastChoice
 from evonav.agents.msgnav.memory import GraphMemory
 from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
@@ -30,7 +30,7 @@ from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
 
-def _navigator_config(explorer: ExplorerConfig) -> NavigatorConfig:
+def navigator_config(explorer: ExplorerConfig) -> NavigatorConfig:
     """Return MSGNav's constants over a way to explore; its background is walls and floors alone."""
     return NavigatorConfig(explorer=explorer, image_px=512, background=("wall", "floor"))
 
@@ -39,7 +39,7 @@ def _navigator_config(explorer: ExplorerConfig) -> NavigatorConfig:
 class MsgNavConfig:
     """MSGNav's constants."""
 
-    navigator: NavigatorConfig = field(default_factory=lambda: _navigator_config(AS_THREE_D_MEM))
+    navigator: NavigatorConfig = field(default_factory=lambda: navigator_config(AS_THREE_D_MEM))
     """3D-Mem's exploration; images of 512 px at most; doors and windows are remembered."""
     max_edge_m: float = 3.5
     """Entries seen together have an edge up to this distance."""
@@ -291,13 +291,6 @@ class MsgNav(NavigatorAgent):
 
     def _round_counters(self) -> Mapping[str, int]:
         return {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
-
-
-class MsgNavPlus(MsgNav):
-    """MSGNav with our fallback for frontiers, which its released code lacks."""
-
-    def __init__(self, config: MsgNavConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or MsgNavConfig(navigator=_navigator_config(AS_THREE_D_MEM_PLUS)), decision)
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:

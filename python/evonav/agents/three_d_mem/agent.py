@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from evonav.agents.agent import AgentAction
-from evonav.agents.explorer import AS_THREE_D_MEM, AS_THREE_D_MEM_PLUS
+from evonav.agents.explorer import AS_THREE_D_MEM
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
@@ -152,10 +152,3 @@ class ThreeDMem(NavigatorAgent):
             "num_snapshots": len(self._snapshots.snapshots),
             **super()._round_details(reason),
         }
-
-
-class ThreeDMemPlus(ThreeDMem):
-    """3D-Mem with our fallback for frontiers, which its released code lacks."""
-
-    def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or ThreeDMemConfig(navigator=NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)), decision)

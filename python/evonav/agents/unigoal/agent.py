@@ -240,10 +240,3 @@ def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[ND
     coarse = np.where((blocks == BLOCKED).any(axis=(1, 3)), BLOCKED, (blocks == FREE).any(axis=(1, 3)) * FREE)
     corner_m = (frame.corner_m[0] + int(low[1]) * frame.cell_m, frame.corner_m[1] + int(low[0]) * frame.cell_m)
     return coarse.astype(np.uint8), MapFrame(rows, cols, frame.cell_m * stride, corner_m)
-
-
-class UniGoalAsPublished(UniGoal):
-    """UniGoal as published: captions are compared without numbers, and all mapped categories may be goals."""
-
-    def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or UniGoalConfig(graph=GraphConfig(mode="paper")), decision)

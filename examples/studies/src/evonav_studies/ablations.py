@@ -1,4 +1,4 @@
-"""Belief-Weighted Search without one of its parts, for the ablation in `examples/sweeps/proactive-ablation.toml`."""
+"""Belief-Weighted Search without one of its parts, for `examples/sweeps/proactive-ablation.toml`."""
 
 from functools import partial
 

@@ -1,0 +1,1 @@
+"""Variants and ablations of evonav's agents, for the studies in its documentation."""
