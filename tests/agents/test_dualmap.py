@@ -12,7 +12,7 @@ from toy_house import OBJECTS, stage_case
 
 from evonav.agents.dualmap.agent import DualMap
 from evonav.agents.dualmap.anchors import AbstractMap, main_plane_m
-from evonav.agents.furniture import is_furniture
+from evonav.decision.home_statistics import is_furniture
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import TaskInfo
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.proactive.priors import room_ratios
+from evonav.decision.home_statistics import room_ratios
 from evonav.decision.text.language import ParsedGoal
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import Detections

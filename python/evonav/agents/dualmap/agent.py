@@ -10,10 +10,10 @@ from evonav.agents.agent import AgentAction, EntryBelief
 from evonav.agents.dualmap.anchors import AbstractMap, Anchor, AnchorConfig, Content
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.furniture import is_furniture
 from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.relatedness import Relatedness
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.home_statistics import is_furniture
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.sensors.observation import Observation

@@ -12,11 +12,10 @@ from evonav.agents.agent import AgentAction, EntryBelief
 from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.furniture import is_furniture
 from evonav.agents.grid import NO_GROUP, CoarseFrame, owners_of
 from evonav.agents.navigator import NavigatorConfig, Target
-from evonav.agents.proactive.priors import room_ratios
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.home_statistics import is_furniture, room_ratios
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier

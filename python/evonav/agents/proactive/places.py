@@ -11,8 +11,8 @@ from evonav import _core
 from evonav.agents.grid import CoarseFrame, box_slices
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.sightings import Sighting
-from evonav.decision.appearance.statistics import PER_100_M2, UNKNOWN_PER_100_M2
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.home_statistics import PER_100_M2, UNKNOWN_PER_100_M2
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 
 MIN_MASK_SHARE = 0.001

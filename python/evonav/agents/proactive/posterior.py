@@ -13,11 +13,11 @@ from evonav.agents.grid import NO_GROUP, CoarseFrame, box_distance_m
 from evonav.agents.proactive.config import PRIORS, ProactiveConfig
 from evonav.agents.proactive.places import prior_of, visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief
-from evonav.agents.proactive.priors import room_ratios
 from evonav.agents.proactive.rooms import NO_ROOM
 from evonav.agents.proactive.searched import SearchedCells
 from evonav.agents.proactive.sightings import Sighting
 from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.home_statistics import room_ratios
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier

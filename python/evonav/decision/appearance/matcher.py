@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
-from evonav.decision.appearance.statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.goal_input import PictureGoal
+from evonav.decision.home_statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
 from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
 from evonav.memory.colours import Layout
