@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.agent import EntryBelief, PlaceBelief, RoundDiagnostics
+from evonav.agents.agent import EntryBelief, PlaceBelief
+from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.hosting import wire
 from evonav.agents.proactive.agent import Proactive
