@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from threading import Thread
@@ -10,21 +11,21 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.cli.doctor import checks as doctor_checks
-from evonav.cli.doctor.checks import EXTRAS, Where, all_checks
+from evonav.cli.doctor import EXTRAS, all_checks
 
 ROOT = Path(__file__).parents[2]
+module = sys.modules["evonav.cli.doctor"]  # `evonav.cli.doctor` is also the name of its command
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(doctor_checks, "RENDER_S", 0.02)
+    monkeypatch.setattr(module, "RENDER_S", 0.02)
     for name in ("OPENAI_API_KEY", "OPENAI_BASE_URL"):
         monkeypatch.delenv(name, raising=False)
 
 
 def found(tmp_path, **where):
-    return {check.name: check for check in all_checks(Where(tmp_path, **where))}
+    return {check.name: check for check in all_checks(tmp_path, **where)}
 
 
 def test_a_machine_on_which_evonav_works(tmp_path):
@@ -47,8 +48,12 @@ def test_a_machine_on_which_evonav_works(tmp_path):
 def test_the_command_prints_a_line_a_check_and_json(tmp_path):
     done = CliRunner().invoke(app, ["doctor", "--out", str(tmp_path), "--no-network"])
     assert done.exit_code == 0
+    *lines, last = done.stdout.splitlines()
+    assert last.startswith("evonav is ready: all that the benchmark needs works.")
+    assert not any(line.startswith("missing") for line in lines)
+    every = CliRunner().invoke(app, ["doctor", "--out", str(tmp_path), "--no-network", "--all"])
     names = list(found(tmp_path))
-    assert len(done.stdout.splitlines()) == len(names)
+    assert len(every.stdout.splitlines()) == len(names) + 1
     as_json = CliRunner().invoke(app, ["doctor", "--json", "--no-network"])
     content = json.loads(as_json.stdout)
     assert content["is_ok"]
@@ -56,12 +61,13 @@ def test_the_command_prints_a_line_a_check_and_json(tmp_path):
 
 
 def test_the_exit_code_is_of_what_is_essential(tmp_path, monkeypatch):
-    monkeypatch.setattr(doctor_checks, "_gpu", lambda: 1 / 0)
+    monkeypatch.setattr(module, "_gpu", lambda: 1 / 0)
     assert CliRunner().invoke(app, ["doctor", "--no-network"]).exit_code == 0
-    monkeypatch.setattr(doctor_checks, "_renderer", lambda: 1 / 0)
+    monkeypatch.setattr(module, "_renderer", lambda: 1 / 0)
     done = CliRunner().invoke(app, ["doctor", "--no-network"])
     assert done.exit_code == 1
     assert "ZeroDivisionError" in done.stdout
+    assert "evonav is not ready" in done.stdout
     assert found(tmp_path)["renderer"].is_essential
 
 
@@ -100,14 +106,14 @@ def test_files_of_models_are_looked_for_where_they_are_to_be(monkeypatch, tmp_pa
 
 
 def test_a_folder_that_cannot_be_written_or_locked(monkeypatch, tmp_path):
-    monkeypatch.setattr(doctor_checks, "_has_locks", lambda path: False)
+    monkeypatch.setattr(module, "_has_locks", lambda path: False)
     assert found(tmp_path)["run folder"].state == "failed"
     assert "local disk" in found(tmp_path)["run folder"].remedy
 
     def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(doctor_checks.tempfile, "TemporaryDirectory", refuse)
+    monkeypatch.setattr(module.tempfile, "TemporaryDirectory", refuse)
     assert "Permission denied" in found(tmp_path)["run folder"].finding
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import short_stages
 
-from evonav.cli.doctor.checks import Where, all_checks
+from evonav.cli.doctor import all_checks
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
@@ -196,7 +196,7 @@ def test_doctor_sends_no_key_to_another_server(stub: Stub, tmp_path: Path, monke
     Thread(target=server.serve_forever, daemon=True).start()
     for key in (KEY, f"{KEY}\nX: 1"):
         monkeypatch.setenv("OPENAI_API_KEY", key)
-        checks = list(all_checks(Where(tmp_path, True, f"http://127.0.0.1:{server.server_port}/v1")))
+        checks = list(all_checks(tmp_path, base_url=f"http://127.0.0.1:{server.server_port}/v1"))
         assert_traceless(repr(checks).encode())
     server.shutdown()
     server.server_close()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from evonav.cli.doctor.checks import Where, all_checks
 from evonav.errors import InvalidArgumentError, PerceptionError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
@@ -147,13 +146,6 @@ def test_bad_options_are_named(options: dict[str, object], message: str) -> None
 def test_the_mini_detector_names_bad_options_too() -> None:
     with pytest.raises(InvalidArgumentError, match="predicted:mini has no option 'side_px'"):
         predicted_perception("mini", side_px=608)
-
-
-def test_doctor_looks_for_the_weights(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.delenv("EVONAV_MODELS", raising=False)
-    monkeypatch.setattr(coco, "PACKAGE", "no_such_package")
-    check = next(check for check in all_checks(Where(tmp_path, uses_network=False)) if check.name == "models coco")
-    assert (check.state, check.remedy.partition(" (")[0]) == ("missing", "pip install 'evonav[coco]'")
 
 
 def test_a_mask_is_the_foreground_of_its_box_without_floor_and_wall() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from evonav.cli.bench.app import bench_app
-from evonav.cli.doctor.doctor import doctor
+from evonav.cli.doctor import doctor
 from evonav.cli.examples import add_examples
 from evonav.cli.group import HELP_NAMES, Group, add_commands
 from evonav.cli.results.breakdown import breakdown

