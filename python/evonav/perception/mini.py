@@ -1,7 +1,7 @@
 """The mini detector: a small network of our own for the embedded simulator's pictures, run by the Rust core.
 
 It needs no torch and no download. It knows the embedded simulator's pictures alone and stands for no published model:
-its figures are never the paper's column. See docs/mini-detector.md.
+its figures are never the paper's column. See docs/studies/mini-detector.md.
 """
 
 import hashlib

@@ -83,7 +83,7 @@ class GenerationParameters(Record):
     moved_children_multiplier: NonNegativeFloat = _DEFAULTS["moved_children_multiplier"]
     """Multiplier for objects that stood on the salient object and moved with it.
 
-    The paper gives 9 to "the moved object". With 1 here, too few goals are relocated (docs/dataset.md).
+    The paper gives 9 to "the moved object". With 1 here, too few goals are relocated (docs/studies/task-statistics.md).
     """
     goals_on_walls: bool = _DEFAULTS["goals_on_walls"]
     """Whether objects on walls, which no modification moves, may be goals.

@@ -43,4 +43,7 @@ ORACLE_THETA = ChangePrior(
     repeated_weight=0.5,
     same_room=0.99,
 )
-"""Constants by which tasks are generated (paper, Tab. 5), and the shares of objects that move (docs/dataset.md)."""
+"""Constants by which tasks are generated (paper, Tab. 5), and shares of objects that move.
+
+The shares are those of docs/studies/task-statistics.md.
+"""
