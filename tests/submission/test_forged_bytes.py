@@ -124,7 +124,7 @@ FILES: dict[str, tuple[Callable[[Path, Path], None], str]] = {
     "another method": (with_byte(2, 9), "compression method"),
     "another checksum": (with_byte(-8, 0), "CRC check failed"),
     "another size": (with_byte(-4, 0), "length of data"),
-    "a flipped bit": (with_bytes(lambda data: data[:2000] + bytes([data[2000] ^ 64]) + data[2001:]), "line "),
+    "a flipped bit": (with_bytes(lambda data: data[:-99] + bytes([data[-99] ^ 64]) + data[-98:]), r"line \d+: "),
 }
 
 

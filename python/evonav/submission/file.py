@@ -143,6 +143,7 @@ def _lines(path: Path) -> Iterator[tuple[str, bytes]]:
                     raise SubmissionError(f"{where}: uncompressed, the limit is {MAX_TOTAL_BYTES} B")
                 yield where, line[:-1]
                 number, most = number + 1, MAX_LINE_BYTES
+                where = f"{path}: line {number}"
     except (OSError, EOFError, zlib.error) as error:
         raise SubmissionError(f"{where}: not a submission, or damaged ({error})") from error
 
