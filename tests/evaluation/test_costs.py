@@ -13,7 +13,7 @@ from evonav.decision.vlm.ledger import Usage
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import AgentFailedError
-from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore

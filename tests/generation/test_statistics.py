@@ -56,7 +56,7 @@ def value_of(found: TaskStatistics, key: str) -> float:
     return raw.value
 
 
-def test_measures_are_what_a_plain_count_says(tasks: list[Task], found: TaskStatistics) -> None:
+def test_metrics_are_what_a_plain_count_says(tasks: list[Task], found: TaskStatistics) -> None:
     later = [(task, stage) for task in tasks for stage in task.oracle_stages if stage.stage > 1]
     evolved = [(task, stage) for task, stage in later if stage.evolution.outcome == "evolved"]
     assert (found.num_tasks, found.num_houses) == (len(tasks), len(tasks))
@@ -127,7 +127,7 @@ def test_distributions_and_quantities_are_what_a_plain_count_says(tasks: list[Ta
     far = found.quantity("reference_distance_m")
     assert far is not None
     assert 1.0 - 1e-6 <= far.quantiles[0] <= far.quantiles[-1] <= 1.5 + 1e-6
-    for measure in found.measures:
+    for measure in found.metrics:
         if measure.raw is not None and measure.raw.ci95 is not None:
             low, high = measure.raw.ci95
             assert low - 1e-9 <= measure.raw.value <= high + 1e-9, measure
@@ -191,7 +191,7 @@ def test_the_expected_evolutions_are_the_papers() -> None:
 def test_folders_give_what_tasks_in_memory_give(tasks: list[Task], folder: Path, found: TaskStatistics) -> None:
     told: list[tuple[int, int]] = []
     read = statistics_of_folders([folder], mix="procthor-10k", on_task=lambda done, total: told.append((done, total)))
-    assert read.measures == found.measures
+    assert read.metrics == found.metrics
     assert told[-1] == (len(tasks), len(tasks))
     houses = read.distribution("house_rejections")
     assert houses is not None
@@ -209,10 +209,10 @@ def test_what_is_wrong_is_named(folder: Path, tmp_path: Path) -> None:
         statistics_of_folders([folder], mix="mansions")
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad/task.json").write_text('{"task_id": 3}')
-    with pytest.raises(TaskError, match=r"bad/task\.json: field"):
+    with pytest.raises(TaskError, match=r"bad/task\.json: task_id = 3"):
         statistics_of_folders([tmp_path])
     good = sorted(path.parent for path in folder.glob("*/task.json"))[:1] * 40
-    with pytest.raises(TaskError, match=r"bad/task\.json: field"):
+    with pytest.raises(TaskError, match=r"bad/task\.json: task_id = 3"):
         list(read_summaries([*good, tmp_path / "bad"], num_workers=2))
     with pytest.raises(InvalidArgumentError, match=r"\.png"):
         check_plot(Path("plot.bmp"))
@@ -223,7 +223,7 @@ def test_the_page_nests_and_the_plots_are_xml(found: TaskStatistics, tmp_path: P
     page = write_dataset_report(found, tmp_path)
     text = page.read_text(encoding="utf-8")
     check_html(text)
-    for measure in found.measures:
+    for measure in found.metrics:
         if measure.raw is not None:
             assert f"<td>{measure.label.strip().replace(chr(39), '&#39;')}</td>" in text
     svg = ET.fromstring((tmp_path / "statistics.svg").read_text(encoding="utf-8"))

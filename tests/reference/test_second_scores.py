@@ -9,7 +9,7 @@ import pytest
 from second_scores import table
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.report.run import load_run

@@ -70,7 +70,7 @@ def test_any_field_groups_and_any_number_is_measured(run: Path) -> None:
     assert breakdown(sides, "terminal_distance_m", "num_rounds").cells
     with pytest.raises(InvalidArgumentError, match="argument `by` is 'weather', expected one of stratum"):
         breakdown(sides, "weather")
-    with pytest.raises(InvalidArgumentError, match="measure 'house' is none of"):
+    with pytest.raises(InvalidArgumentError, match="metric 'house' is none of"):
         breakdown(sides, "mode", "house")
 
 

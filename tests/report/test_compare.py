@@ -108,8 +108,8 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
             pairs(*asked)
     with pytest.raises(InvalidArgumentError, match="baseline 'x' is none of fu"):
         pairs(a, baseline="x")
-    with pytest.raises(InvalidArgumentError, match=r"measure 'house' is none of .*spl"):
-        pairs(a, measures=["house"])
+    with pytest.raises(InvalidArgumentError, match=r"metric 'house' is none of .*spl"):
+        pairs(a, metrics=["house"])
 
 
 def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path:
     behind = sentence("b", "a", compare(read_compared_agents([str(run), "a", "b"]))[0].all.effects["success"])
     assert behind.startswith("b is ahead by "), "the difference of the agent that is ahead, whichever is named first"
     assert "[-" not in behind
-    by_rounds = compare(read_compared_agents([str(run)]), measures=["num_rounds", "recall"])
+    by_rounds = compare(read_compared_agents([str(run)]), metrics=["num_rounds", "recall"])
     assert "recall" not in by_rounds[0].all.effects  # no stage has it
     assert by_rounds[0].all.effects["num_rounds"].verdict == "equal"
 
@@ -148,7 +148,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     assert re.search(r"^ % +ftu +fu +difference", result.output, re.MULTILINE), "in the order named"
     assert max(len(line) for line in result.output.splitlines() if not line.startswith(("written", "note"))) <= 80
     found = one(run, "ftu", "fu")
-    rows = {(row["part"], row["measure"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}
+    rows = {(row["part"], row["metric"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}
     effect = found.all.effects["success"]
     assert effect.ci95 is not None
     assert float(rows["all", "success"]["low"]) == effect.ci95[0]

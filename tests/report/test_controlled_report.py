@@ -9,7 +9,7 @@ from made_up_run import OLD_TABLE_M, entry, floor_plan, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.controlled.analysis import MEASURES, load_analysis, pair_tables, split_of
+from evonav.controlled.analysis import METRICS, load_analysis, pair_tables, split_of
 from evonav.controlled.claims import claims
 from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
 from evonav.controlled.page import controlled_plots, write_controlled_report
@@ -98,14 +98,14 @@ def test_rates_and_changes_are_those_of_the_pairs(pairs):
     analysis = load_analysis(pairs)
     assert analysis.agents == ("fu", "stage-reset")
     assert len(analysis.keys("fu")) == len(analysis.keys("fu", "stage-reset")) == 6
-    drop = analysis.effect(("fixed", "fu"), ("evolved", "fu"), MEASURES["SR"])
+    drop = analysis.effect(("fixed", "fu"), ("evolved", "fu"), METRICS["SR"])
     assert (drop.n, drop.mean_a, drop.mean_b) == (6, 5 / 6, 2 / 6)
     assert drop.difference == pytest.approx(-0.5)
     assert drop.p == pytest.approx(mcnemar(3, 0)) == pytest.approx(0.25)
     assert drop.ci95[0] < -0.5 < drop.ci95[1]
-    spl = analysis.effect(("fixed", "fu"), ("evolved", "fu"), MEASURES["SPL"])
+    spl = analysis.effect(("fixed", "fu"), ("evolved", "fu"), METRICS["SPL"])
     assert spl.mean_a == pytest.approx(0.8 * 5 / 6)
-    more = analysis.effect_on_change("stage-reset", "fu", MEASURES["SR"])
+    more = analysis.effect_on_change("stage-reset", "fu", METRICS["SR"])
     assert more.difference == pytest.approx(-0.5 + 1 / 6)
 
 
@@ -121,7 +121,7 @@ def test_an_arm_has_the_rates_and_differences_of_its_run(pairs):
     for arm in analysis.arms:
         (one,) = compare(read_compared_agents([str(run_of(pairs, arm))]))
         for name, field in (("SR", "success"), ("SPL", "spl")):
-            assert analysis.effect((arm, one.a), (arm, one.b), MEASURES[name]) == one.all.effects[field]
+            assert analysis.effect((arm, one.a), (arm, one.b), METRICS[name]) == one.all.effects[field]
 
 
 def test_pairs_that_one_arm_lacks_are_left_out(tmp_path):
@@ -272,12 +272,12 @@ def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):
         "stage-reset": ([S, S, S, F, F, F],) * 3,
     }
     analysis = load_analysis(write_analysis(tmp_path / "rates", "rates", arms, outcomes))
-    assert [mean.value for _, mean in by_rate(analysis, "fu", MEASURES["SR"])] == [1.0, 0.5, 0.0]
-    found = crossover(analysis, "fu", MEASURES["SR"])
+    assert [mean.value for _, mean in by_rate(analysis, "fu", METRICS["SR"])] == [1.0, 0.5, 0.0]
+    found = crossover(analysis, "fu", METRICS["SR"])
     assert found.rate == pytest.approx(0.5)
     # All six houses of one kind: 1 in 64 resamples, which plain percentiles leave out and those widened for six do not.
     assert found.ci95 == pytest.approx((1 / 6, 5 / 6))
-    assert crossover(analysis, "stage-reset", MEASURES["SR"]) is None
+    assert crossover(analysis, "stage-reset", METRICS["SR"]) is None
     path = write_controlled_report(tmp_path / "rates")
     assert (path.parent / "rates.svg").is_file()
     assert "overtaken by stage-reset at p" in path.read_text(encoding="utf-8")

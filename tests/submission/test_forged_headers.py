@@ -113,7 +113,7 @@ HEADERS: dict[str, tuple[Forge, str, str]] = {
     "agents exchanged": (lambda parts: parts.header["agents"].reverse(), "complete", "fu .* instead of ftu"),
     "an agent more": (lambda parts: parts.header["agents"].append("me"), "complete", "14 records of 21 stages"),
     "an agent less": (lambda parts: parts.header["agents"].pop(), "complete", "14 records of 7 stages"),
-    "agents in one text": (setting("agents", value="fu"), "file", "agents: Input should be"),
+    "agents in one text": (setting("agents", value="fu"), "file", "agents = 'fu': Input should be"),
     "another format": (setting("format_version", value=2), "file", "format_version"),
     "an unknown field": (setting("surprise", value=1), "file", "surprise = 1: Extra"),
     "a field less": (lambda parts: parts.header.pop("config"), "file", 'missing "config"'),

@@ -31,8 +31,8 @@ SPLITS = {
 
 Key = tuple[str, int]
 """Task and stage."""
-Measure = Callable[[RecordedStage], float]
-MEASURES: dict[str, Measure] = {
+MetricOf = Callable[[RecordedStage], float]
+METRICS: dict[str, MetricOf] = {
     "SR": lambda one: float(bool(one.row.success)),
     "SPL": lambda one: one.row.spl or 0.0,
 }
@@ -70,12 +70,12 @@ class Analysis:
         """Return the house of each stage, all of which the agent has scored."""
         return [house_of(self.outcomes[self.arms[0], agent][key].row) for key in keys]
 
-    def values(self, agent: str, measure: Measure, keys: Sequence[Key]) -> NDArray[np.float64]:
-        """Return a measure of some stages of an agent in every arm, `(K, A)`."""
-        return np.array([[measure(self.outcomes[arm, agent][key]) for arm in self.arms] for key in keys])
+    def values(self, agent: str, metric: MetricOf, keys: Sequence[Key]) -> NDArray[np.float64]:
+        """Return a metric of some stages of an agent in every arm, `(K, A)`."""
+        return np.array([[metric(self.outcomes[arm, agent][key]) for arm in self.arms] for key in keys])
 
     def effect(
-        self, a: tuple[str, str], b: tuple[str, str], measure: Measure, keys: Sequence[Key] | None = None
+        self, a: tuple[str, str], b: tuple[str, str], metric: MetricOf, keys: Sequence[Key] | None = None
     ) -> PairedEffect | None:
         """Compare `b` with `a`, each an arm and an agent, over the stages that both scored in every arm.
 
@@ -85,15 +85,15 @@ class Analysis:
         keys = self.keys(a[1], b[1]) if keys is None else keys
         if not keys:
             return None
-        before, after = (self.values(agent, measure, keys)[:, self.arms.index(arm)] for arm, agent in (a, b))
+        before, after = (self.values(agent, metric, keys)[:, self.arms.index(arm)] for arm, agent in (a, b))
         return paired_effect(before, after, self.houses(keys, a[1]))
 
-    def effect_on_change(self, a: str, b: str, measure: Measure) -> PairedEffect | None:
+    def effect_on_change(self, a: str, b: str, metric: MetricOf) -> PairedEffect | None:
         """Estimate how much more agent `b` gains from the first arm to the last than agent `a`, pair by pair."""
         keys = self.keys(a, b)
         if not keys:
             return None
-        gain_a, gain_b = (found[:, -1] - found[:, 0] for found in (self.values(name, measure, keys) for name in (a, b)))
+        gain_a, gain_b = (found[:, -1] - found[:, 0] for found in (self.values(name, metric, keys) for name in (a, b)))
         return paired_effect(gain_a, gain_b, self.houses(keys, a))
 
 
@@ -160,9 +160,9 @@ def pair_tables(analysis: Analysis) -> list[Table]:
 def _drop_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
-    for name, measure in MEASURES.items():
+    for name, metric in METRICS.items():
         for agent in analysis.paired_agents:
-            effect = analysis.effect((fixed, agent), (evolved, agent), measure)
+            effect = analysis.effect((fixed, agent), (evolved, agent), metric)
             rows.append((f"{agent}, {name}", str(len(analysis.keys(agent))), *effect_cells(effect)))
     keys = {(fixed, agent, key) for agent in analysis.paired_agents for key in analysis.keys(agent)}
     num_houses = len({house_of(analysis.outcomes[arm, agent][key].row) for arm, agent, key in keys})
@@ -204,7 +204,7 @@ def _split_table(analysis: Analysis) -> Table:
         for agent in analysis.paired_agents:
             keys = analysis.keys(agent)
             part = [key for key in keys if is_part(analysis.outcomes[evolved, agent][key])]
-            effect = analysis.effect((fixed, agent), (evolved, agent), MEASURES["SR"], part)
+            effect = analysis.effect((fixed, agent), (evolved, agent), METRICS["SR"], part)
             rows.append((f"{name}: {agent}", str(len(part)), *effect_cells(effect)))
     columns = ("what changed, agent", "pairs", "SR Fixed", "Not Fixed", "change", "p")
     return Table("By what changed", columns, tuple(rows))
@@ -217,8 +217,8 @@ def _baseline_table(analysis: Analysis) -> Table:
             continue
         row = [agent, str(len(analysis.keys(agent, BASELINE)))]
         for arm in analysis.arms:
-            row += effect_cells(analysis.effect((arm, BASELINE), (arm, agent), MEASURES["SR"]))[2:]
-        row += effect_cells(analysis.effect_on_change(BASELINE, agent, MEASURES["SR"]))[2:]
+            row += effect_cells(analysis.effect((arm, BASELINE), (arm, agent), METRICS["SR"]))[2:]
+        row += effect_cells(analysis.effect_on_change(BASELINE, agent, METRICS["SR"]))[2:]
         rows.append(tuple(row))
     columns = ("agent", "pairs", "Fixed", "p", "Not Fixed", "p", "what the change does to it", "p")
     notes = (f"SR of the agent minus that of {BASELINE} on the same pairs, in points; last, Not Fixed minus Fixed.",)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys
+from evonav.controlled.analysis import BASELINE, METRICS, Analysis, moved_keys
 from evonav.report.tables.numbers import points
 from evonav.report.tables.table import Table
 from evonav.report.tables.verdicts import p_words
@@ -48,28 +48,28 @@ def claims(analysis: Analysis) -> list[Claim]:
     there = [agent for agent in MEMORY_AGENTS if agent in analysis.paired_agents]
     if BASELINE in analysis.paired_agents:
         for agent in there:
-            effect = analysis.effect((fixed, BASELINE), (fixed, agent), MEASURES["SR"])
+            effect = analysis.effect((fixed, BASELINE), (fixed, agent), METRICS["SR"])
             add("Fixed: memory is ahead of Stage-Reset", f"{agent} minus {BASELINE}, Fixed", effect)
         if "fu" in there:
-            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"])
+            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), METRICS["SR"])
             add("Not Fixed: FU is behind Stage-Reset", f"{BASELINE} minus fu, Not Fixed", effect)
             moved = moved_keys(analysis, "fu", BASELINE)
-            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"], moved)
+            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), METRICS["SR"], moved)
             add("the same", f"{BASELINE} minus fu, Not Fixed, where the target moved", effect)
     for agent in there:
-        effect = analysis.effect((evolved, agent), (fixed, agent), MEASURES["SR"])
+        effect = analysis.effect((evolved, agent), (fixed, agent), METRICS["SR"])
         add("Memory drops when the scene evolves", f"{agent}, Fixed minus Not Fixed", effect)
     for careful in ("msgnav", "ftu"):
         for trusting in ("3d-mem", "fu"):
             if careful in there and trusting in there:
-                effect = analysis.effect_on_change(trusting, careful, MEASURES["SR"])
+                effect = analysis.effect_on_change(trusting, careful, METRICS["SR"])
                 add(
                     "MSGNav and FTU drop less than 3D-Mem and FU", f"drop of {trusting} minus that of {careful}", effect
                 )
     if "ftu" in there:
         for agent in [*there, BASELINE]:
             if agent != "ftu" and agent in analysis.paired_agents:
-                effect = analysis.effect((evolved, agent), (evolved, "ftu"), MEASURES["SR"])
+                effect = analysis.effect((evolved, agent), (evolved, "ftu"), METRICS["SR"])
                 add("Not Fixed: FTU is best", f"ftu minus {agent}, Not Fixed", effect)
     return found
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
+from evonav.controlled.analysis import BASELINE, METRICS, Analysis, Key, MetricOf, effect_cells
 from evonav.report.tables.numbers import estimate_text
 from evonav.report.tables.table import Table
 from evonav.statistics import ClusterBootstrap, Estimate, Interval
@@ -43,21 +43,21 @@ def rate_keys(analysis: Analysis, *agents: str) -> list[Key]:
     return [key for key in analysis.keys(*agents) if key[1] > 1]
 
 
-def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[float, Estimate]]:
+def by_rate(analysis: Analysis, agent: str, metric: MetricOf) -> list[tuple[float, Estimate]]:
     """Return rate and mean of each arm, over the stages that the agent has scored in all."""
     keys = rate_keys(analysis, agent)
     if not keys:
         return []
-    found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(analysis.values(agent, measure, keys))
+    found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(analysis.values(agent, metric, keys))
     return [(arm.evolve_probability, mean) for arm, mean in zip(analysis.record.arms, found, strict=True)]
 
 
-def crossover(analysis: Analysis, agent: str, measure: Measure) -> Crossover | None:
+def crossover(analysis: Analysis, agent: str, metric: MetricOf) -> Crossover | None:
     """Estimate the rate at which the baseline overtakes an agent; `None` without stages of both."""
     keys = rate_keys(analysis, agent, BASELINE)
     if not keys or agent == BASELINE:
         return None
-    leads = analysis.values(agent, measure, keys) - analysis.values(BASELINE, measure, keys)
+    leads = analysis.values(agent, metric, keys) - analysis.values(BASELINE, metric, keys)
     rates = np.array([arm.evolve_probability for arm in analysis.record.arms])
     bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
     drawn = bootstrap.resampled_sums(bootstrap.sums(np.column_stack([leads, np.ones(len(leads))])))
@@ -83,10 +83,10 @@ def _crossing(rates: NDArray[np.float64], leads: NDArray[np.float64]) -> float:
 def rate_tables(analysis: Analysis) -> list[Table]:
     """Build the tables of SR and SPL by rate, of leads over the baseline, and of crossovers."""
     tables = []
-    for name, measure in MEASURES.items():
+    for name, metric in METRICS.items():
         rows = []
         for agent in analysis.agents:
-            found = by_rate(analysis, agent, measure)
+            found = by_rate(analysis, agent, metric)
             if found:
                 cells = [estimate_text(mean) for _, mean in found]
                 rows.append((agent, str(len(rate_keys(analysis, agent))), *cells))
@@ -104,15 +104,15 @@ def _lead_table(analysis: Analysis) -> Table:
         keys = rate_keys(analysis, agent, BASELINE)
         if agent == BASELINE or not keys:
             continue
-        for name, measure in MEASURES.items():
+        for name, metric in METRICS.items():
             cells = []
             for arm in analysis.arms:
-                _, _, lead, p = effect_cells(analysis.effect((arm, BASELINE), (arm, agent), measure, keys))
+                _, _, lead, p = effect_cells(analysis.effect((arm, BASELINE), (arm, agent), metric, keys))
                 cells.append(f"{lead}, p {p}")
-            found = crossover(analysis, agent, measure)
+            found = crossover(analysis, agent, metric)
             rows.append((f"{agent}, {name}", *cells, "" if found is None else found.text()))
     columns = (
-        "agent, measure",
+        "agent, metric",
         *(f"p = {arm.evolve_probability:g}" for arm in analysis.record.arms),
         f"overtaken by {BASELINE} at p",
     )

@@ -14,7 +14,8 @@ from typing import Any
 from evonav.component import optional_module
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import stage_metrics as metrics
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records import costs
 from evonav.evaluation.records.schema import RoundRecord, StageRecord
 from evonav.evaluation.records.store import RunStore

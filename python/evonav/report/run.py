@@ -11,7 +11,8 @@ from typing import Any
 from evonav.errors import StoreError
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord

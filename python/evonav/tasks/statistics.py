@@ -126,14 +126,14 @@ class TaskStatistics(Record):
     parameters: tuple[str, ...]
     """Generation parameters as JSON, each distinct set once."""
     weighting: Weighting | None
-    measures: tuple[Metric, ...]
+    metrics: tuple[Metric, ...]
     tests: tuple[Test, ...]
     distributions: tuple[Distribution, ...]
     quantities: tuple[Quantity, ...]
 
     def metric(self, key: str) -> Metric:
         """Return a metric by its key."""
-        return next(one for one in self.measures if one.key == key)
+        return next(one for one in self.metrics if one.key == key)
 
     def test(self, key: str) -> Test | None:
         """Return a test by its key; `None` if there was too little to test."""

@@ -50,7 +50,7 @@ def compare(
     from evonav.report.compare.selection import read_compared_agents
 
     found = compare_agents(
-        read_compared_agents(runs), measures=listed(measure), baseline=baseline, allow_differences=allow_differences
+        read_compared_agents(runs), metrics=listed(measure), baseline=baseline, allow_differences=allow_differences
     )
     content = json.dumps(comparison_json(found), indent=1) + "\n"
     if as_json:

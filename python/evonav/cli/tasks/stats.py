@@ -82,7 +82,7 @@ def print_statistics(found: "TaskStatistics") -> None:
     console.print(_metrics(found))
     for test in found.tests:
         console.print(_test_words(test), soft_wrap=False)
-    for metric in found.measures:
+    for metric in found.metrics:
         if metric.accepted is not None:
             console.print(_verdict(metric))
     console.print()
@@ -111,7 +111,7 @@ def _metrics(found: "TaskStatistics") -> "Table":
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     group = ""
-    for metric in found.measures:
+    for metric in found.metrics:
         if metric.raw is None:
             continue
         if metric.group != group:

@@ -23,8 +23,8 @@ Part = tuple[float, float] | None
 
 
 @dataclass(frozen=True, slots=True)
-class Measure:
-    """A column of a table."""
+class AggregateMetric:
+    """A metric of an agent over stages: a row of a table."""
 
     name: str
     label: str
@@ -69,82 +69,85 @@ def _radius(radius_m: float) -> Callable[[StageMetrics], Part]:
 
 
 SUCCESS = (
-    Measure("sr", "success (paper)", "%", _mean("success")),
-    Measure("strict_sr", "strict success", "%", _mean("is_strict_success")),
-    Measure("geodesic_sr", "geodesic success", "%", _mean("is_geodesic_success")),
-    Measure("spl", "SPL", "%", _mean("spl")),
-    Measure("ring_spl", "SPL to the radius", "%", _mean("ring_spl")),
-    Measure("soft_spl", "SoftSPL", "%", _mean("soft_spl")),
-    Measure("spl_after_change", "SPL from a change during the stage on", "%", _mean("spl_after_change")),
-    *(Measure(f"sr_{radius_m:g}m", f"success at {radius_m:g} m", "%", _radius(radius_m)) for radius_m in RADII_M),
+    AggregateMetric("sr", "success (paper)", "%", _mean("success")),
+    AggregateMetric("strict_sr", "strict success", "%", _mean("is_strict_success")),
+    AggregateMetric("geodesic_sr", "geodesic success", "%", _mean("is_geodesic_success")),
+    AggregateMetric("spl", "SPL", "%", _mean("spl")),
+    AggregateMetric("ring_spl", "SPL to the radius", "%", _mean("ring_spl")),
+    AggregateMetric("soft_spl", "SoftSPL", "%", _mean("soft_spl")),
+    AggregateMetric("spl_after_change", "SPL from a change during the stage on", "%", _mean("spl_after_change")),
+    *(
+        AggregateMetric(f"sr_{radius_m:g}m", f"success at {radius_m:g} m", "%", _radius(radius_m))
+        for radius_m in RADII_M
+    ),
 )
 STALENESS = (
-    Measure("stale_visits", "stale visits", "", _mean("num_stale_visits")),
-    Measure("stale_path_m", "path for stale entries", "m", _mean("stale_path_m")),
-    Measure("stale_path_share", "path for stale entries, share", "%", _share("stale_path_m", "path_length_m")),
-    Measure(
+    AggregateMetric("stale_visits", "stale visits", "", _mean("num_stale_visits")),
+    AggregateMetric("stale_path_m", "path for stale entries", "m", _mean("stale_path_m")),
+    AggregateMetric("stale_path_share", "path for stale entries, share", "%", _share("stale_path_m", "path_length_m")),
+    AggregateMetric(
         "stale_evident",
         "stale entries whose empty place was seen",
         "%",
         _share("num_stale_evident", "num_stale_at_start"),
     ),
-    Measure(
+    AggregateMetric(
         "stale_cleared", "such entries cleared in the stage", "%", _share("num_stale_cleared", "num_stale_evident")
     ),
-    Measure("rounds_to_clear", "rounds until cleared", "rounds", _mean("rounds_to_clear", "num_stale_cleared")),
-    Measure("metres_to_clear", "metres until cleared", "m", _mean("metres_to_clear", "num_stale_cleared")),
-    Measure(
+    AggregateMetric("rounds_to_clear", "rounds until cleared", "rounds", _mean("rounds_to_clear", "num_stale_cleared")),
+    AggregateMetric("metres_to_clear", "metres until cleared", "m", _mean("metres_to_clear", "num_stale_cleared")),
+    AggregateMetric(
         "moved_found", "moved objects that were seen and got an entry", "%", _share("num_moved_found", "num_moved_seen")
     ),
-    Measure("rounds_to_find", "rounds until they got it", "rounds", _mean("rounds_to_find", "num_moved_found")),
-    Measure("forgotten", "objects forgotten", "", _later(_mean("num_forgotten"))),
+    AggregateMetric("rounds_to_find", "rounds until they got it", "rounds", _mean("rounds_to_find", "num_moved_found")),
+    AggregateMetric("forgotten", "objects forgotten", "", _later(_mean("num_forgotten"))),
 )
 MEMORY = (
-    Measure("entries", "entries at the end", "", _mean("num_entries")),
-    Measure("precision", "precision at the end", "%", _rest("num_stale_entries", "num_entries")),
-    Measure("recall", "recall at the end", "%", _mean("recall")),
-    Measure("precision_before", "precision before a change", "%", _mean("precision_before")),
-    Measure("precision_at_start", "precision after a change", "%", _later(_mean("precision_at_start"))),
-    Measure("recall_at_start", "recall after a change", "%", _later(_mean("recall_at_start"))),
-    Measure("duplicates", "duplicates", "", _mean("num_duplicates")),
-    Measure("position_error_m", "position error", "m", _mean("position_error_m")),
+    AggregateMetric("entries", "entries at the end", "", _mean("num_entries")),
+    AggregateMetric("precision", "precision at the end", "%", _rest("num_stale_entries", "num_entries")),
+    AggregateMetric("recall", "recall at the end", "%", _mean("recall")),
+    AggregateMetric("precision_before", "precision before a change", "%", _mean("precision_before")),
+    AggregateMetric("precision_at_start", "precision after a change", "%", _later(_mean("precision_at_start"))),
+    AggregateMetric("recall_at_start", "recall after a change", "%", _later(_mean("recall_at_start"))),
+    AggregateMetric("duplicates", "duplicates", "", _mean("num_duplicates")),
+    AggregateMetric("position_error_m", "position error", "m", _mean("position_error_m")),
 )
 COSTS = (
-    Measure("wall_s", "wall", "s", _mean("wall_s")),
-    Measure("cpu_s", "CPU", "s", _mean("cpu_s")),
-    Measure("simulation_cpu_s", "simulation", "s", _mean("simulation_cpu_s")),
-    Measure("perception_cpu_s", "perception", "s", _mean("perception_cpu_s")),
-    Measure("agent_cpu_s", "agent", "s", _mean("agent_cpu_s")),
-    Measure("decision_cpu_s", "of it decisions", "s", _mean("decision_cpu_s")),
-    Measure("evaluator_cpu_s", "evaluator", "s", _mean("evaluator_cpu_s")),
-    Measure("questions", "questions", "", _mean("num_questions")),
-    Measure("input_tokens", "tokens in", "", _mean("input_tokens")),
-    Measure("output_tokens", "tokens out", "", _mean("output_tokens")),
-    Measure("cost_usd", "money", "$", _mean("cost_usd")),
-    Measure("agent_peak_rss_mb", "agent's memory", "MB", _mean("agent_peak_rss_mb")),
+    AggregateMetric("wall_s", "wall", "s", _mean("wall_s")),
+    AggregateMetric("cpu_s", "CPU", "s", _mean("cpu_s")),
+    AggregateMetric("simulation_cpu_s", "simulation", "s", _mean("simulation_cpu_s")),
+    AggregateMetric("perception_cpu_s", "perception", "s", _mean("perception_cpu_s")),
+    AggregateMetric("agent_cpu_s", "agent", "s", _mean("agent_cpu_s")),
+    AggregateMetric("decision_cpu_s", "of it decisions", "s", _mean("decision_cpu_s")),
+    AggregateMetric("evaluator_cpu_s", "evaluator", "s", _mean("evaluator_cpu_s")),
+    AggregateMetric("questions", "questions", "", _mean("num_questions")),
+    AggregateMetric("input_tokens", "tokens in", "", _mean("input_tokens")),
+    AggregateMetric("output_tokens", "tokens out", "", _mean("output_tokens")),
+    AggregateMetric("cost_usd", "money", "$", _mean("cost_usd")),
+    AggregateMetric("agent_peak_rss_mb", "agent's memory", "MB", _mean("agent_peak_rss_mb")),
 )
-MEASURES = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs": COSTS}
-"""The measures by kind. `costs` depend on the machine; the others depend on the run's inputs alone."""
+METRICS = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs": COSTS}
+"""The metrics by kind. `costs` depend on the machine; the others depend on the run's inputs alone."""
 
 
-def explain(rows: Sequence[StageMetrics], measures: Sequence[Measure]) -> dict[str, list[Estimate]]:
-    """Estimate measures for each agent, in the order of the rows.
+def explain(rows: Sequence[StageMetrics], metrics: Sequence[AggregateMetric]) -> dict[str, list[Estimate]]:
+    """Estimate metrics for each agent, in the order of the rows.
 
     Args:
         rows: The stages of a run, or some of them.
-        measures: Measures of `MEASURES`.
+        metrics: Metrics of `METRICS`.
 
     Returns:
-        An estimate of each measure by agent; its `n` is the number of stages that have a value.
+        An estimate of each metric by agent; its `n` is the number of stages that have a value.
     """
     agents = dict.fromkeys(row.agent for row in rows)
     return {
-        agent: [_estimate_of([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
+        agent: [_estimate_of([row for row in rows if row.agent == agent], one) for one in metrics] for agent in agents
     }
 
 
-def _estimate_of(rows: Sequence[StageMetrics], measure: Measure) -> Estimate:
-    parts = [(house_of(row), part) for row in rows if (part := measure.part(row)) is not None]
+def _estimate_of(rows: Sequence[StageMetrics], metric: AggregateMetric) -> Estimate:
+    parts = [(house_of(row), part) for row in rows if (part := metric.part(row)) is not None]
     if not parts:
         return Estimate(None, None, 0, 0)
     bootstrap = ClusterBootstrap([house for house, _ in parts])

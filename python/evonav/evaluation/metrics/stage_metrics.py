@@ -1,14 +1,10 @@
-"""Compute one flat row per stage, the source of all tables, exports and comparisons (defined in docs/measures.md).
-
-`read_stage_metrics` reads the metrics that the store holds beside each record, so no trace is parsed.
-"""
+"""Compute the metrics of a stage from its record (defined in docs/measures.md): a flat row."""
 
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
 
 from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.failure_causes import cause_of
@@ -16,9 +12,6 @@ from evonav.evaluation.metrics.scoring import stage_spl
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
 from evonav.tasks.language import STRUCTURE_TYPES
-
-if TYPE_CHECKING:
-    from evonav.evaluation.records.store import RunStore
 
 STRICT_RADIUS_M = 1.0
 """Largest distance to the target's box for `is_strict_success`."""
@@ -175,19 +168,8 @@ class StageMetrics(StageCosts, RecordMetrics):
         return None if self.terminal_distance_m is None or not self.is_scored else self.terminal_distance_m < radius_m
 
 
-@dataclass(frozen=True, slots=True)
-class _StoredMetrics:
-    """The metrics of a record as the store holds them."""
-
-    metrics: RecordMetrics
-    counters: dict[str, int]
-    """The agent's cumulative counters at the end of the stage."""
-    is_fresh: bool
-    """The agent began again in this stage, and its counters with it."""
-
-
 def encode_metrics(record: StageRecord) -> str:
-    """Encode the metrics and counters of a record as JSON, for `read_stage_metrics`.
+    """Encode the metrics and counters of a record as JSON, for `evonav.evaluation.metrics.stage_rows`.
 
     Args:
         record: The whole record, with its trace.
@@ -201,44 +183,6 @@ def encode_metrics(record: StageRecord) -> str:
         "is_fresh": record.stage == 1 or record.memory_lost_at == record.stage,
     }
     return json.dumps(values, separators=(",", ":"), allow_nan=False)
-
-
-def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -> list[StageMetrics]:
-    """Return a row for every recorded stage, by agent, task and stage.
-
-    Args:
-        store: The store of a run, finished or not.
-        agents: The agents to read; default: all.
-
-    Raises:
-        StoreError: The run cannot be read.
-    """
-    stored = _stored_metrics(store, agents)
-    costs, timings, retries = store.costs(), store.timings(), store.retries()
-    rows: list[StageMetrics] = []
-    for _, episode in groupby(stored, key=lambda one: (one.metrics.agent, one.metrics.task_id)):
-        before: _StoredMetrics | None = None
-        counted: dict[str, int] = {}
-        for one in episode:
-            key = (one.metrics.agent, one.metrics.task_id, one.metrics.stage)
-            counted = {} if one.is_fresh else counted
-            follows = before is not None and before.metrics.stage == one.metrics.stage - 1
-            wall_s, cpu_s = timings.get(key, (None, None))
-            values: dict[str, Any] = {
-                **vars(one.metrics),
-                "wall_s": wall_s,
-                "cpu_s": cpu_s,
-                **costs.get(key, {}),
-                "num_retries": retries[key],
-                **{
-                    field: one.counters[name] - counted.get(name, 0) if name in one.counters else None
-                    for name, field in COUNTERS.items()
-                },
-                "precision_before": before.metrics.precision if before is not None and follows else None,
-            }
-            rows.append(StageMetrics(**values))
-            before, counted = one, {**counted, **one.counters}
-    return rows
 
 
 def metrics_of(record: StageRecord) -> RecordMetrics:
@@ -312,15 +256,6 @@ def _spl_after_change(record: StageRecord) -> float | None:
         return None
     path_m = max(0.0, record.path_length_m - (during.path_before_m or 0.0))
     return stage_spl(record.state is EndState.SUCCESS, path_m, during.reference_after_m)
-
-
-def _stored_metrics(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_StoredMetrics]:
-    """Yield metrics by agent, task and stage."""
-    wanted = None if agents is None else set(agents)
-    for (agent, _, _), text in store.encoded_metrics():
-        if wanted is None or agent in wanted:
-            values = json.loads(text)
-            yield _StoredMetrics(RecordMetrics(**values["metrics"]), values["counters"], values["is_fresh"])
 
 
 def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:

@@ -75,7 +75,7 @@ def statistics_of(
         num_stages=tally.num_stages,
         parameters=tuple(sorted(tally.parameters)),
         weighting=None if weighting is None else weighting.record,
-        measures=_metrics(tally, weighting),
+        metrics=_metrics(tally, weighting),
         tests=_tests(tally, weighting),
         distributions=tuple(
             _distribution(tally, weighting, key, label)

@@ -10,9 +10,9 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
-from evonav.report.compare.compare import STRATA, check_measure
+from evonav.report.compare.compare import STRATA, check_metric
 from evonav.report.compare.selection import ComparedAgent
-from evonav.report.compare.wording import RATES, measure_name, scale_of
+from evonav.report.compare.wording import RATES, metric_name, scale_of
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.report.tables.numbers import NONE, estimate_text, number
@@ -31,11 +31,11 @@ NUM_BINS = 4
 
 @dataclass(frozen=True, slots=True)
 class Breakdown:
-    """A measure of every agent by group."""
+    """A metric of every agent by group."""
 
     by: str
     label: str
-    measure: str
+    metric: str
     groups: tuple[str, ...]
     agents: tuple[str, ...]
     cells: Mapping[tuple[str, str], Estimate]
@@ -59,19 +59,19 @@ STANDARD = ("stratum", "mode", "path-length", "earlier-stages", "room-count", "c
 """Groupings that `evonav breakdown` shows by default."""
 
 
-def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = "success") -> Breakdown:
+def breakdown(compared_agents: Sequence[ComparedAgent], by: str, metric: str = "success") -> Breakdown:
     """Compute a metric by group, for every compared agent.
 
     Args:
         compared_agents: Agents from `read_compared_agents`.
         by: One of `STANDARD`, or any field of a stage's row.
-        measure: Any numeric field of a row; the radius sweep always shows success.
+        metric: Any numeric field of a row; the radius sweep always shows success.
 
     Raises:
         InvalidArgumentError: There is no such field.
         StoreError: A run cannot be read.
     """
-    check_measure(measure)
+    check_metric(metric)
     if by == RADIUS:
         return _by_radius(compared_agents)
     grouping = _grouping(compared_agents, by)
@@ -79,7 +79,7 @@ def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = 
     for compared in compared_agents:
         for row in compared.rows.values():
             group = grouping.group_of(row)
-            if group is not None and row.is_scored and getattr(row, measure) is not None:
+            if group is not None and row.is_scored and getattr(row, metric) is not None:
                 rows.setdefault((group, compared.name), []).append(row)
     sizes: dict[str, int] = {}
     for (group, _), part in rows.items():
@@ -88,11 +88,11 @@ def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = 
     return Breakdown(
         by=by,
         label=grouping.label,
-        measure=measure,
+        metric=metric,
         groups=tuple(group for group in known if group in sizes),
         agents=tuple(compared.name for compared in compared_agents),
         cells={  # group by group: agents with the same houses share resamples
-            key: _cell(part, [float(getattr(row, measure)) for row in part]) for key, part in sorted(rows.items())
+            key: _cell(part, [float(getattr(row, metric)) for row in part]) for key, part in sorted(rows.items())
         },
         note=grouping.note,
     )
@@ -207,15 +207,15 @@ def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
     for group in found.groups:
         cells = [found.cells.get((group, agent)) for agent in found.agents]
         sizes = sorted({cell.n for cell in cells if cell is not None})
-        scale = scale_of(found.measure)
+        scale = scale_of(found.metric)
         shown = (_brief(cell, scale) if is_brief else estimate_text(cell, scale=scale) for cell in cells)
         rows.append((group, "-".join(map(str, sizes[:1] + sizes[1:][-1:])), *shown))
-    unit = " %" if found.measure in RATES else ""
+    unit = " %" if found.metric in RATES else ""
     ends = "± half of its 95% interval" if is_brief else "[95% CI]"
-    notes = [f"{measure_name(found.measure)}{unit} {ends}, bootstrap by house; n stages of an agent."]
+    notes = [f"{metric_name(found.metric)}{unit} {ends}, bootstrap by house; n stages of an agent."]
     notes += [found.note] if found.note else []
     columns = (found.label, "n", *found.agents)
-    return Table(f"{measure_name(found.measure)} by {found.label}", columns, tuple(rows), tuple(notes))
+    return Table(f"{metric_name(found.metric)} by {found.label}", columns, tuple(rows), tuple(notes))
 
 
 def _brief(cell: Estimate | None, scale: float) -> str:
@@ -227,7 +227,7 @@ def _brief(cell: Estimate | None, scale: float) -> str:
 
 def breakdown_csv(found: Sequence[Breakdown]) -> str:
     """Return one CSV row per group and agent, unrounded."""
-    columns = ("by", "group", "agent", "measure", "n", "num_houses", "value", "low", "high")
+    columns = ("by", "group", "agent", "metric", "n", "num_houses", "value", "low", "high")
     rows = []
     for one in found:
         for group in one.groups:
@@ -235,14 +235,14 @@ def breakdown_csv(found: Sequence[Breakdown]) -> str:
                 cell = one.cells.get((group, agent))
                 if cell is not None:
                     low, high = cell.ci95 or (None, None)
-                    rows.append((one.by, group, agent, one.measure, cell.n, cell.num_clusters, cell.value, low, high))
+                    rows.append((one.by, group, agent, one.metric, cell.n, cell.num_clusters, cell.value, low, high))
     return csv_text(columns, rows)
 
 
 def breakdown_plot(found: Breakdown) -> Plot:
     """Plot a breakdown as dots with whiskers, or as lines along the success radius."""
-    scale = scale_of(found.measure)
-    name = f"{measure_name(found.measure)}, %" if scale == 100 else measure_name(found.measure)
+    scale = scale_of(found.metric)
+    name = f"{metric_name(found.metric)}, %" if scale == 100 else metric_name(found.metric)
     if found.by == RADIUS:
         radii = [group for group in found.groups if group.endswith(" m")]
         lines = []
@@ -261,5 +261,5 @@ def breakdown_plot(found: Breakdown) -> Plot:
         for group, size in zip(groups, sizes, strict=True)
     )
     more = len(found.groups) - len(groups)
-    heading = f"{measure_name(found.measure)} by {found.label}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
+    heading = f"{metric_name(found.metric)} by {found.label}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
     return GroupPlot(heading, labels, tuple(series), name)

@@ -23,7 +23,7 @@ from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.table import MODES
 from evonav.statistics import PairedEffect, mcnemar, paired_effects, with_holm
 
-MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
+METRICS = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
 """Fields of a row that are compared unless others are asked for."""
 SAME_PROTOCOL = ("protocol.", "tasks", "num_tasks")
 """Settings that two runs have to share."""
@@ -92,7 +92,7 @@ class Comparison:
 def compare(
     compared_agents: Sequence[ComparedAgent],
     *,
-    measures: Sequence[str] = (),
+    metrics: Sequence[str] = (),
     baseline: str | None = None,
     allow_differences: bool = False,
 ) -> list[Comparison]:
@@ -104,7 +104,7 @@ def compare(
 
     Args:
         compared_agents: Agents from `read_compared_agents`.
-        measures: Numeric fields of a row, besides success and SPL.
+        metrics: Numeric fields of a row, besides success and SPL.
         baseline: Name of the agent that all others are compared with.
         allow_differences: Compare what runs of different tasks or protocol have in common.
 
@@ -112,7 +112,7 @@ def compare(
         InvalidArgumentError: There are fewer than two agents, their runs differ, or a name is unknown.
     """
     pairs = _pairs(compared_agents, baseline)
-    names = _fields(compared_agents, measures)
+    names = _fields(compared_agents, metrics)
     found = [_compare(a, b, names, allow_differences) for a, b in pairs]
     adjusted: list[dict[str, PairedEffect]] = [dict(one.all.effects) for one in found]
     for field in names:
@@ -125,7 +125,7 @@ def compare(
     ]
 
 
-def check_measure(name: str) -> None:
+def check_metric(name: str) -> None:
     """Check that a field of a row can be averaged.
 
     Raises:
@@ -133,7 +133,7 @@ def check_measure(name: str) -> None:
     """
     numeric = [field.name for field in fields(StageMetrics) if any(kind in str(field.type) for kind in _NUMBERS)]
     if name not in numeric:
-        raise InvalidArgumentError(f"measure {name!r} is none of {', '.join(sorted(numeric))}")
+        raise InvalidArgumentError(f"metric {name!r} is none of {', '.join(sorted(numeric))}")
 
 
 _NUMBERS = ("int", "float", "bool")
@@ -187,14 +187,14 @@ def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> li
     return pairs
 
 
-def _fields(compared_agents: Sequence[ComparedAgent], measures: Sequence[str]) -> list[str]:
+def _fields(compared_agents: Sequence[ComparedAgent], metrics: Sequence[str]) -> list[str]:
     if not any(compared.rows for compared in compared_agents):
         raise InvalidArgumentError(
             f"no recorded stage in {', '.join(str(compared.run.run_dir) for compared in compared_agents)}"
         )
-    for name in measures:
-        check_measure(name)
-    return list(dict.fromkeys([*MEASURES, *measures]))
+    for name in metrics:
+        check_metric(name)
+    return list(dict.fromkeys([*METRICS, *metrics]))
 
 
 def _compare(a: ComparedAgent, b: ComparedAgent, fields: Sequence[str], allow_differences: bool) -> Comparison:

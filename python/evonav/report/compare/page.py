@@ -18,7 +18,7 @@ from evonav.statistics import PairedEffect
 
 def comparison_plot(comparisons: Sequence[Comparison], field: str = "success") -> GapPlot:
     """Plot differences of SR, or of `spl`: of one pair by parts, or of several pairs on all stages."""
-    name = wording.measure_name(field)
+    name = wording.metric_name(field)
     if len(comparisons) == 1:
         (one,) = comparisons
         gaps = tuple(_gap(part.effects[field], part.label) for part in one.parts if field in part.effects)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from evonav.counted import counted
-from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip, Part
+from evonav.report.compare.compare import METRICS, STRATA, Comparison, Flip, Part
 from evonav.report.export import csv_text
 from evonav.report.tables.table import (
     INTERVALS,
@@ -26,7 +26,7 @@ from evonav.statistics import Interval
 
 RATES = frozenset(
     {
-        *MEASURES,
+        *METRICS,
         "ring_spl",
         "is_geodesic_success",
         "has_stopped",
@@ -44,9 +44,9 @@ METHOD = f"Differences are of the same stages. {INTERVALS} {VERDICTS}"
 EXPLORING = "Use parts to explore, not as claims: their p is not adjusted for the number of parts."
 
 
-def measure_name(field: str) -> str:
+def metric_name(field: str) -> str:
     """Return a metric's name as tables show it."""
-    return MEASURES.get(field, field.replace("_", " "))
+    return METRICS.get(field, field.replace("_", " "))
 
 
 def pair_table(comparisons: Sequence[Comparison]) -> Table:
@@ -69,7 +69,7 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     )
     columns = ("", "difference [95% CI]", p_heading(len(comparisons)), "verdict")
     sizes = sorted({one.all.n for one in comparisons})
-    return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, rows)
+    return Table(f"{metric_name(field)}, n = {'-'.join(map(str, sizes))}", columns, rows)
 
 
 def comparison_table(one: Comparison) -> Table:
@@ -77,7 +77,7 @@ def comparison_table(one: Comparison) -> Table:
     effects = one.all.effects
     rows = tuple(
         (
-            measure_name(field),
+            metric_name(field),
             *(f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_b, effect.mean_a)),
             *effect_cells(effect, scale_of(field)),
             says(one, field),
@@ -162,7 +162,7 @@ def _part_heads(one: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]
 
 
 def _field_columns(fields: Sequence[str]) -> list[str]:
-    return [name for field in fields for name in (f"{measure_name(field)} difference [95% CI]", "p")]
+    return [name for field in fields for name in (f"{metric_name(field)} difference [95% CI]", "p")]
 
 
 def _field_cells(part: Part, fields: Sequence[str]) -> list[str]:
@@ -199,7 +199,7 @@ def findings(comparisons: Sequence[Comparison]) -> list[str]:
         for field in ("success", "spl"):
             effect = one.all.effects.get(field)
             if effect is not None:
-                lines.append(sentence(one.a, one.b, effect, measure_name(field), num_pairs=len(comparisons)))
+                lines.append(sentence(one.a, one.b, effect, metric_name(field), num_pairs=len(comparisons)))
     return lines
 
 
@@ -229,7 +229,7 @@ def comparison_csv(comparisons: Sequence[Comparison]) -> str:
         "a",
         "b",
         "part",
-        "measure",
+        "metric",
         "n",
         "num_houses",
         "mean_a",

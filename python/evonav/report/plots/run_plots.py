@@ -37,7 +37,7 @@ def run_breakdowns(run: RecordedRun) -> Breakdowns:
     """
     agents = [one for one in agents_of(run) if any(row.is_scored for row in one.rows.values())]
     wanted = dict.fromkeys((*TABLED, *PLOTTED)) if agents else ()
-    found = {(by, measure): breakdown(agents, by, measure) for by, measure in wanted}
+    found = {(by, metric): breakdown(agents, by, metric) for by, metric in wanted}
     return {key: one for key, one in found.items() if one.groups}
 
 

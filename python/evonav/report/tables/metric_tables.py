@@ -5,9 +5,10 @@ from functools import partial
 from pathlib import Path
 
 from evonav.counted import counted
-from evonav.evaluation.metrics.aggregate import MEASURES, explain
+from evonav.evaluation.metrics.aggregate import METRICS, explain
 from evonav.evaluation.metrics.navigation import house_of
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.numbers import estimate_text
 from evonav.report.tables.table import STRICT_NOTE, Table
@@ -37,19 +38,19 @@ def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[
     if agents is not None:
         rank = {agent: i for i, agent in enumerate(agents)}
         rows.sort(key=lambda row: rank[row.agent])
-    return [measures_table(rows, kind) for kind in MEASURES]
+    return [measures_table(rows, kind) for kind in METRICS]
 
 
 def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
-    """Build the table of one kind of metric, a key of `MEASURES`, from the rows of a run."""
-    found = explain(rows, MEASURES[kind])
+    """Build the table of one kind of metric, a key of `METRICS`, from the rows of a run."""
+    found = explain(rows, METRICS[kind])
     totals = {agent: sum(row.is_scored for row in rows if row.agent == agent) for agent in found}
     lines = []
-    for index, measure in enumerate(MEASURES[kind]):
+    for index, metric in enumerate(METRICS[kind]):
         cells = {agent: metrics[index] for agent, metrics in found.items()}
         if any(cell.value is not None for cell in cells.values()):
-            name = f"{measure.label}, {measure.unit}" if measure.unit else measure.label
-            written = partial(estimate_text, scale=100 if measure.unit == "%" else 1, digits=_DIGITS[measure.unit])
+            name = f"{metric.label}, {metric.unit}" if metric.unit else metric.label
+            written = partial(estimate_text, scale=100 if metric.unit == "%" else 1, digits=_DIGITS[metric.unit])
             lines.append((name, *(written(cell, has_n=cell.n != totals[agent]) for agent, cell in cells.items())))
     houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
     sizes = "; ".join(

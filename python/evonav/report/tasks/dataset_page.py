@@ -41,7 +41,7 @@ def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
 
 def _page(found: TaskStatistics) -> str:
     groups: dict[str, list[list[str]]] = {}
-    for metric in found.measures:
+    for metric in found.metrics:
         if metric.raw is not None:
             groups.setdefault(metric.group, []).append(_row(metric))
     return page_text(

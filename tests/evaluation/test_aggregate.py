@@ -1,9 +1,9 @@
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.metrics.aggregate import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
+from evonav.evaluation.metrics.aggregate import COSTS, MEMORY, METRICS, STALENESS, SUCCESS, explain
 from evonav.evaluation.metrics.navigation import summarise
-from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, StaleEntryRecord
 from evonav.evaluation.records.store import RunStore
@@ -81,7 +81,7 @@ def test_tables_leave_out_what_no_agent_has(run_dir):
     assert table.rows[0][1] == "50.0 [0.0, 100.0]"
     assert "fu 2 stages of 2 houses" in table.notes[0]
     assert rows
-    assert len(measures_tables(run_dir)) == len(MEASURES)
+    assert len(measures_tables(run_dir)) == len(METRICS)
 
 
 def _rows(run_dir):

@@ -3,7 +3,8 @@ from dataclasses import fields
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, metrics_of, read_stage_metrics
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, metrics_of
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
