@@ -2,7 +2,7 @@
 
 import hashlib
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -110,9 +110,10 @@ class Evaluation:
         config, hosting, is_one_of_many = self.config, self.config.hosting, workforce.jobs_at_once > 1
         if not hosting.is_in_process and (workforce.num_workers == 0 or not IS_SUPPORTED):
             hosting = replace(hosting, isolation="none")
+        hidden = (self.run_dir, *(task.path.parent for task in self.tasks))
         processes = ProcessSetup(
             log=str(self.run_dir.absolute() / LOG_NAME),
-            hidden=tuple(sorted({str(path.absolute()) for path in (self.run_dir, *_folders_of(self.tasks))})),
+            hidden=tuple(sorted({str(path.absolute()) for path in hidden})),
             scratch=scratch,
             relays_model=(hosting.isolation == "sandbox" or is_one_of_many)  # else processes have the client's memory
             and is_relayed(config.backend.decision),
@@ -307,10 +308,6 @@ class Evaluation:
             else:
                 record = as_not_run(blank, failed.error, failed.stage)
             yield encode_stage(record, wall_s=0.0, cpu_s=0.0, traceback=failure.traceback, floor_plan=plans.get(stage))
-
-
-def _folders_of(tasks: Sequence[TaskFile]) -> Iterator[Path]:
-    return (task.path.parent for task in tasks)
 
 
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
