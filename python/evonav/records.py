@@ -25,7 +25,7 @@ def sentence_of(error: ValidationError, name: str = "") -> str:
     """Return the first problem that pydantic found as a sentence with the wrong field and its value.
 
     Args:
-        name: What was read, which begins the field's path.
+        name: The thing that was read, which begins the field's path.
     """
     return sentences_of(error, name)[0]
 

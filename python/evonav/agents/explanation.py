@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RoundDiagnostics:
-    """What records state of a round: the part of an explanation that is asked for in every one."""
+    """The part of an explanation that is asked for in every round, as records state it."""
 
     choice: str = ""
     """The agent's choice, for example `object 12`, `frontier 3`, `none`."""
@@ -84,7 +84,7 @@ class Explanation:
     chosen_id: int | None = None
     """Id of the entry of `objects` that the agent chose; the evaluator notes whether it was stale."""
     chosen_entry: EntryBelief | None = None
-    """That entry as it was when it was chosen; default: as it is in `objects` now."""
+    """The entry as it was when it was chosen; default: as it is in `objects` now."""
     choice: str = ""
     """The choice in a few words; default: `object ID` if `chosen_id` is given. `frontier ID` is marked on the map."""
     reason: str = ""
