@@ -6,7 +6,7 @@ from dataclasses import replace
 from toy_house import OBJECTS, stage_case
 
 from evonav.evaluation.episode.spec import HouseChange
-from evonav.evaluation.records.changes import DuringRecord, Relocation, TransitionRecord
+from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
 
 
 def changing_stage(stage, target_id, at_round, moves, **options):
@@ -21,6 +21,6 @@ def changing_stage(stage, target_id, at_round, moves, **options):
         {"id": key, "position_m": place, "rotation_deg": (0.0, 0.0, 0.0), "parent": None}
         for key, place in moves.items()
     ]
-    record = DuringRecord(round=at_round, change=TransitionRecord(mode="SALIENT_OBJECT", relocations=relocations))
+    record = ChangeDuringStage(round=at_round, change=TransitionRecord(mode="SALIENT_OBJECT", relocations=relocations))
     delta_json = json.dumps({"moves": steps, "removed": [], "added": [], "states": []})
     return replace(case, change=HouseChange(record, delta_json, moves.get(target_id, case.target.position_m)))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from made_up_run import NEW_TABLE_M, OLD_TABLE_M, box, floor_plan, stage_record
 
-from evonav.evaluation.records.changes import DuringRecord, Relocation, TransitionRecord
+from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.replay.pages import write_episode
@@ -23,7 +23,7 @@ MOVES = (
 
 
 def changed(at_round: int | None, *skipped_ids: str) -> StageRecord:
-    during = DuringRecord(
+    during = ChangeDuringStage(
         round=2, change=TransitionRecord(mode="FULL_SHUFFLE", room_id="room|1", relocations=MOVES), at_round=at_round
     )
     if at_round is not None:

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
+from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
 from evonav.evaluation.records.floor_plans import FloorPlan, floor_plan_of, image_uri
 from evonav.evaluation.records.oracle import during_record, target_record, transition_record
 from evonav.evaluation.records.schema import EndState, GoalRecord, StageRecord, TargetRecord
@@ -37,7 +37,7 @@ class GuidedWalk:
 class HouseChange:
     """A change of the house during a stage, as the evaluator knows it."""
 
-    record: DuringRecord
+    record: ChangeDuringStage
     """The change as a record has it before it takes place."""
     delta_json: str
     """The change as `House.apply` takes it."""

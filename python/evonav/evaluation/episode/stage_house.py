@@ -8,7 +8,7 @@ from evonav.errors import SimulationError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.changes import DuringRecord
+from evonav.evaluation.records.changes import ChangeDuringStage
 from evonav.records import Point2, Point3
 from evonav.world.change_around import change_around
 from evonav.world.pose import Pose
@@ -29,7 +29,7 @@ class StageHouse:
         self.target_m: Point3 = self._stage.target.position_m
         """The target's present position."""
         self._target_room_id = self._stage.target.room_id
-        self.during: DuringRecord | None = None if self._stage.change is None else self._stage.change.record
+        self.during: ChangeDuringStage | None = None if self._stage.change is None else self._stage.change.record
         """The record of the change during the stage, so far."""
 
     def load(self, requested: Pose) -> Pose:
@@ -65,7 +65,7 @@ class StageHouse:
         """Return whether the house changes before the views of a round of the agent, from 0."""
         return self.during is not None and number == self._protocol.step_of_round(self.during.round, sensors)
 
-    def change(self, number: int, path_before_m: float) -> DuringRecord:
+    def change(self, number: int, path_before_m: float) -> ChangeDuringStage:
         """Change the house around the agent, which keeps its pose.
 
         Args:

@@ -44,7 +44,7 @@ DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
 """Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
 
 
-class DuringRecord(WholeRecord):
+class ChangeDuringStage(WholeRecord):
     """The change of the house during the stage (docs/extensions.md). Oracle."""
 
     round: Whole

@@ -1,6 +1,6 @@
 """Convert a task's oracle data to the parts of records that describe target and hidden change."""
 
-from evonav.evaluation.records.changes import DuringRecord, Relocation, TransitionRecord
+from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
 from evonav.evaluation.records.schema import TargetRecord
 from evonav.tasks import Task
 from evonav.tasks.oracle import Evolution, OracleStage
@@ -33,11 +33,11 @@ def target_record(task: Task, stage: int) -> TargetRecord:
     )
 
 
-def during_record(oracle: OracleStage) -> DuringRecord | None:
+def during_record(oracle: OracleStage) -> ChangeDuringStage | None:
     """Return the change during a stage as its record has it before the stage; `None` without one."""
     if oracle.during is None:
         return None
-    return DuringRecord(round=oracle.during.round, change=transition_record(oracle.during.evolution))
+    return ChangeDuringStage(round=oracle.during.round, change=transition_record(oracle.during.evolution))
 
 
 def transition_record(evolution: Evolution) -> TransitionRecord:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Whole, WholeRecord
-from evonav.evaluation.records.changes import DuringRecord, TransitionRecord
+from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
 from evonav.records import Point2, Point3, Real
 
 SCHEMA_VERSION = 1
@@ -254,7 +254,7 @@ class StageRecord(WholeRecord):
     goal: GoalRecord
     target: TargetRecord
     transition: TransitionRecord
-    during: DuringRecord | None = None
+    during: ChangeDuringStage | None = None
     """`None`, and left out of the JSON, for a task without a change during the stage."""
 
     requested_start: PoseRecord | None = None
@@ -321,7 +321,7 @@ class StageRecord(WholeRecord):
 
     @property
     def during_stratum(self) -> str | None:
-        """`DuringRecord.stratum`; `None` without a change during the stage in the task."""
+        """`ChangeDuringStage.stratum`; `None` without a change during the stage in the task."""
         return None if self.during is None else self.during.stratum
 
     @property
