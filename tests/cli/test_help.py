@@ -145,7 +145,7 @@ def test_the_help_of_evaluate_fits_on_two_screens():
 def test_options_that_mean_the_same_are_declared_once():
     """One help and one default for an option, but where it says what this very command works on."""
     own = {"out", "seed", "houses", "agent", "task", "tasks", "exchanges", "perceptions", "measure", "latex", "split"}
-    own |= {"agent_timeout", "config", "perception"}
+    own |= {"config", "every", "perception"}
     texts = {}
     for name in set(COMMANDS) - {"sweep", "paper"}:  # whose options change a file, and name the paper's tables
         for param in COMMANDS[name].params:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.sweeps.plots import sweep_plots
+from evonav.sweeps.report import sweep_plots
 from evonav.sweeps.summary import SweepRow
 
 SWEEP = """

@@ -11,23 +11,19 @@ from evonav.cli.bench.app import bench_app
 from evonav.cli.doctor import doctor
 from evonav.cli.examples import add_examples
 from evonav.cli.group import HELP_NAMES, Group, add_commands
-from evonav.cli.results.breakdown import breakdown
-from evonav.cli.results.compare import compare
-from evonav.cli.results.export import export
 from evonav.cli.results.leaderboard import leaderboard
 from evonav.cli.results.paper import paper
 from evonav.cli.results.perception import perception
 from evonav.cli.results.report import report
 from evonav.cli.results.submission import pack, verify
+from evonav.cli.results.tables import breakdown, compare, export
 from evonav.cli.results.video import video
 from evonav.cli.results.view import view
-from evonav.cli.run.agents import agents
-from evonav.cli.run.check_agent import check_agent
+from evonav.cli.run.agents import agents, check_agent, new_agent
 from evonav.cli.run.controlled import controlled_app
 from evonav.cli.run.demo import demo
 from evonav.cli.run.evaluate import evaluate
 from evonav.cli.run.failures import failures
-from evonav.cli.run.new_agent import new_agent
 from evonav.cli.run.sweep import sweep
 from evonav.cli.tasks.app import tasks_app
 from evonav.cli.tasks.houses import houses_app

@@ -14,13 +14,7 @@ class Command(TyperCommand):
 
     def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - click's
         """Return the parameters; the help shows no type of flags and arguments, whose names say it."""
-        params: list[Any] = super().get_params(ctx)
-        for param in params:
-            if getattr(param, "is_flag", False):
-                param.metavar = ""
-            elif param.param_type_name == "argument":
-                param.display_type_rich = _no_type
-        return params
+        return _without_types(super().get_params(ctx))
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - click's
         """Run the command; an invalid setting is wrong usage."""
@@ -36,6 +30,15 @@ class Command(TyperCommand):
             raise usage from None
 
 
+def _without_types(params: list[Any]) -> list[Any]:
+    for param in params:
+        if getattr(param, "is_flag", False):
+            param.metavar = ""
+        elif param.param_type_name == "argument":
+            param.display_type_rich = _no_type
+    return params
+
+
 def _no_type(ctx: Any) -> None:  # noqa: ANN401 - click's
     """Stand for the type of an argument."""
 
@@ -45,6 +48,10 @@ class Group(TyperGroup):
 
     order: tuple[str, ...] = ()
     """Names of commands in the order of the help; default: as they were added."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - click's
+        """Return the parameters; the help shows no type of flags."""
+        return _without_types(super().get_params(ctx))
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401 - click's
         """Return the names of the commands in the order of the help."""

@@ -27,8 +27,8 @@ from evonav.evaluation.run.run import Evaluation, Progress, RunConfig
 from evonav.evaluation.run.run_settings import DecisionResources
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
+from evonav.sweeps import RUNS_NAME, SWEEP_NAME
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
-from evonav.sweeps.layout import RUNS_NAME, SWEEP_NAME
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
 

@@ -14,7 +14,7 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.summary import SUMMARY_NAME, write_summary
 from evonav.statistics import Interval
-from evonav.sweeps.layout import RUNS_NAME
+from evonav.sweeps import RUNS_NAME
 from evonav.sweeps.run import read_claim
 
 AXES = ("simulator", "perception", "decision", "tasks", "seed")

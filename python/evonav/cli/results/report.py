@@ -49,7 +49,7 @@ def report(
     A sweep gets a page for each run and one for all. With --text, no page is written, and metrics that explain
     rates are printed: other definitions of success, stale entries, memory, costs.
     """
-    from evonav.sweeps.layout import SWEEP_NAME
+    from evonav.sweeps import SWEEP_NAME
 
     if not text and agent is not None:
         raise typer.BadParameter("--agent is for --text; the page shows all agents")
@@ -90,8 +90,8 @@ def _report_sweep(
     """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
     from evonav.report import load_run
-    from evonav.sweeps.layout import RUNS_NAME
-    from evonav.sweeps.page import write_sweep_page
+    from evonav.sweeps import RUNS_NAME
+    from evonav.sweeps.report import write_sweep_page
     from evonav.sweeps.summary import sweep_title
 
     rows = write_sweep_summary(sweep)

@@ -116,8 +116,8 @@ def write_sweep_summary(out: Path) -> "list[SweepRow]":
     Raises:
         StoreError: There is no sweep, or it cannot be read or written.
     """
+    from evonav.sweeps.report import write_sweep_files
     from evonav.sweeps.summary import sweep_json, sweep_rows
-    from evonav.sweeps.tables import write_sweep_files
 
     rows = sweep_rows(out)
     write_sweep_files(out, rows, sweep_json(out, rows))
@@ -131,7 +131,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
         True if a stage of the selected cells is missing.
     """
     from evonav.cli.options.decisions import print_spending
-    from evonav.sweeps.tables import sweep_tables
+    from evonav.sweeps.report import sweep_tables
 
     rows = write_sweep_summary(out)
     show_tables(sweep_tables(rows))
