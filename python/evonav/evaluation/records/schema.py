@@ -255,7 +255,7 @@ class StageRecord(WholeRecord):
     target: TargetRecord
     transition: TransitionRecord
     during: ChangeDuringStage | None = None
-    """`None`, and left out of the JSON, for a task without a change during the stage."""
+    """`None` for a task without a change during the stage."""
 
     requested_start: PoseRecord | None = None
     """The pose carried over (stage 1: the manifest's)."""
@@ -295,7 +295,7 @@ class StageRecord(WholeRecord):
     num_forgotten: Whole | None = None
     """Objects that an entry stood for at the start and none at the end, though they stand where they stood."""
     belief_at_start: BeliefRecord | None = None
-    """`None`, and left out of the JSON, for an agent that tells no probabilities."""
+    """`None` for an agent that tells no probabilities."""
     stale_entries: tuple[StaleEntryRecord, ...] = ()
     moved_objects: tuple[MovedObjectRecord, ...] = ()
 
