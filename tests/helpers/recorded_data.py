@@ -1,4 +1,4 @@
-"""Find the data sets that are not in the repository; CONTRIBUTING.md lists them and where they come from."""
+"""Find the data sets that are not in the repository; docs/data-sets.md lists them and where they come from."""
 
 import os
 from pathlib import Path
@@ -20,7 +20,7 @@ DATA_SETS = {
     "roseh-procthor-100k-history",
     "zhiyuan-gao-procthor-houses",
 }
-"""Folders that CONTRIBUTING.md describes."""
+"""Folders that docs/data-sets.md describes."""
 BESIDE_THE_CHECKOUT = Path(__file__).parents[3] / "shared" / "data"
 
 
@@ -44,7 +44,7 @@ def data_path(name: str) -> Path:
     Args:
         name: Relative to the folder of data sets.
     """
-    assert Path(name).parts[0] in DATA_SETS, f"{name} is in no data set that CONTRIBUTING.md describes"
+    assert Path(name).parts[0] in DATA_SETS, f"{name} is in no data set that docs/data-sets.md describes"
     return data_folder() / name
 
 
@@ -53,7 +53,7 @@ def why_skipped(*names: str) -> str | None:
     missing = [name for name in names if not data_path(name).exists()]
     if not missing:
         return None
-    return f"{', '.join(missing)} not found: set {VARIABLE} to a folder that has it (CONTRIBUTING.md, Data sets)"
+    return f"{', '.join(missing)} not found: set {VARIABLE} to a folder that has it (docs/data-sets.md, Data sets)"
 
 
 def needs_data(*names: str) -> pytest.MarkDecorator:

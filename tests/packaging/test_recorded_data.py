@@ -34,7 +34,7 @@ def test_a_variable_that_names_no_folder_is_an_error(tmp_path: Path, monkeypatch
 
 
 def test_every_data_set_is_documented() -> None:
-    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/data-sets.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)) == recorded_data.DATA_SETS
     with pytest.raises(AssertionError, match="no-such-set"):
         data_path("no-such-set/houses.json")

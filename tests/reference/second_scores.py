@@ -1,6 +1,6 @@
 """A second implementation of the benchmark's scores, from the raw records alone.
 
-Written from the paper's formulas (Sec. C.2) and docs/measures.md, with sqlite3, json and math; it imports nothing of
+Written from the paper's formulas (Sec. C.2) and docs/metrics.md, with sqlite3, json and math; it imports nothing of
 evonav and shares no code with it. It believes no score that a record holds: success, SPL and SoftSPL follow from poses,
 paths and the reference length.
 """
@@ -58,7 +58,7 @@ def is_the_target(record, entry):
 
 
 def cause(record, radius_m):
-    """The taxonomy of docs/measures.md; `None` for a success."""
+    """The taxonomy of docs/metrics.md; `None` for a success."""
     if record["state"] == "not_run":
         return "not_run"
     if record["state"] == "errored":

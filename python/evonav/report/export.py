@@ -143,7 +143,7 @@ def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path
             pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": description})
             for name, description in columns.items()
         ],
-        metadata={"evonav": "one row a stage or round; docs/measures.md"},
+        metadata={"evonav": "one row a stage or round; docs/metrics.md"},
     )
     with parquet.ParquetWriter(path, schema) as writer:
         left = iter(rows)

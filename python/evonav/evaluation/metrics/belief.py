@@ -1,4 +1,4 @@
-"""Score the probabilities that agents stated as stages began (defined in docs/measures.md)."""
+"""Score the probabilities that agents stated as stages began (defined in docs/metrics.md)."""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,6 @@
 """Find the cause of a failed stage: the first cause that fits, judged from its record alone.
 
-Definitions, in the order in which they are tried, are in docs/measures.md.
+Definitions, in the order in which they are tried, are in docs/metrics.md.
 """
 
 import math

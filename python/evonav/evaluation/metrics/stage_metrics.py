@@ -1,4 +1,4 @@
-"""Compute the metrics of a stage from its record (defined in docs/measures.md): a flat row."""
+"""Compute the metrics of a stage from its record (defined in docs/metrics.md): a flat row."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Build the tables of metrics that explain the rates (docs/measures.md)."""
+"""Build the tables of metrics that explain the rates (docs/metrics.md)."""
 
 from collections.abc import Sequence
 from functools import partial

@@ -2,7 +2,7 @@
 
 use crate::{Error, geometry::Pose, simulator::EmbeddedSimulator};
 
-/// Number of steps per degree to which angles of poses are rounded (docs/world.md, "Angles").
+/// Number of steps per degree to which angles of poses are rounded (docs/simulator.md, "Angles").
 const PARTS_PER_DEG: f64 = 1e4;
 
 /// A discrete action.

@@ -93,7 +93,7 @@ struct Lone {
 }
 
 impl Lone {
-    /// By the words of docs/world.md: angles are whole multiples of 1e-4 degrees.
+    /// By the words of docs/simulator.md: angles are whole multiples of 1e-4 degrees.
     fn turned(&self, by_rad: f64) -> f64 {
         let turned_deg = (self.pose.yaw_rad + by_rad).to_degrees();
         let in_turn_deg = turned_deg - 360.0 * (turned_deg / 360.0).floor();
