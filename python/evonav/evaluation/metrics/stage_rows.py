@@ -1,4 +1,4 @@
-"""Read one flat row per stage of a run, the source of all tables, exports and comparisons, by docs/measures.md.
+"""Read one flat row per stage of a run, the source of all tables, exports and comparisons, by docs/metrics.md.
 
 The store holds the metrics of each record beside it, so no trace is parsed.
 """
