@@ -85,7 +85,7 @@ def test_variants_and_ablations_are_a_plug_in(tmp_path_factory, tmp_path):
     code = """
 from importlib.metadata import entry_points
 from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
-found = [one.name for one in entry_points(group="evonav.agents") if one.value.startswith("evonav_studies")]
+found = [one.name for one in entry_points(group="evonav.agents") if one.dist.name == "evonav-studies"]
 assert not set(found) & set(BUILT_IN)
 print(*(f"{name}={type(new_agent(agent_factory(name))).__name__}" for name in found))
 """
@@ -96,7 +96,7 @@ print(*(f"{name}={type(new_agent(agent_factory(name))).__name__}" for name in fo
     assert agents["3d-mem+"] == "ThreeDMemPlus"
     assert agents["pro-without-rooms"] == "Proactive"
     listed = evonav("agents", PYTHONPATH=str(site)).stdout
-    assert "plug-in: evonav_studies.variants:FailThenUpdateRelook" in listed
+    assert "plug-in: evonav_studies.relook:FailThenUpdateRelook" in listed
     options = ("--limit", 1, "--workers", 1, "--out", tmp_path)
     done = evonav("evaluate", "--agent", "ftu-early-stop", *options, PYTHONPATH=str(site))
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,8 +1,6 @@
 """Agents that differ from evonav's own in one option."""
 
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
-from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.frontier_update.relook import RelookConfig
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig, navigator_config
 from evonav.agents.navigator import NavigatorConfig
 from evonav.agents.proactive.agent import Proactive
@@ -11,30 +9,6 @@ from evonav.agents.three_d_mem.agent import ThreeDMem, ThreeDMemConfig
 from evonav.agents.unigoal.agent import UniGoal, UniGoalConfig
 from evonav.agents.unigoal.graphs import GraphConfig
 from evonav.decision.question import DecisionModel
-
-EARLY_STOP_M = 1.8
-"""Distance of `ftu-early-stop`: a little less than the success radius of 2.0 m, since boxes of parts are off-centre."""
-
-
-class FailThenUpdateRelook(FailThenUpdate):
-    """Fail-then-Update that looks once more, from another side, where its look on arrival does not tell."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(relook=RelookConfig()), decision)
-
-
-class FailThenUpdateIdentity(FailThenUpdate):
-    """Fail-then-Update that does not stop at an object that contradicts the goal."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(checks_identity=True), decision)
-
-
-class FailThenUpdateEarlyStop(FailThenUpdate):
-    """Fail-then-Update that stops as soon as it is near enough to an object that it sees."""
-
-    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        super().__init__(config or FailThenUpdateConfig(stop_within_m=EARLY_STOP_M), decision)
 
 
 class ThreeDMemPlus(ThreeDMem):

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from evonav.agents.agent import AgentAction, EntryBelief
 from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
-from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdateConfig
+from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
 from evonav.agents.grid import NO_GROUP, CoarseFrame, owners_of
 from evonav.agents.navigator import NavigatorConfig, Target
 from evonav.decision.candidates import ObjectCandidate
@@ -36,20 +37,21 @@ class EvolvingConfig(FailThenUpdateConfig):
     """Constants of the filter and of the search."""
 
     navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS))
-    checks_identity: bool = True
     belief: BeliefConfig = field(default_factory=BeliefConfig)
     inspect_m: float = 1.0
     """Cost of a look, as a way (lambda); ours."""
+    reserve_rounds: int = RESERVE_ROUNDS
+    """Number of remaining rounds from which identity is no longer checked."""
     num_sites: int = 8
     """Largest number of sites that are compared by their ways; ours."""
 
 
-class Evolving(FailThenUpdate):
+class Evolving(FailThenUpdateIdentity):
     """Keeps the belief over sites in each stage, and stops only at a verified match."""
 
     def __init__(self, config: EvolvingConfig | None = None, decision: DecisionModel | None = None) -> None:
         self._own = config or EvolvingConfig()
-        super().__init__(self._own, decision)
+        super().__init__(self._own, decision, reserve_rounds=self._own.reserve_rounds)
         self._matcher = self._queries.model.matcher or Matcher()
         self._belief = Belief({}, 1.0)
 

@@ -5,15 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evonav_studies.variants import EARLY_STOP_M, FailThenUpdateEarlyStop, FailThenUpdateIdentity
+from evonav_studies.early_stop import EARLY_STOP_M, FailThenUpdateEarlyStop
 from scripted_model import Scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.frontier_update.fail_then_update import (
-    FailThenUpdate,
-    FailThenUpdateConfig,
-)
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
+from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
 from evonav.agents.frontier_update.questions import IdentityQuestion
 from evonav.decision.appearance.matcher import AppearanceMatcher
 from evonav.decision.candidates import Appearance, ObjectCandidate
@@ -39,7 +37,7 @@ def test_an_object_that_contradicts_the_goal_is_set_aside_and_stays_in_memory():
     assert set(aside[1]) & remembered
     assert by_stage[1][-1].counters["rejected_entries"] == 0
     gone = {1: set(), 2: set()}
-    offered_again, reserve = set(), FailThenUpdateConfig().reserve_rounds
+    offered_again, reserve = set(), RESERVE_ROUNDS
     for question in model.questions:
         stage = question.goal.stage
         if question.kind == "identity":

@@ -5,15 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evonav_studies.variants import FailThenUpdateRelook
+from evonav_studies.relook import FailThenUpdateRelook, RelookConfig, place_from_another_side
 from hypothesis import given
 from hypothesis import strategies as st
 from scripted_model import Scripted
 from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.frontier_update.relook import RelookConfig, place_from_another_side
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import places_around
 from evonav.evaluation.protocol import ProtocolConfig
@@ -227,7 +226,7 @@ def test_an_entry_may_be_looked_at_again_in_the_next_stage():
 
 @pytest.mark.parametrize("config", [RelookConfig(max_way_m=0.3), RelookConfig(min_turn_deg=180.0)])
 def test_without_a_place_from_which_to_look_the_first_look_counts(config):
-    agent = FailThenUpdate(FailThenUpdateConfig(relook=config))
+    agent = FailThenUpdateRelook(relook=config)
     poses = hide_arrivals(agent, 3, 9)
     last = run(agent, *moved_table_stages())[2]
     assert len(poses) == 1
@@ -251,7 +250,7 @@ def test_the_question_is_asked_once_and_shows_both_looks():
         lambda question: "yes" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0",
         needs_images=True,
     )
-    agent = FailThenUpdate(FailThenUpdateConfig(relook=RelookConfig()), model)
+    agent = FailThenUpdateRelook(decision=model)
     hide_arrivals(agent, 1, 1)
     (record,) = run(agent, stage_case(1, "Mug|1"))
     (verified,) = (question for question in model.questions if question.kind == "verify")
