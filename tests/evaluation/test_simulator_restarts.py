@@ -1,7 +1,5 @@
 """A simulator's process that is lost costs time, not results."""
 
-import sqlite3
-
 import pytest
 from test_engine import CONFIG, records, texts
 from toy_house import write_tasks
@@ -79,14 +77,6 @@ def test_stages_forgotten_are_forgotten_with_their_restarts(tasks, tmp_path):
         assert len(store.failures()) == 1
         store.forget_episode(AGENT, tasks[0].task_id, 2)
         assert store.failures() == []
-
-
-def test_runs_from_before_failures_were_kept_are_read(tasks, tmp_path):
-    evaluate([AGENT], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
-    with sqlite3.connect(tmp_path / "run" / "records.sqlite") as database:
-        database.execute("DROP TABLE failures")
-    database.close()
-    assert load_run(tmp_path / "run").failures == ()
 
 
 def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):
