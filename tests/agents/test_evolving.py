@@ -9,14 +9,14 @@ from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.evolving.agent import Evolving, EvolvingConfig, hidden_behind
-from evonav.agents.evolving.belief import MIN_WEIGHT, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
+from evonav.agents.evolving.belief import MIN_WEIGHT, BeliefConfig, Coverage, SeenSite, belief_of, best_of, p_present
 from evonav.agents.grid import CoarseFrame
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.memory import OccupancyMap
 from evonav.sensors.observation import MapFrame, VisibleOccupancy
 
 CONFIG = BeliefConfig()
-SEEN = {1: Seen(ratio=9.0, num_stages=1)}
+SEEN = {1: SeenSite(ratio=9.0, num_stages=1)}
 PLACES = {2: 3.0, 3: 1.0}
 
 
@@ -25,17 +25,17 @@ def belief(coverage=None, seen=SEEN, places=PLACES, unknown_share=0.5):
 
 
 def test_the_place_where_it_was_last_seen_keeps_most_and_loses_some_with_each_stage():
-    new, old, older = (belief(seen={1: Seen(9.0, stages)}).sites[1] for stages in (0, 1, 3))
+    new, old, older = (belief(seen={1: SeenSite(9.0, stages)}).sites[1] for stages in (0, 1, 3))
     assert new == pytest.approx(0.9)
     assert old == pytest.approx(0.9 * 0.8)
     assert older == pytest.approx(0.9 * 0.8**3)
 
 
 def test_of_two_namesakes_the_one_that_fits_the_description_has_the_belief():
-    found = belief(seen={1: Seen(5.0, 0), 4: Seen(0.05, 0)})
+    found = belief(seen={1: SeenSite(5.0, 0), 4: SeenSite(0.05, 0)})
     assert found.sites[1] / found.sites[4] == pytest.approx(100.0)
     assert found.sites[1] == pytest.approx(5.0 / 6.05)  # 1 is the share of one that was never seen
-    alike = belief(seen={1: Seen(5.0, 0), 4: Seen(5.0, 0)})
+    alike = belief(seen={1: SeenSite(5.0, 0), 4: SeenSite(5.0, 0)})
     assert alike.sites[1] == alike.sites[4] == pytest.approx(5.0 / 11.0)
 
 
@@ -114,7 +114,7 @@ def test_the_belief_is_a_distribution(ratios, places, unknown_share, looks):
     coverage = Coverage(CONFIG)
     for site, share in looks:
         coverage.look(site, share)
-    seen = {site: Seen(*one) for site, one in enumerate(ratios)}
+    seen = {site: SeenSite(*one) for site, one in enumerate(ratios)}
     found = belief_of(seen, dict(enumerate(places, len(ratios))), unknown_share, coverage, CONFIG)
     assert all(p >= 0.0 for p in found.sites.values())
     assert sum(found.sites.values()) + found.unknown == pytest.approx(1.0)

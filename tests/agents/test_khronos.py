@@ -8,7 +8,7 @@ from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.khronos.agent import KhronosFrontierUpdate
-from evonav.agents.khronos.votes import Change, RayVotes, VotesConfig, change_of, rays_of
+from evonav.agents.khronos.votes import KhronosVotes, PresenceChange, VotesConfig, change_of, rays_of
 from evonav.memory import ObjectMap
 
 CONFIG = VotesConfig()
@@ -18,7 +18,7 @@ class Watched:
     """A map with votes, a view a round."""
 
     def __init__(self, *views):
-        self.map, self.votes = ObjectMap(), RayVotes()
+        self.map, self.votes = ObjectMap(), KhronosVotes()
         for view in views:
             self.see(view)
 
@@ -61,11 +61,13 @@ def test_rays_of_the_rounds_in_which_it_is_detected_do_not_count():
 
 def test_the_first_window_with_most_votes_for_absence_is_the_change():
     bins = {3: (90, 10), 4: (80, 20), 9: (10, 90), 10: (0, 100)}
-    assert change_of(bins, CONFIG, forward=True) == Change(absent=9, present=4)
-    assert change_of(bins, CONFIG, forward=False) == Change(absent=10, present=None)
+    assert change_of(bins, CONFIG, forward=True) == PresenceChange(absent=9, present=4)
+    assert change_of(bins, CONFIG, forward=False) == PresenceChange(absent=10, present=None)
     one_bad_look = {3: (10, 40), 4: (90, 0), 5: (90, 0)}
-    assert change_of(one_bad_look, CONFIG, forward=True) == Change(None, 5)  # the window of five rounds outvotes it
-    assert change_of({}, CONFIG, forward=True) == Change()
+    assert change_of(one_bad_look, CONFIG, forward=True) == PresenceChange(
+        None, 5
+    )  # the window of five rounds outvotes it
+    assert change_of({}, CONFIG, forward=True) == PresenceChange()
 
 
 @given(
@@ -85,7 +87,7 @@ def test_a_change_is_that_of_the_definition(bins, window, forward):
     first = next((index for index, one in enumerate(order) if is_absent[one]), None)
     proofs = [one for one in order[:first] if is_present[one]]
     found = change_of(bins, config, forward=forward)
-    assert found == Change(None if first is None else order[first], proofs[-1] if proofs else None)
+    assert found == PresenceChange(None if first is None else order[first], proofs[-1] if proofs else None)
 
 
 def test_a_thinned_view_has_the_same_rays():

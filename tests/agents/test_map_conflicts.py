@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -57,6 +57,6 @@ def test_conflicts_are_cells_that_contradict_the_map(config, contradicting, is_r
 def test_a_commitment_ends_with_the_map_that_it_was_made_on(is_contradicted):
     navigator = Navigator(MapFrame(40, 40, 0.1, (0.0, 0.0)), NavigatorConfig())
     navigator.observe(saw(view_of(BLOCK)))
-    navigator.target = Target(1, (2.0, 2.0), (2.5, 2.5))
+    navigator.target = NavigationTarget(1, (2.0, 2.0), (2.5, 2.5))
     navigator.observe(saw(view_of(blocked=BLOCK[:1]) if is_contradicted else view_of(BLOCK[:1])))
     assert (navigator.target is None) == is_contradicted

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
-from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
+from evonav.agents.unigoal.object_graph import NodeGroup, SceneEdge, SceneNode, Verdict
 from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
@@ -39,7 +39,7 @@ def node(node_id, caption, x=0.0, z=0.0, y=0.4, size=(0.6, 0.8, 0.6)):
 CHAIR, TABLE, BED = node(1, "chair"), node(2, "table", 1.0, size=(1.2, 0.8, 0.8)), node(3, "bed", 5.0)
 VASE = node(4, "plant", 1.0, y=0.95, size=(0.2, 0.3, 0.2))
 PAIRS = ((CHAIR, TABLE), (CHAIR, BED), (VASE, TABLE), (TABLE, VASE))
-GROUP = Group((CHAIR, TABLE))
+GROUP = NodeGroup((CHAIR, TABLE))
 ANCHORS = {"chair": CHAIR, "bed": BED}
 
 ASKED = {
@@ -113,7 +113,7 @@ def test_scene_relations_are_judged_by_boxes():
 def test_rooms_and_groups_are_judged_by_words():
     assert answer("room") == "bedroom"
     with_goal = answer("score")
-    without = TextMatch().answer(GroupScoreQuestion(GOAL, GRAPH, Group((VASE,)), (), (VASE,))).answer
+    without = TextMatch().answer(GroupScoreQuestion(GOAL, GRAPH, NodeGroup((VASE,)), (), (VASE,))).answer
     assert 0.0 <= without < with_goal <= 1.0
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import evonav
 from evonav import Action, Agent, Move, Stop
-from evonav.agents.random_walk import RandomWalk
+from evonav.agents.baselines import RandomWalk
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 
 
@@ -34,12 +34,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> evonav.Run:
 
 
 def test_agents_are_recorded_by_the_name_of_their_class(run: evonav.Run) -> None:
-    assert run.agents == ("Local", "evonav.agents.random_walk:RandomWalk", "stay-still")
+    assert run.agents == ("Local", "evonav.agents.baselines:RandomWalk", "stay-still")
     assert len(run.stages["success"]) == 3 * 4
     assert max(value for name, value in zip(run.rounds["agent"], run.rounds["round"], strict=True) if name == "Local")
-    assert (
-        repr(run) == f"Run({str(run.path)!r}, agents=['Local', 'evonav.agents.random_walk:RandomWalk', 'stay-still'])"
-    )
+    assert repr(run) == f"Run({str(run.path)!r}, agents=['Local', 'evonav.agents.baselines:RandomWalk', 'stay-still'])"
 
 
 def test_a_local_class_needs_no_workers_and_lambdas_have_the_class_s_name() -> None:
@@ -82,14 +80,14 @@ def test_a_run_shows_tables_and_pages(run: evonav.Run, tmp_path: Path) -> None:
 
 def test_two_agents_are_compared_by_class_name(run: evonav.Run) -> None:
     found = run.compare("RandomWalk", "stay-still")
-    assert found.title == "evonav.agents.random_walk:RandomWalk minus stay-still, n = 4"
+    assert found.title == "evonav.agents.baselines:RandomWalk minus stay-still, n = 4"
     spl = dict(zip(found.columns, found.rows[1], strict=True))
-    less = float(spl["evonav.agents.random_walk:RandomWalk"]) - float(spl["stay-still"])
+    less = float(spl["evonav.agents.baselines:RandomWalk"]) - float(spl["stay-still"])
     assert float(spl["difference [95% CI]"].split(" ")[0]) == pytest.approx(less, abs=0.1)
     with pytest.raises(InvalidArgumentError, match="no agent 'Locale'; did you mean `Local`"):
         run.compare("Locale", "RandomWalk")
     with pytest.raises(InvalidArgumentError, match="compared with itself"):
-        run.compare("RandomWalk", "evonav.agents.random_walk:RandomWalk")
+        run.compare("RandomWalk", "evonav.agents.baselines:RandomWalk")
     with pytest.raises(InvalidArgumentError, match="the run has no task 'x'"):
         run.view(task="x")
 

@@ -9,7 +9,7 @@ from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.decision.appearance.matcher import AppearanceMatcher
 from evonav.decision.backends import appearance_match
-from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate
+from evonav.decision.candidates import FrontierCandidate, ObjectAppearance, ObjectCandidate
 from evonav.decision.metered import Metered
 from evonav.decision.rules import AppearanceMatch
 from evonav.decision.text.language import parse_goal
@@ -19,12 +19,12 @@ from evonav.tasks.language import COLOURS
 from evonav.tasks.public import Goal
 
 
-def appearance_of(colour: str = "grey", shown: tuple[int, ...] = (), known_share: float = 1.0) -> Appearance:
-    return Appearance(tuple(float(word == colour) for word in COLOURS), frozenset(shown), known_share)
+def appearance_of(colour: str = "grey", shown: tuple[int, ...] = (), known_share: float = 1.0) -> ObjectAppearance:
+    return ObjectAppearance(tuple(float(word == colour) for word in COLOURS), frozenset(shown), known_share)
 
 
 def mug(
-    entry_id: int, x_m: float, seen: Appearance | None, size_m: float = 0.1, num_detections: int = 5
+    entry_id: int, x_m: float, seen: ObjectAppearance | None, size_m: float = 0.1, num_detections: int = 5
 ) -> ObjectCandidate:
     return ObjectCandidate(entry_id, "Mug", (x_m, 0.85, 0.0), (size_m,) * 3, num_detections, appearance=seen)
 

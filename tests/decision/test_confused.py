@@ -15,7 +15,7 @@ from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.three_d_mem.questions import SnapshotCandidate, SnapshotChoice, SnapshotQuestion
 from evonav.component import Component
 from evonav.decision.backends import appearance_match, text_match
-from evonav.decision.candidates import Appearance, Choice, FrontierCandidate, ObjectCandidate
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectAppearance, ObjectCandidate
 from evonav.decision.noisy import NoiseRates, Noisy
 from evonav.decision.query import QuerySession
 from evonav.decision.rules import AppearanceMatch, TextMatch
@@ -79,7 +79,7 @@ def test_where_no_other_fits_at_all_each_is_as_likely() -> None:
 
 def test_rules_that_look_draw_by_their_posterior() -> None:
     def mug(entry_id: int, shown_ids: set[int]) -> ObjectCandidate:
-        seen = Appearance((1.0 / len(COLOURS),) * len(COLOURS), frozenset(shown_ids), 1.0)
+        seen = ObjectAppearance((1.0 / len(COLOURS),) * len(COLOURS), frozenset(shown_ids), 1.0)
         return replace(RIGHT, entry_id=entry_id, appearance=seen)
 
     question = choose([mug(1, {10, 11}), mug(2, {10}), mug(3, set())])

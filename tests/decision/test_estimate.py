@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from evonav.component import Component
+from evonav.decision.vlm.client import Pace
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.decision.vlm.mock_answers import mock_answer
-from evonav.decision.vlm.pacing import Pace
 from evonav.evaluation.cost_estimate import estimate_run, ratio_error
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend

@@ -15,7 +15,7 @@ from evonav.component import Component
 from evonav.decision.appearance.matcher import AppearanceMatcher
 from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
 from evonav.decision.backends import appearance_match, counting, custom, vlm
-from evonav.decision.candidates import Appearance, ObjectCandidate
+from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
 from evonav.decision.goal_input import GoalInput, PictureGoal, goal_as_given
 from evonav.decision.metered import Metered
 from evonav.decision.prompts import Picture, goal_prompt
@@ -73,7 +73,7 @@ def test_prompts_of_the_sentence_show_no_picture() -> None:
 
 
 def mug(entry_id: int, layout: Layout | None) -> ObjectCandidate:
-    seen = Appearance((1.0 / len(COLOURS),) * len(COLOURS), frozenset(), 1.0, layout)
+    seen = ObjectAppearance((1.0 / len(COLOURS),) * len(COLOURS), frozenset(), 1.0, layout)
     return ObjectCandidate(entry_id, "Mug", (float(entry_id), 0.8, 0.0), (0.1, 0.1, 0.1), 5, appearance=seen)
 
 

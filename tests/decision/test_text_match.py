@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evonav.agents.frontier_update.questions import ChooseQuestion, Sighting, VerifyQuestion
+from evonav.agents.frontier_update.questions import ChooseQuestion, ComparedDetection, VerifyQuestion
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.question import AnswerError, Question
 from evonav.decision.rules import TextMatch
@@ -101,11 +101,11 @@ SEEN_THROUGH = DepthEvidence(num_see_through=256)
 def test_verification_answers_yes_to_the_label_at_the_place():
     model = TextMatch()
     for sighting, is_present in (
-        (Sighting("Mug", 0.9, 0.6), True),
-        (Sighting("Mug", 0.0, 0.3), True),
-        (Sighting("Mug", 0.1, 0.8), False),
-        (Sighting("Mug", 0.0, float("inf")), False),
-        (Sighting("Bowl", 0.9, 0.0), False),
+        (ComparedDetection("Mug", 0.9, 0.6), True),
+        (ComparedDetection("Mug", 0.0, 0.3), True),
+        (ComparedDetection("Mug", 0.1, 0.8), False),
+        (ComparedDetection("Mug", 0.0, float("inf")), False),
+        (ComparedDetection("Bowl", 0.9, 0.0), False),
     ):
         assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], SEEN_THROUGH)).answer is is_present
 

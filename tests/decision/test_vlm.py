@@ -22,7 +22,7 @@ from evonav.decision.vlm.account import Account, Price, image_tokens, read_price
 from evonav.decision.vlm.client import Answer, VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
-from evonav.decision.vlm.response_cache import Failure, ResponseCache, key_of
+from evonav.decision.vlm.response_cache import ResponseCache, StoredFailure, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
@@ -293,7 +293,7 @@ def test_the_first_outcome_kept_is_everybodys(path: Path) -> None:
     """Two processes that asked the same: the second to come back takes over what the first has kept."""
     first, second = ResponseCache(path), ResponseCache(path)
     for number, (ours, theirs) in enumerate(
-        (({"a": 1}, {"a": 2}), (Failure("timeout", "late"), {"a": 3}), ({"a": 4}, Failure("server", "500")))
+        (({"a": 1}, {"a": 2}), (StoredFailure("timeout", "late"), {"a": 3}), ({"a": 4}, StoredFailure("server", "500")))
     ):
         request = {"number": number}
         assert first.keep_first(request, {}, ours) == ours

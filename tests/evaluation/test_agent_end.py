@@ -57,7 +57,7 @@ FORKING = """
 import os
 import time
 from pathlib import Path
-from evonav.agents.random_walk import RandomWalk
+from evonav.agents.baselines import RandomWalk
 
 if (child := os.fork()) == 0:
     time.sleep(600)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import doubting_agent
 
-from evonav.agents.nearest_frontier import NearestFrontier
+from evonav.agents.baselines import NearestFrontier
 from evonav.evaluation.contract.situations import check_situations, place_of
 from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks

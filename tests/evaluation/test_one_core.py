@@ -19,7 +19,7 @@ AGENT = """
 import json
 import os
 from pathlib import Path
-from evonav.agents.random_walk import RandomWalk
+from evonav.agents.baselines import RandomWalk
 
 class Confined(RandomWalk):
     def begin_task(self, task):

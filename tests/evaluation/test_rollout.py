@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 from toy_house import ToySimulator, episode_spec
 
-from evonav.agents.stay_still import StayStill
+from evonav.agents.baselines import StayStill
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord

@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 
+from evonav.agents.baselines import NearestFrontier
 from evonav.agents.frontier_update.agent import FrontierUpdate
-from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.outcome import as_errored

@@ -28,7 +28,7 @@ NEEDS_SANDBOX = pytest.mark.skipif(
 READING = """
 import os
 from pathlib import Path
-from evonav.agents.random_walk import RandomWalk
+from evonav.agents.baselines import RandomWalk
 
 class Reading(RandomWalk):
     def begin_task(self, task):

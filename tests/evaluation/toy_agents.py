@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from evonav.agents.agent import NavigateTo, SensorConfig, Stop
-from evonav.agents.nearest_frontier import NearestFrontier
+from evonav.agents.baselines import NearestFrontier
 
 
 class Explorer(NearestFrontier):

@@ -14,7 +14,7 @@ from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
 from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
 from evonav.agents.frontier_update.questions import IdentityQuestion
 from evonav.decision.appearance.matcher import AppearanceMatcher
-from evonav.decision.candidates import Appearance, ObjectCandidate
+from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
 from evonav.decision.text.matcher import Matcher
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.tasks.language import COLOURS
@@ -104,7 +104,7 @@ def test_rules_that_read_find_contradictions_in_what_is_around(sentence, answers
 def test_rules_that_look_find_contradictions_in_colours():
     def mug(entry_id, colour):
         shares = tuple(float(name == colour) for name in COLOURS)
-        looks = Appearance(shares, frozenset({entry_id}), 1.0)
+        looks = ObjectAppearance(shares, frozenset({entry_id}), 1.0)
         return candidate(entry_id, "Mug", float(entry_id), 0.5, size_m=(0.1, 0.1, 0.1), appearance=looks)
 
     mugs = (mug(1, "red"), mug(2, "blue"))

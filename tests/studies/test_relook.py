@@ -13,7 +13,7 @@ from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
 from evonav.agents.viewpoint import places_around
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
@@ -126,7 +126,7 @@ def test_the_second_place_is_the_nearest_of_those_that_show_most(monkeypatch):
 def test_the_second_place_is_kept_when_the_middle_of_the_entry_shifts():
     navigator, entry = knowing_a_mug()
     x_m, _, z_m = entry.centre_m
-    target = Target(entry.id, (1.0, 1.0), (x_m + 0.5, z_m), keeps_place=True)
+    target = NavigationTarget(entry.id, (1.0, 1.0), (x_m + 0.5, z_m), keeps_place=True)
     navigator.target = target
     navigator.aim()
     assert navigator.target == target

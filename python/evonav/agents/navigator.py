@@ -12,7 +12,7 @@ import numpy as np
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.candidates import Appearance, FrontierCandidate, ObjectCandidate
+from evonav.decision.candidates import FrontierCandidate, ObjectAppearance, ObjectCandidate
 from evonav.decision.pictures import Picture, crop_of, picture_of
 from evonav.decision.text.language import canonical
 from evonav.memory import ObjectMap, ObjectMapConfig, forgetting
@@ -25,7 +25,7 @@ from evonav.sensors.observation import MapFrame, Observation, View
 
 DAY_S = 86400.0
 KNOWN_RADIUS_M = 1.0
-"""Radius around an entry within which `Appearance.known_share` counts cells."""
+"""Radius around an entry within which `ObjectAppearance.known_share` counts cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class NavigatorConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class NavigationTarget:
     """An object entry that the agent is committed to."""
 
     entry_id: int
@@ -89,7 +89,7 @@ class Navigator:
         )
         self.observers: list[Callable[[ObjectMap, View, ObjectUpdate], None]] = []
         """Functions that are called after the object map has taken in a view, before anything is forgotten."""
-        self.target: Target | None = None
+        self.target: NavigationTarget | None = None
         self.round_views: list[StoredView] = []
         """Views of the last round, the heading view last."""
         self._detected_ids: list[int | None] = []
@@ -159,7 +159,7 @@ class Navigator:
         entry_id = self.views.resolve(target.entry_id)
         self.target = None if entry_id in removed else replace(target, entry_id=entry_id)
 
-    def reached(self, observation: Observation) -> Target | None:
+    def reached(self, observation: Observation) -> NavigationTarget | None:
         """Return the committed target if its place was reached, or cannot be approached any further."""
         is_done = observation.has_arrived or not observation.is_action_success
         return self.target if is_done else None
@@ -184,7 +184,7 @@ class Navigator:
         centre_m = (entry.centre_m[0], entry.centre_m[2])
         if math.dist(centre_m, target.centre_m) > self.config.aim_again_m:
             goal_m = self.observation_point(centre_m) or target.goal_m
-            self.target = Target(entry.id, goal_m, centre_m)
+            self.target = NavigationTarget(entry.id, goal_m, centre_m)
 
     def candidate(self, entry: ObjectEntry, *, with_looks: bool = True) -> ObjectCandidate:
         """Return an entry of the object memory as questions describe it, without images.
@@ -201,7 +201,7 @@ class Navigator:
         """Return entries as `candidate` describes each."""
         return [self.candidate(entry) for entry in entries] if self._names_colours else [*map(_candidate_of, entries)]
 
-    def _appearance(self, entry: ObjectEntry) -> Appearance | None:
+    def _appearance(self, entry: ObjectEntry) -> ObjectAppearance | None:
         """Return what the views of an entry show; `None` without any."""
         largest, latest = self.views.largest(entry.id), self.views.latest(entry.id)
         shares = [seen.colours for _, seen in largest if seen.colours is not None]
@@ -210,7 +210,7 @@ class Navigator:
         around = [seen.layout for _, seen in largest if seen.layout is not None]
         shown = (seen.entry_id for view in (*(view for view, _ in largest), latest) for seen in view.seen)
         layout = Layout(_mean([one.near for one in around]), _mean([one.whole for one in around])) if around else None
-        return Appearance(
+        return ObjectAppearance(
             colours=_mean(shares),
             shown_ids=frozenset(self.views.resolve(entry_id) for entry_id in shown if entry_id is not None),
             known_share=self.explorer.map.known_share((entry.centre_m[0], entry.centre_m[2]), KNOWN_RADIUS_M),

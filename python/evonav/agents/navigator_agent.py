@@ -8,7 +8,7 @@ from typing import Any
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConfig, Stop
 from evonav.agents.explanation import Explanation, entry_belief
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
 from evonav.decision.candidates import FrontierCandidate
 from evonav.decision.goal_input import goal_as_given
 from evonav.decision.pictures import Picture, picture_of
@@ -102,7 +102,7 @@ class NavigatorAgent(ABC):
         """Return all frontiers as questions describe them, with images if the model looks at them."""
         return self._navigator.frontier_candidates(here, with_images=self._shows_images)
 
-    def _approach(self, target: Target, reason: str = "") -> AgentAction:
+    def _approach(self, target: NavigationTarget, reason: str = "") -> AgentAction:
         """Commit to a target and continue towards it."""
         self._record_round(f"object {target.entry_id}", reason, target.entry_id)
         self._navigator.target = target

@@ -67,8 +67,8 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.unigoal.agent:UniGoal",
         "UniGoal as released: single actions, detector, nearest frontiers",
     ),
-    "stay-still": ("evonav.agents.stay_still:StayStill", "baseline: stops at once; its successes are free"),
-    "random-walk": ("evonav.agents.random_walk:RandomWalk", "baseline: walks in random directions"),
+    "stay-still": ("evonav.agents.baselines:StayStill", "baseline: stops at once; its successes are free"),
+    "random-walk": ("evonav.agents.baselines:RandomWalk", "baseline: walks in random directions"),
 }
 """Import path and description of each built-in agent, by name."""
 

@@ -9,7 +9,7 @@ from evonav.records import Point2, Point3
 
 
 @dataclass(frozen=True, slots=True)
-class Appearance:
+class ObjectAppearance:
     """The appearance of a remembered object in its three largest views and its latest one."""
 
     colours: tuple[float, ...]
@@ -35,7 +35,7 @@ class ObjectCandidate:
     """The object, cut out of its best view."""
     view: Picture | None = field(default=None, compare=False, repr=False)
     """The view in which the object was last seen."""
-    appearance: Appearance | None = field(default=None, compare=False, repr=False)
+    appearance: ObjectAppearance | None = field(default=None, compare=False, repr=False)
     """Its appearance, if the decision model asks for colours."""
 
     @property

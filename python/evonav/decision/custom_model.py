@@ -11,7 +11,7 @@ from evonav.component import import_callable
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.question import DecisionModel, Need
 from evonav.decision.vlm.account import Account
-from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.answer import ModelAnswer
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
@@ -90,11 +90,11 @@ class CustomClient(CachingClient):
             raise DecisionError(f"{self.name}: ask: expected a string, got {type(text).__name__}")
         return {"text": text}
 
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
         text = str(response["text"])
         if not text.strip():
             raise VlmError("empty", "an empty answer")
-        return Answer(text, self.name, Usage(), key, is_replayed)
+        return ModelAnswer(text, self.name, Usage(), key, is_replayed)
 
 
 def needs_of(model: object) -> frozenset[Need]:

@@ -3,7 +3,7 @@
 import math
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.navigator import Target
+from evonav.agents.navigator import NavigationTarget
 from evonav.decision.question import DecisionModel
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
@@ -30,7 +30,7 @@ class FailThenUpdateEarlyStop(FailThenUpdate):
         super().begin_task(task)
         self._counters.update(early_looks=0)
 
-    def _in_reach(self, observation: Observation) -> Target | None:
+    def _in_reach(self, observation: Observation) -> NavigationTarget | None:
         """Return the committed target if it is near and this round's views detect it."""
         target, here = self._navigator.target, (observation.pose.x_m, observation.pose.z_m)
         if target is None or math.dist(target.centre_m, here) >= self._stop_within_m:

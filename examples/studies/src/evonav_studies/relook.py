@@ -7,7 +7,7 @@ import numpy as np
 
 from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.navigator import Navigator, Target
+from evonav.agents.navigator import NavigationTarget, Navigator
 from evonav.agents.viewpoint import places_around
 from evonav.decision.pictures import Picture
 from evonav.decision.question import DecisionModel
@@ -154,4 +154,4 @@ class FailThenUpdateRelook(FailThenUpdate):
         self._details = {**self._details, "relooks": [look.entry_id for look in self._first_looks]}
         centre_m = (entry.centre_m[0], entry.centre_m[2])
         reason = f"a second look from {place.turn_deg:.0f} degrees around, {place.way_m:.1f} m away: {why}"
-        return self._approach(Target(entry.id, place.position_m, centre_m, keeps_place=True), reason)
+        return self._approach(NavigationTarget(entry.id, place.position_m, centre_m, keeps_place=True), reason)

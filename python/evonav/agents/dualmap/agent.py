@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from evonav.agents.agent import AgentAction, EntryBelief
-from evonav.agents.dualmap.anchors import AbstractMap, Anchor, AnchorConfig, Content
+from evonav.agents.dualmap.anchors import AbstractMap, AnchorConfig, Content, FurnitureAnchor
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.agents.navigator import Navigator, NavigatorConfig
@@ -51,7 +51,7 @@ class DualMap(FrontierUpdate):
 
     def _new_navigator(self) -> Navigator:
         self._abstract = AbstractMap(self._own.anchors)
-        self._places: dict[int, Anchor] = {}
+        self._places: dict[int, FurnitureAnchor] = {}
         """The anchor of each candidate that the last question offered for one."""
         return super()._new_navigator()
 
@@ -112,14 +112,14 @@ class DualMap(FrontierUpdate):
         remembered = [*local, *(anchor.candidate() for anchor in self._abstract.anchors.values())]
         return self._choose([candidate for _, candidate in ranked], remembered, observation)
 
-    def _best_of(self, anchor: Anchor) -> tuple[float, Content | None]:
+    def _best_of(self, anchor: FurnitureAnchor) -> tuple[float, Content | None]:
         """Return an anchor's score, and the content that has it; `None` if it has it itself."""
         own = self._related.of(anchor.label, anchor.feature)
         scores = [(self._related.of(one.label, one.feature), one) for one in anchor.contents]
         best = max(scores, key=lambda one: one[0], default=None)
         return best if best is not None and best[0] > own else (own, None)
 
-    def _open_anchors(self) -> list[Anchor]:
+    def _open_anchors(self) -> list[FurnitureAnchor]:
         """Return the anchors that may be gone to: after a failure those that are about as good as the first.
 
         If none of them is left, the others of the first anchor's label are.
@@ -151,7 +151,7 @@ class DualMap(FrontierUpdate):
         self._places = {}
         return self._go_to_object(self._navigator.candidate(found), (observation.pose.x_m, observation.pose.z_m))
 
-    def _accepted(self, anchor: Anchor) -> ObjectEntry | None:
+    def _accepted(self, anchor: FurnitureAnchor) -> ObjectEntry | None:
         """Return the best local object in an anchor's box; `None` if none is about as good as the anchor."""
         least = self._best_of(anchor)[0] - self._own.margin
         half_m = np.array(anchor.size_m) / 2 * (1.0 + self._own.box_growth)

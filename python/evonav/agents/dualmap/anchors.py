@@ -41,7 +41,7 @@ class Content:
 
 
 @dataclass(frozen=True, slots=True)
-class Anchor:
+class FurnitureAnchor:
     """A piece of furniture that stays in memory."""
 
     entry_id: int
@@ -67,7 +67,7 @@ class AbstractMap:
 
     def __init__(self, config: AnchorConfig | None = None) -> None:
         self.config = config or AnchorConfig()
-        self.anchors: dict[int, Anchor] = {}
+        self.anchors: dict[int, FurnitureAnchor] = {}
         """Anchors by id."""
 
     def add(self, entry: ObjectEntry, points_m: NDArray[np.float32]) -> None:
@@ -78,7 +78,7 @@ class AbstractMap:
         same = (one for one in self.anchors.values() if one.label == entry.label and self._overlaps(one, entry))
         known = next(same, None)
         plane_m = main_plane_m(points_m, self.config.plane_bin_m)
-        anchor = Anchor(entry.id, entry.label, entry.feature, entry.centre_m, entry.size_m, plane_m)
+        anchor = FurnitureAnchor(entry.id, entry.label, entry.feature, entry.centre_m, entry.size_m, plane_m)
         if known is not None:
             anchor = replace(anchor, entry_id=known.entry_id, contents=known.contents)
         self.anchors[anchor.entry_id] = anchor
@@ -90,7 +90,7 @@ class AbstractMap:
             self._put(anchor.entry_id, Content(entry.id, entry.label, entry.feature))
         return bool(below)
 
-    def lies_on(self, upper: ObjectEntry, lower: Anchor) -> bool:
+    def lies_on(self, upper: ObjectEntry, lower: FurnitureAnchor) -> bool:
         """Return whether an entry lies on an anchor, by their boxes and its main plane."""
         config, bottom_m = self.config, upper.centre_m[1] - upper.size_m[1] / 2
         is_level = bottom_m - config.below_m <= lower.plane_m <= bottom_m + config.above_m
@@ -102,7 +102,7 @@ class AbstractMap:
         others = tuple(one for one in anchor.contents if one.label != content.label)
         self.anchors[anchor_id] = replace(anchor, contents=(*others, content))
 
-    def _overlaps(self, anchor: Anchor, entry: ObjectEntry) -> bool:
+    def _overlaps(self, anchor: FurnitureAnchor, entry: ObjectEntry) -> bool:
         smaller_m2 = min(_footprint_m2(anchor), _footprint_m2(entry))
         return _shared_m2(anchor, entry) > self.config.min_overlap * smaller_m2
 
@@ -114,11 +114,11 @@ def main_plane_m(points_m: NDArray[np.float32], bin_m: float) -> float:
     return (float(levels[counts.argmax()]) + 0.5) * bin_m
 
 
-def _footprint_m2(one: ObjectEntry | Anchor) -> float:
+def _footprint_m2(one: ObjectEntry | FurnitureAnchor) -> float:
     return one.size_m[0] * one.size_m[2]
 
 
-def _shared_m2(one: ObjectEntry | Anchor, other: ObjectEntry | Anchor) -> float:
+def _shared_m2(one: ObjectEntry | FurnitureAnchor, other: ObjectEntry | FurnitureAnchor) -> float:
     """Return the area that two boxes share on the ground plane."""
     sides_m = []
     for axis in (0, 2):

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import AgentAction, EntryBelief
-from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, Seen, belief_of, best_of, p_present
+from evonav.agents.evolving.belief import Belief, BeliefConfig, Coverage, SeenSite, belief_of, best_of, p_present
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdateConfig
 from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
 from evonav.agents.grid import NO_GROUP, CoarseFrame, owners_of
-from evonav.agents.navigator import NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, NavigatorConfig
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.home_statistics import is_furniture, room_ratios
 from evonav.decision.question import DecisionModel
@@ -142,13 +142,13 @@ class Evolving(FailThenUpdateIdentity):
         target = targets[best]
         return self._approach(target, f"{belief.sites[target.entry_id]:.0%} likely here")
 
-    def _seen(self, remembered: list[ObjectCandidate], entries: Mapping[int, ObjectEntry]) -> dict[int, Seen]:
+    def _seen(self, remembered: list[ObjectCandidate], entries: Mapping[int, ObjectEntry]) -> dict[int, SeenSite]:
         """Return the sites where an object of the goal's name was seen."""
         named = [one for one in remembered if self._matcher.names_goal(self._parsed, one)]
         appearances = self._matcher.appearance_ratios(self._parsed, named)
         contexts = self._matcher.context_ratios(self._parsed, named, remembered)
         return {
-            one.entry_id: Seen(appearance * context, self._goal.stage - entries[one.entry_id].last_seen_stage)
+            one.entry_id: SeenSite(appearance * context, self._goal.stage - entries[one.entry_id].last_seen_stage)
             for one, appearance, context in zip(named, appearances, contexts, strict=True)
         }
 
@@ -162,9 +162,9 @@ class Evolving(FailThenUpdateIdentity):
                 found[one.entry_id] = ratios.get(room or "", 1.0) * one.size_m[0] * one.size_m[2]
         return found
 
-    def _target(self, entry: ObjectEntry) -> Target:
+    def _target(self, entry: ObjectEntry) -> NavigationTarget:
         centre_m = (entry.centre_m[0], entry.centre_m[2])
-        return Target(entry.id, self._navigator.observation_point(centre_m) or centre_m, centre_m)
+        return NavigationTarget(entry.id, self._navigator.observation_point(centre_m) or centre_m, centre_m)
 
     def _ways_m(self, here: Point2, places_m: list[Point2]) -> list[float]:
         if not places_m:

@@ -24,7 +24,7 @@ class BeliefConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenSite:
     """A place where an object of the goal's name was seen."""
 
     ratio: float
@@ -94,7 +94,7 @@ class Belief:
 
 
 def belief_of(
-    seen: Mapping[int, Seen],
+    seen: Mapping[int, SeenSite],
     places: Mapping[int, float],
     unknown_share: float,
     coverage: Coverage,

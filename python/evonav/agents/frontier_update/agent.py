@@ -9,7 +9,7 @@ from typing import Any, Literal
 from evonav.agents.agent import AgentAction
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
-from evonav.agents.navigator import NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.question import DecisionModel
@@ -87,7 +87,7 @@ class FrontierUpdate(NavigatorAgent):
     def _after_look(self, observation: Observation) -> None:
         """Revise further beliefs by a look that map and object entries have taken in; here there are none."""
 
-    def _in_reach(self, observation: Observation) -> Target | None:
+    def _in_reach(self, observation: Observation) -> NavigationTarget | None:
         """Return the committed target if the agent need not go any nearer, though it has not reached its place."""
         return None
 
@@ -182,7 +182,7 @@ class FrontierUpdate(NavigatorAgent):
             if frontier is not None:
                 return self._go_to_frontier(frontier, f"towards object {chosen.entry_id}, which the map does not reach")
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
-        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._queries.reason)
+        return self._approach(NavigationTarget(chosen.entry_id, goal_m, chosen.ground_m), self._queries.reason)
 
     def _round_counters(self) -> Mapping[str, int]:
         explorer = self._navigator.explorer

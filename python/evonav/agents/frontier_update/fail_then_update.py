@@ -7,7 +7,7 @@ from typing import Literal
 
 from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
+from evonav.agents.frontier_update.questions import ComparedDetection, VerifyQuestion
 from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
@@ -99,10 +99,10 @@ class FailThenUpdate(FrontierUpdate):
         found = [evidence for view in views for evidence in self._navigator.objects.depth_evidence([entry_id], view)]
         return max(found, key=lambda evidence: (evidence.num_not_hidden, evidence.num_in_view))
 
-    def _sightings(self, entry_id: int, view: View) -> list[Sighting]:
+    def _sightings(self, entry_id: int, view: View) -> list[ComparedDetection]:
         compared = self._navigator.objects.compare(entry_id, view)
         return [
-            Sighting(label, overlap, distance_m)
+            ComparedDetection(label, overlap, distance_m)
             for label, overlap, distance_m in zip(
                 view.detections.labels, compared.overlap.tolist(), compared.distance_m.tolist(), strict=True
             )

@@ -107,7 +107,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class ComparedDetection:
     """An object in a present view, compared with a remembered one."""
 
     label: str
@@ -124,7 +124,7 @@ class VerifyQuestion(YesNoQuestion):
     kind: ClassVar[str] = "verify"
     goal: Goal
     entry: ObjectCandidate
-    seen: Sequence[Sighting]
+    seen: Sequence[ComparedDetection]
     """Objects in the present views, for models that do not look at images. Not part of the prompt."""
     evidence: DepthEvidence
     """Its points compared with the present depth. Not part of the prompt."""
@@ -159,7 +159,7 @@ class VerifyQuestion(YesNoQuestion):
             f"{evidence.num_supported} on a surface, {evidence.num_occluded} hidden"
         )
 
-    def _is_entry(self, seen: Sighting, matcher: Matcher) -> bool:
+    def _is_entry(self, seen: ComparedDetection, matcher: Matcher) -> bool:
         """Return whether a detection may be of the remembered object."""
         is_here = seen.overlap > matcher.config.min_overlap or seen.distance_m < matcher.config.same_place_m
         return is_here and canonical(seen.label) == canonical(self.entry.label)

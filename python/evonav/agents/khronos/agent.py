@@ -7,7 +7,7 @@ from typing import Any
 from evonav.agents.agent import EntryBelief
 from evonav.agents.explanation import entry_belief
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.khronos.votes import RayVotes, VotesConfig
+from evonav.agents.khronos.votes import KhronosVotes, VotesConfig
 from evonav.agents.navigator import Navigator
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
@@ -30,7 +30,7 @@ class KhronosFrontierUpdate(FrontierUpdate):
 
     def _new_navigator(self) -> Navigator:
         navigator = super()._new_navigator()
-        self._votes = RayVotes(self._own.votes)
+        self._votes = KhronosVotes(self._own.votes)
         navigator.observers.append(self._votes.see)
         return navigator
 

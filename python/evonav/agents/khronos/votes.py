@@ -35,7 +35,7 @@ Bins = dict[int, tuple[int, int]]
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class PresenceChange:
     """The result of a series of votes, in one direction of time."""
 
     absent: int | None = None
@@ -44,7 +44,7 @@ class Change:
     """The farthest round before that in which it is present; `None` if it never is."""
 
 
-def change_of(bins: Mapping[int, tuple[int, int]], config: VotesConfig, *, forward: bool) -> Change:
+def change_of(bins: Mapping[int, tuple[int, int]], config: VotesConfig, *, forward: bool) -> PresenceChange:
     """Return when an object changed, by votes before it was first seen, or after it was last seen.
 
     Each window begins at a round with votes and goes on for `window` rounds, forwards in time in both directions, as
@@ -61,10 +61,10 @@ def change_of(bins: Mapping[int, tuple[int, int]], config: VotesConfig, *, forwa
         if present + absent == 0:
             continue
         if absent > config.absent_share * (present + absent):
-            return Change(start, present_at)
+            return PresenceChange(start, present_at)
         if present > config.present_share * (present + absent):
             present_at = start
-    return Change(None, present_at)
+    return PresenceChange(None, present_at)
 
 
 @dataclass(slots=True)
@@ -75,11 +75,11 @@ class _Track:
     """Round in which it was last seen."""
     after: Bins = field(default_factory=dict)
     """Votes of rounds after the last one."""
-    before: Change | None = None
+    before: PresenceChange | None = None
     """The result of the rays from before the first detection; `None` before it is known."""
 
 
-class RayVotes:
+class KhronosVotes:
     """The votes about all entries of an object map."""
 
     def __init__(self, config: VotesConfig | None = None) -> None:

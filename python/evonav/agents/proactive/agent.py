@@ -25,7 +25,7 @@ from evonav.agents.proactive.search import (
     shown_from,
     with_ways,
 )
-from evonav.agents.proactive.sightings import Sighting
+from evonav.agents.proactive.sightings import FarSighting
 from evonav.agents.proactive.standing import (
     ALIKE,
     Placed,
@@ -321,7 +321,7 @@ class Proactive(NavigatorAgent):
             "object", entry_id, self._navigator.observation_point(centre_m) or centre_m, centre_m, weight, 0.0
         )
 
-    def _sighting_option(self, number: int, one: Sighting, weight: float, around: Surroundings) -> Option:
+    def _sighting_option(self, number: int, one: FarSighting, weight: float, around: Surroundings) -> Option:
         """Return the place nearest to a sighting that no known wall hides from it, or the sighting's own."""
         places = places_before(one.ground_m, self._belief.searched.coarse, around, self.config.stand_within_m)
         place = min(places, key=lambda place: (math.dist(place, one.ground_m), place), default=one.ground_m)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.agents.grid import CoarseFrame, box_slices
 from evonav.agents.proactive.config import ProactiveConfig
-from evonav.agents.proactive.sightings import Sighting
+from evonav.agents.proactive.sightings import FarSighting
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.home_statistics import PER_100_M2, UNKNOWN_PER_100_M2
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
@@ -46,11 +46,11 @@ def density_of(noun: str) -> float:
 def prior_of(
     goal: ParsedGoal,
     remembered: Sequence[ObjectCandidate],
-    sightings: Sequence[Sighting],
+    sightings: Sequence[FarSighting],
     coarse: CoarseFrame,
     unknown: NDArray[np.bool_],
     config: ProactiveConfig,
-) -> tuple[NDArray[np.float64], list[tuple[Sighting, float]]]:
+) -> tuple[NDArray[np.float64], list[tuple[FarSighting, float]]]:
     """Return how many objects of the goal's type are to be expected at each place, weighted by how they fit the text.
 
     Args:
@@ -66,7 +66,7 @@ def prior_of(
     frame = coarse.frame
     cell_m2 = frame.cell_m**2
     expected = np.full((frame.rows, frame.cols), density_of(goal.noun) * cell_m2)
-    leads: list[tuple[Sighting, float]] = []
+    leads: list[tuple[FarSighting, float]] = []
     relations = [one for one in goal.relations if one.kind != "in" and not is_structure(one.noun)]
     if not config.uses_anchors:
         return expected, leads

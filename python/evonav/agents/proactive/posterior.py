@@ -15,7 +15,7 @@ from evonav.agents.proactive.places import prior_of, visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief
 from evonav.agents.proactive.rooms import NO_ROOM
 from evonav.agents.proactive.searched import SearchedCells
-from evonav.agents.proactive.sightings import Sighting
+from evonav.agents.proactive.sightings import FarSighting
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.home_statistics import room_ratios
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
@@ -39,7 +39,7 @@ class Posterior:
 
     entries: Mapping[int, float]
     """Weight of the stored place of each entry with the goal's name, by id."""
-    sightings: Sequence[tuple[Sighting, float]]
+    sightings: Sequence[tuple[FarSighting, float]]
     """Detections without an entry that may be of the goal, or of what the goal is on, and the weight of each."""
     moved: NDArray[np.float64]
     """`(R, C)` weight of each coarse cell as the present place of a remembered object that is no longer at its own."""
@@ -122,7 +122,7 @@ def posterior_of(
     around: Surroundings,
     presence: PresenceBelief,
     searched: SearchedCells,
-    sightings: Sequence[Sighting],
+    sightings: Sequence[FarSighting],
     factors: Mapping[int, float],
     replaced: frozenset[int],
     config: ProactiveConfig,

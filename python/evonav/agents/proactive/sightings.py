@@ -23,7 +23,7 @@ the middle of what is seen shifts with the direction."""
 
 
 @dataclass(slots=True)
-class Sighting:
+class FarSighting:
     """Something that was detected and is not remembered as an entry."""
 
     label: str
@@ -45,7 +45,7 @@ class Sightings:
     """All such detections, by label."""
 
     def __init__(self) -> None:
-        self.all: list[Sighting] = []
+        self.all: list[FarSighting] = []
         self.stage = self.round = 0
 
     def begin_stage(self, stage: int) -> None:
@@ -106,22 +106,22 @@ class Sightings:
         known = [one for one in self.all if canonical(one.label) == name]
         nearest = min(known, key=lambda one: math.dist(one.centre_m, centre_m), default=None)
         if nearest is None or math.dist(nearest.centre_m, centre_m) > max(SAME_M, SAME_SHARE * range_m):
-            self.all.append(Sighting(label, centre_m, range_m, self.stage, self.round))
+            self.all.append(FarSighting(label, centre_m, range_m, self.stage, self.round))
             return
         nearest.stage, nearest.round = self.stage, self.round
         if range_m < nearest.range_m:
             nearest.centre_m, nearest.range_m = centre_m, range_m
 
-    def is_current(self, one: Sighting) -> bool:
+    def is_current(self, one: FarSighting) -> bool:
         """Return whether something was seen in the present round."""
         return one.stage == self.stage and one.round == self.round
 
-    def drop(self, one: Sighting) -> None:
+    def drop(self, one: FarSighting) -> None:
         """Forget something that is not there, or not the goal."""
         self.all = [other for other in self.all if other is not one]
 
 
-def _is_covered(one: Sighting, boxes: list[ObjectCandidate]) -> bool:
+def _is_covered(one: FarSighting, boxes: list[ObjectCandidate]) -> bool:
     """Return whether something is an entry by now."""
     reach_m = max(SAME_M, SAME_SHARE * one.range_m)
     return any(box.label == canonical(one.label) and box_distance_m(box, one.ground_m) <= reach_m for box in boxes)

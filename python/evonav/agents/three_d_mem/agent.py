@@ -6,7 +6,7 @@ from typing import Any
 
 from evonav.agents.agent import AgentAction
 from evonav.agents.explorer import AS_THREE_D_MEM
-from evonav.agents.navigator import NavigatorConfig, Target
+from evonav.agents.navigator import NavigationTarget, NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
@@ -135,7 +135,7 @@ class ThreeDMem(NavigatorAgent):
         if goal_m is None:
             self._counters["unmapped_choices"] += 1
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
-        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), reason)
+        return self._approach(NavigationTarget(chosen.entry_id, goal_m, chosen.ground_m), reason)
 
     def _round_counters(self) -> Mapping[str, int]:
         explorer = self._navigator.explorer

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from evonav.agents.unigoal.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
-from evonav.agents.unigoal.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
+from evonav.agents.unigoal.object_graph import NodeGroup, ObjectGraph, ObjectGraphConfig, SceneNode
 from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
@@ -212,7 +212,7 @@ class GraphReasoner:
             return ends[0]
         return (sum(x for x, _ in found) / len(found), sum(z for _, z in found) / len(found))
 
-    def _best_group(self) -> Group | None:
+    def _best_group(self) -> NodeGroup | None:
         """Return the likeliest group of the likeliest room; `None` if no group is likely at all."""
         groups = self.scene.groups(self._room_of())
         if not groups:
@@ -221,7 +221,7 @@ class GraphReasoner:
         rooms = tuple(sorted(groups))
         room = self._queries.ask(RoomQuestion(goal, subgraph, rooms)) or rooms[0]
         nodes, edges = self.scene.nodes, self.scene.edges
-        best: tuple[float, Group] | None = None
+        best: tuple[float, NodeGroup] | None = None
         for group in groups[room]:
             ids = {node.id for node in group.nodes}
             inside = [edge for edge in edges if {edge.subject_id, edge.object_id} <= ids]

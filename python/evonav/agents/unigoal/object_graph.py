@@ -77,7 +77,7 @@ class SceneEdge:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class NodeGroup:
     """Nodes that are near each other."""
 
     nodes: tuple[SceneNode, ...]
@@ -183,7 +183,7 @@ class ObjectGraph:
         for (a, b), relation in zip(pairs, relations or (), strict=relations is not None):
             self._relations[(a.id, b.id)] = relation
 
-    def groups(self, room_of: Callable[[SceneNode], str]) -> dict[str, list[Group]]:
+    def groups(self, room_of: Callable[[SceneNode], str]) -> dict[str, list[NodeGroup]]:
         """Return groups by room: nodes connected by steps of at most `group_eps_m` from centre to centre.
 
         With a minimum of one, DBSCAN's clusters are just the connected components.
@@ -193,7 +193,7 @@ class ObjectGraph:
             rooms.setdefault(room_of(node), []).append(node)
         return {room: self._clusters(nodes) for room, nodes in rooms.items()}
 
-    def _clusters(self, nodes: Sequence[SceneNode]) -> list[Group]:
+    def _clusters(self, nodes: Sequence[SceneNode]) -> list[NodeGroup]:
         cell_m = self.config.group_cell_m
         reach = round(self.config.group_eps_m / cell_m)
         cells = [tuple(math.floor(value / cell_m) for value in node.ground_m) for node in nodes]
@@ -206,7 +206,7 @@ class ObjectGraph:
         members: dict[int, list[SceneNode]] = {}
         for node, group in zip(nodes, group_of, strict=True):
             members.setdefault(group, []).append(node)
-        return [Group(tuple(group)) for group in members.values()]
+        return [NodeGroup(tuple(group)) for group in members.values()]
 
     def neighbourhood(self, node_ids: Sequence[int], num_hops: int, reach_m: float) -> list[SceneNode]:
         """Return the nodes within some hops of others, along edges no longer than `reach_m`, by ascending id.

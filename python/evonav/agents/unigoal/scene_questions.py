@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
 from evonav.agents.unigoal.goal_graph import GoalGraph, relation_kind
-from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
+from evonav.agents.unigoal.object_graph import NodeGroup, SceneEdge, SceneNode, Verdict
 from evonav.agents.unigoal.questions import parse_relation, relation_line
 from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
@@ -154,7 +154,7 @@ class GroupScoreQuestion(Question[float]):
     kind: ClassVar[str] = "group-score"
     goal: Goal
     subgraph: GoalGraph
-    group: Group
+    group: NodeGroup
     edges: Sequence[SceneEdge]
     """Edges within the group."""
     nodes: Sequence[SceneNode]

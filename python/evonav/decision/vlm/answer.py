@@ -11,7 +11,7 @@ from evonav.decision.vlm.response_cache import JsonObject
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ModelAnswer:
     """A complete answer."""
 
     text: str
@@ -46,7 +46,7 @@ def usage_of(response: JsonObject) -> Usage | None:
     return Usage(*numbers) if len(numbers) == 2 else None
 
 
-def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
     """Return the answer in a response.
 
     Raises:
@@ -68,7 +68,9 @@ def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
     if not content.strip():
         raise VlmError("empty", f"an empty answer (finish_reason {reason!r})")
     model = response.get("model")
-    return Answer(content, model if isinstance(model, str) else "", usage_of(response) or Usage(), key, is_replayed)
+    return ModelAnswer(
+        content, model if isinstance(model, str) else "", usage_of(response) or Usage(), key, is_replayed
+    )
 
 
 def _content(content: Any) -> str:  # noqa: ANN401

@@ -6,9 +6,9 @@ from typing import Literal, cast
 
 from evonav.decision.prompts import Prompt
 from evonav.decision.vlm.account import Account
-from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.answer import ModelAnswer
 from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
-from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, key_of
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, StoredFailure, key_of
 from evonav.errors import InvalidArgumentError
 
 Mode = Literal["live", "record", "replay", "auto"]
@@ -51,7 +51,7 @@ class CachingClient(ABC):
         if self.mode != "live" and store is None:
             raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
 
-    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
+    def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
         """Return the model's answer.
 
         Args:
@@ -64,7 +64,7 @@ class CachingClient(ABC):
         """
         return self.ask_first((prompt,), attempt)[1]
 
-    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, Answer]:
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:
         """Return the answer to the first prompt whose outcome is cached; if none is, ask one of them.
 
         Args:
@@ -91,11 +91,11 @@ class CachingClient(ABC):
             if self.mode == "replay":
                 raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {keys[index]}")
             outcome = self._ask_anew(prompts[index], attempt, requests[index])
-        if isinstance(outcome, Failure):
+        if isinstance(outcome, StoredFailure):
             raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
         return index, self._read(outcome, keys[index], is_replayed=cached is not None)
 
-    def _first_cached(self, keys: Sequence[str]) -> tuple[int, JsonObject | Failure] | None:
+    def _first_cached(self, keys: Sequence[str]) -> tuple[int, JsonObject | StoredFailure] | None:
         """Return the first outcome that is cached, with the index of its key."""
         if self.store is not None and self.mode in ("replay", "auto"):
             for index, key in enumerate(keys):
@@ -103,27 +103,27 @@ class CachingClient(ABC):
                     return index, outcome
         return None
 
-    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
+    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | StoredFailure:
         """Ask the model, and store the outcome if the mode and `keeps_failures` require it."""
-        outcome: JsonObject | Failure
+        outcome: JsonObject | StoredFailure
         try:
             outcome = self._ask_model(prompt, attempt)
         except VlmError as error:
             if not self.keeps_failures or error.kind in LASTING:
                 raise
-            outcome = Failure(error.kind, error.message)
+            outcome = StoredFailure(error.kind, error.message)
         if self.store is None or self.mode == "live":
             return outcome
         pictures = prompt.pictures if self.keeps_images else []
         if self.mode == "auto" and (self.keeps_failures or not self._is_malformed(outcome)):
             return self.store.keep_first(cached, pictures, outcome)
-        if self.mode == "record" and not isinstance(outcome, Failure) and not self._is_malformed(outcome):
+        if self.mode == "record" and not isinstance(outcome, StoredFailure) and not self._is_malformed(outcome):
             self.store.put(cached, pictures, outcome)
         return outcome
 
-    def _is_malformed(self, outcome: JsonObject | Failure) -> bool:
+    def _is_malformed(self, outcome: JsonObject | StoredFailure) -> bool:
         """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
-        if isinstance(outcome, Failure):
+        if isinstance(outcome, StoredFailure):
             return True
         try:
             self._read(outcome, "", is_replayed=False)
@@ -164,5 +164,5 @@ class CachingClient(ABC):
         """
 
     @abstractmethod
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
         """Return the answer in a response."""

@@ -9,6 +9,7 @@ Keys come from the caller or the environment, are sent in the header, and appear
 
 import os
 import threading
+import time
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,11 +22,10 @@ from pydantic_core import to_json
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
-from evonav.decision.vlm.answer import Answer, read_answer, read_response, usage_of
+from evonav.decision.vlm.answer import ModelAnswer, read_answer, read_response, usage_of
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
-from evonav.decision.vlm.pacing import Pace
 from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.decision.vlm.secrets import REMOVED, without_secrets
 from evonav.errors import DecisionError, InvalidArgumentError
@@ -90,6 +90,42 @@ class VlmConfig:
                 raise InvalidArgumentError(f"{name}: expected {least:g} to {most:g}, got {value!r}")
         if not self.model:
             raise InvalidArgumentError("model: expected a name, got ''")
+
+
+class Pace:
+    """Delays questions so that they begin no faster than the limits allow. Any number of threads may use one.
+
+    Each question moves the earliest start of the next one on by its share of a minute, so there is no burst that a
+    server with another idea of where minutes begin could object to. `Retry-After` is the client's business.
+    """
+
+    def __init__(
+        self,
+        requests_per_minute: float | None = None,
+        tokens_per_minute: float | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Set the limits; `None` is no limit."""
+        self._s_a_request = 60.0 / requests_per_minute if requests_per_minute else 0.0
+        self._s_a_token = 60.0 / tokens_per_minute if tokens_per_minute else 0.0
+        self._clock = clock
+        self._sleep = sleep
+        self._lock = threading.Lock()
+        self._next_s = 0.0
+
+    def wait(self, num_tokens: int) -> None:
+        """Wait until a question of a number of tokens may begin."""
+        share_s = max(self._s_a_request, self._s_a_token * num_tokens)
+        if share_s == 0.0:
+            return
+        with self._lock:
+            now_s = self._clock()
+            begin_s = max(now_s, self._next_s)
+            self._next_s = begin_s + share_s
+        if begin_s > now_s:
+            self._sleep(begin_s - now_s)
 
 
 class VlmClient(CachingClient):
@@ -185,7 +221,7 @@ class VlmClient(CachingClient):
         finally:
             self.account.settle(reserved_usd, usage)
 
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
         return read_answer(response, key, is_replayed=is_replayed)
 
     def _post(self, request: JsonObject) -> JsonObject:

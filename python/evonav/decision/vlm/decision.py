@@ -14,7 +14,7 @@ from evonav.decision.goal_input import check_goal_input
 from evonav.decision.options import PromptOptions
 from evonav.decision.prompts import Prompt, Text, Turn, with_notice
 from evonav.decision.question import AnswerError, DecisionModel, Fault, Question, Reply
-from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.answer import ModelAnswer
 from evonav.decision.vlm.caching_client import CachingClient
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.decision.vlm.relay import RelayedClient
@@ -93,7 +93,7 @@ class VlmDecision(DecisionModel):
         # A server that ignores a schema answers in lines, which are as good.
         return Reply(question.parse(answer.text), answer.text)
 
-    def _ask(self, question: Question[A], attempt: int) -> tuple[Answer, bool]:
+    def _ask(self, question: Question[A], attempt: int) -> tuple[ModelAnswer, bool]:
         """Return the answer, and whether JSON was requested."""
         plain = with_notice(question.prompt(), tells_of_change=self.options.tells_of_change)
         if self.options.structured == "off":

@@ -18,7 +18,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.answer import ModelAnswer
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.records import sentence_of
@@ -65,7 +65,7 @@ class _Request:
 class Response:
     """The outcome of a request, in one of the fields."""
 
-    answer: Answer | None = None
+    answer: ModelAnswer | None = None
     index: int = 0
     """Index of the prompt that was answered."""
     failure: VlmFailure | None = None
@@ -102,7 +102,7 @@ class RelayedClient:
         """Return nothing: the evaluator counts the costs."""
         return {}
 
-    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
+    def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
         """Return the model's answer.
 
         Raises:
@@ -111,7 +111,7 @@ class RelayedClient:
         """
         return self.ask_first((prompt,), attempt)[1]
 
-    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, Answer]:
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:
         """Return the answer to the first prompt whose outcome is cached, else to `prompts[otherwise]`, with its index.
 
         Raises:

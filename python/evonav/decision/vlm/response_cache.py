@@ -52,7 +52,7 @@ def key_of(request: JsonObject) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
+class StoredFailure:
     """The outcome of a question without a response."""
 
     kind: str
@@ -99,7 +99,7 @@ class ResponseCache(SharedFile):
             raise StoreError(f"{self.path}: response of {key}: expected an object, got {str(row[0])[:80]!r}")
         return response
 
-    def outcome(self, key: str) -> JsonObject | Failure | None:
+    def outcome(self, key: str) -> JsonObject | StoredFailure | None:
         """Return the response or failure stored for a key.
 
         Raises:
@@ -133,8 +133,8 @@ class ResponseCache(SharedFile):
         return key
 
     def keep_first(
-        self, request: JsonObject, pictures: Sequence[Picture], outcome: JsonObject | Failure
-    ) -> JsonObject | Failure:
+        self, request: JsonObject, pictures: Sequence[Picture], outcome: JsonObject | StoredFailure
+    ) -> JsonObject | StoredFailure:
         """Store an outcome unless another process has stored one of the same question meanwhile.
 
         Returns:
@@ -147,7 +147,7 @@ class ResponseCache(SharedFile):
         files = self._new_files(pictures)
         with self._writing():
             row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
-            there: JsonObject | Failure | None = self._failure(key) if row is None else json.loads(row[0])
+            there: JsonObject | StoredFailure | None = self._failure(key) if row is None else json.loads(row[0])
             if there is None:
                 self._insert(key, request, files, outcome)
         return outcome if there is None else there
@@ -157,9 +157,9 @@ class ResponseCache(SharedFile):
         with self._writing():
             return self._db.execute("DELETE FROM failures").rowcount
 
-    def _failure(self, key: str) -> Failure | None:
+    def _failure(self, key: str) -> StoredFailure | None:
         row = self._db.execute("SELECT kind, message FROM failures WHERE key = ?", (key,)).fetchone()
-        return None if row is None else Failure(*row)
+        return None if row is None else StoredFailure(*row)
 
     def _new_files(self, pictures: Sequence[Picture]) -> dict[str, bytes]:
         """Return the files of images that are not stored yet, by name."""
@@ -169,9 +169,11 @@ class ResponseCache(SharedFile):
             stored = {name for (name,) in self._db.execute(query, tuple(by_name))}
         return {name: _file_of(picture) for name, picture in by_name.items() if name not in stored}
 
-    def _insert(self, key: str, request: JsonObject, files: dict[str, bytes], outcome: JsonObject | Failure) -> None:
+    def _insert(
+        self, key: str, request: JsonObject, files: dict[str, bytes], outcome: JsonObject | StoredFailure
+    ) -> None:
         self._db.executemany("INSERT OR IGNORE INTO pictures VALUES (?, ?)", files.items())
-        if isinstance(outcome, Failure):
+        if isinstance(outcome, StoredFailure):
             row = (key, canonical_json(request), outcome.kind, outcome.message)
             self._db.execute("INSERT INTO failures VALUES (?, ?, ?, ?)", row)
         else:

@@ -8,9 +8,9 @@ import math
 from collections.abc import Sequence
 
 from evonav.agents.agent import AgentAction, NavigateTo, Stop
+from evonav.agents.baselines import NearestFrontier
 from evonav.agents.explanation import Explanation
 from evonav.agents.frontier_update.agent import FrontierUpdate
-from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
