@@ -35,10 +35,12 @@ PHRASES = tuple(
         r"\bworth what\b",
         r"\bunless told\b",
         r"\bto be had\b",
+        r"\bbut for (the|those|a|an|what|one|some|its|their)\b",
+        r"\banew\b",
         r"^(who|whoever) [a-z]+s\b[^?]*$",
     )
 )
-"""Phrases that a reader has to translate: write `except for`, `available`, and say who does what."""
+"""Phrases that a reader has to translate: write `except for`, `again`, `available`, and say who does what."""
 _OPENERS = frozenset(
     """
     about after among around as at before behind below beneath beside between beyond by during for from in inside into
