@@ -93,7 +93,7 @@ def test_unrounded_rates_are_those_of_the_summary(run: Path, summary: dict[str, 
             name = "all" if row["by"] == "is_baseline" or row["group"] == "2 m" else GROUPS.get(row["group"])
             measured = numbers(row["value"], row["low"], row["high"])
             if name is not None:
-                assert found.setdefault((row["agent"], name, row["measure"]), measured) == measured
+                assert found.setdefault((row["agent"], name, row["metric"]), measured) == measured
     for agent in AGENTS:
         alone = summary["agents"][agent]
         for name in ("all", *GROUPS.values()):
@@ -157,7 +157,7 @@ def test_pairs_are_the_same_everywhere(run: Path, summary: dict[str, Any], tmp_p
     command("compare", run, *(part for kind, path in files.items() for part in ("--out", path)))
     command("paper", run, "--out", tmp_path / "paper.md")
     compared = {(one["a"], one["b"]): one for one in json.loads(command("compare", run, "--json"))["comparisons"]}
-    lines = {(row["a"], row["b"], row["measure"]): row for row in rows_of(files["csv"]) if row["part"] == "all"}
+    lines = {(row["a"], row["b"], row["metric"]): row for row in rows_of(files["csv"]) if row["part"] == "all"}
     paired = {row[0]: row for row in table_rows((run / "table.md").read_text().split("## ")[2])}
     overview = {row[0]: row for row in table_rows(files["md"].read_text().split("## ")[1])}
     papers = next(part for part in (tmp_path / "paper.md").read_text().split("## ") if part.startswith("Differences"))
