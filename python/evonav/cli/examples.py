@@ -92,7 +92,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav houses make --count 100 --seed 7 --out houses.jsonl.gz",
         "evonav houses make --count 10 --config flats.toml --out flats.jsonl",
     ),
-    "houses stats": ("evonav houses stats bundled endless:7 --limit 150 --classifier",),
+    "houses stats": ("evonav houses stats bundled endless:7 --limit 150",),
     "houses fetch": (
         "evonav houses fetch procthor-10k --split test",
         "evonav houses fetch evonav-10k --split train --workers 8",

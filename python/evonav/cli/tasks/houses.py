@@ -24,13 +24,10 @@ from evonav.cli.options.shared import (
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from evonav.generation.house_classifier import ClassifierTest
     from evonav.generation.house_statistics import HouseComparison
     from evonav.report.tables.table import Table
 
 EXIT_WRONG = 1
-NUM_USED = 10
-"""Features that the table of a classifier shows."""
 LEVEL = 0.05
 """Largest adjusted p at which two sets of houses differ in a feature."""
 
@@ -186,16 +183,11 @@ def stats(
     b: Annotated[str, typer.Argument(metavar="B", help="Houses to compare them with.")],
     limit: Limit = None,
     every: Annotated[bool, typer.Option("--all", help="Print all features, not only those that differ.")] = False,
-    classifier: Annotated[
-        bool,
-        typer.Option("--classifier", help="Also train a classifier to tell the sets apart; needs the extra `houses`."),
-    ] = False,
 ) -> None:
     """Set two sets of houses side by side, and test in what they differ.
 
     Houses are compared with those of the same room spec.
     """
-    from evonav.generation.house_classifier import tell_apart
     from evonav.generation.house_statistics import compare_houses, sample_of
 
     samples = []
@@ -206,33 +198,6 @@ def stats(
             samples.append([sample_of(text) for text in islice(texts, limit)])
     found = compare_houses(*samples)
     show_tables([comparison_table(found, (a, b), every=every)])
-    if classifier:
-        with status("Training a classifier"):
-            tested = tell_apart(*samples)
-        show_tables([classifier_table(tested, found)])
-
-
-def classifier_table(tested: "ClassifierTest", found: "HouseComparison") -> "Table":
-    """Return the table of `evonav houses stats --classifier`: what the classifier uses most."""
-    from evonav.report.tables.table import Table
-
-    averages = {one.name: (f"{one.mean_a:.2f}", f"{one.mean_b:.2f}") for one in found.features}
-    rows = [
-        (name, f"{100 * loss:.1f}", *averages.get(name, ("-", "-")))
-        for name, loss in list(tested.uses.items())[:NUM_USED]
-        if loss > 0.0
-    ]
-    rate, low, high = (f"{100 * value:.1f}" for value in (tested.accuracy, *tested.interval))
-    counts = counted(tested.num_houses, "house")
-    return Table(
-        title=f"A classifier is right in {rate}% [{low}, {high}]; chance is 50%",
-        columns=("what it uses", "lost without, points", "A", "B"),
-        rows=tuple(rows),
-        notes=(
-            f"Gradient boosting with {counted(len(tested.uses), 'feature')} of {counts} of each set, as many of each "
-            "room spec, on houses that it was not trained on (five folds).",
-        ),
-    )
 
 
 def comparison_table(found: "HouseComparison", names: tuple[str, str], *, every: bool) -> "Table":

@@ -1,21 +1,27 @@
 """Train a classifier to tell two sets of houses apart: a two-sample test that also sees combinations of features.
 
+    pip install scikit-learn
+    python scripts/studies/tell_houses_apart.py bundled endless:7 --limit 150
+
 Lopez-Paz & Oquab, "Revisiting Classifier Two-Sample Tests", ICLR 2017: if no classifier tells houses that it has not
 seen from those of the other set better than by chance, the sets have the same distribution as far as its features
 show.
 """
 
+import argparse
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from random import Random
-from typing import Any
 
 import numpy as np
+from sklearn.ensemble import GradientBoostingClassifier
+from sklearn.inspection import permutation_importance
 
-from evonav.component import optional_module
+from evonav.cli.options.shared import read_houses
 from evonav.errors import InvalidArgumentError
-from evonav.generation.house_statistics import CATEGORY, Features, HouseSample, by_stratum, feature_table
+from evonav.generation.house_statistics import CATEGORY, Features, HouseSample, by_stratum, feature_table, sample_of
 from evonav.statistics import Interval, wilson
 
 NUM_FEATURES = 60
@@ -25,7 +31,8 @@ MIN_HOUSES = 2 * NUM_FOLDS
 """Least number of houses of each set."""
 NUM_SHUFFLES = 5
 """Times that each feature is shuffled to find what it is worth."""
-_EXTRA = "'evonav[houses]'"
+NUM_SHOWN = 10
+"""Features that are printed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +62,8 @@ def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int 
 
     Raises:
         InvalidArgumentError: There are too few houses of the same strata.
-        StoreError: scikit-learn is not installed.
     """
-    purpose = "the classifier needs scikit-learn"
-    ensemble = optional_module("sklearn.ensemble", purpose, _EXTRA)
-    inspection = optional_module("sklearn.inspection", purpose, _EXTRA)
-    sets = _balanced(a, b, Random(seed))  # noqa: S311 - no secrets
+    sets = _balanced(a, b, Random(seed))
     num_houses = len(sets[0])
     if num_houses < MIN_HOUSES:
         raise InvalidArgumentError(
@@ -73,11 +76,11 @@ def tell_apart(a: Sequence[HouseSample], b: Sequence[HouseSample], *, seed: int 
     num_right, losses = 0, np.zeros(len(names))
     for fold in range(NUM_FOLDS):
         is_test = folds == fold
-        model: Any = ensemble.GradientBoostingClassifier(random_state=seed)
+        model = GradientBoostingClassifier(random_state=seed)
         model.fit(table[~is_test], labels[~is_test])
         test = table[is_test], labels[is_test]
         num_right += round(float(model.score(*test)) * len(test[1]))
-        found = inspection.permutation_importance(model, *test, n_repeats=NUM_SHUFFLES, random_state=seed)
+        found = permutation_importance(model, *test, n_repeats=NUM_SHUFFLES, random_state=seed)
         losses += found.importances_mean * len(test[1])
     num_all = 2 * num_houses
     order = np.argsort(-losses, kind="stable")
@@ -104,3 +107,21 @@ def _most_usual(houses: Sequence[Features]) -> list[str]:
     others = sorted(name for name in shares if not name.startswith(CATEGORY))
     categories = sorted((name for name in shares if name.startswith(CATEGORY)), key=lambda name: (-shares[name], name))
     return [*others, *categories][:NUM_FEATURES]
+
+
+def main() -> None:
+    """Print how often a classifier is right, and which features it uses most."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("houses", nargs=2, help="two sets of houses, as of `evonav houses`")
+    parser.add_argument("--limit", type=int, help="houses of each set")
+    arguments = parser.parse_args()
+    sets = [read_houses(name, None, "auto") for name in arguments.houses]
+    found = tell_apart(*([sample_of(text) for text in islice(texts, arguments.limit)] for texts in sets))
+    low, high = found.interval
+    print(f"right in {found.accuracy:.1%} [{low:.1%}, {high:.1%}] of {2 * found.num_houses} houses; chance is 50%")
+    for name, loss in list(found.uses.items())[:NUM_SHOWN]:
+        print(f"{name}: {loss:.1%} lost without it")
+
+
+if __name__ == "__main__":
+    main()

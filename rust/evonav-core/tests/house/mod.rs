@@ -1,0 +1,5 @@
+//! Reading, checking and changing houses.
+
+mod delta;
+mod malformed;
+mod parse;

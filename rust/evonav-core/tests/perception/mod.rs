@@ -1,0 +1,4 @@
+//! The small detector and simulated errors.
+
+mod mini;
+mod simulated_errors;

@@ -1,0 +1,4 @@
+//! Batches of simulated agents, and houses in random looks.
+
+mod batch;
+mod random_looks;
