@@ -30,7 +30,7 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 from evonav.world import ai2thor
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
-from evonav.world.ai2thor_events import InstanceDecoder, depth_of
+from evonav.world.ai2thor.events import InstanceDecoder, depth_of
 from evonav.world.check import check_simulator
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

@@ -15,7 +15,7 @@ def executable() -> str:
     Raises:
         SimulationError: The program is not installed.
     """
-    from evonav.world.ai2thor_startup import own_engine  # the engine's own process must start without NumPy
+    from evonav.world.ai2thor.startup import own_engine  # the engine's own process must start without NumPy
 
     # The client splits the path like a shell.
     return shlex.quote(str(own_engine()))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from evonav import _core
+from evonav.evaluation.episode.stage_house import change_around
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
-from evonav.world.change_around import change_around
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig

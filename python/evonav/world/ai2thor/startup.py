@@ -14,11 +14,11 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
-from evonav.world.ai2thor_errors import ProcessEndedError
+from evonav.world.ai2thor.guard import ProcessEndedError
 from evonav.world.simulator import SimulatorConfig
 
 if TYPE_CHECKING:
-    from evonav.world.ai2thor_process import GuardedController
+    from evonav.world.ai2thor.process import GuardedController
 
 OWN_ENGINE = "evonav"
 """Name of evonav's own engine as an executable; it is installed with evonav as `evonav-thor`."""
@@ -116,7 +116,7 @@ def start_controller(
     try:
         import ai2thor.platform
 
-        from evonav.world.ai2thor_process import GuardedController
+        from evonav.world.ai2thor.process import GuardedController
     except ImportError as error:
         raise SimulationError(f"AI2-THOR's client cannot be imported ({error}): pip install 'evonav[thor]'") from error
     settings: dict[str, Any] = {

@@ -20,8 +20,8 @@ from typing import Any, NoReturn
 from ai2thor.controller import Controller
 from ai2thor.fifo_server import FifoServer
 
-from evonav.world import ai2thor_guard
-from evonav.world.ai2thor_errors import ProcessEndedError
+from evonav.world.ai2thor import guard
+from evonav.world.ai2thor.guard import ProcessEndedError
 
 _POLL_S = 0.1
 """Time between two checks that the process is alive."""
@@ -167,12 +167,12 @@ class GuardedController(Controller):  # type: ignore[misc]
         return super().start(*args, **settings)
 
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
-        """Return the command line, which starts `ai2thor_guard`."""
+        """Return the command line, which starts `guard`."""
         if not self._uses_gpu:
             self.gpu_device = None
         is_bound = threading.current_thread() is threading.main_thread()  # other threads may end before evonav
-        guard = [sys.executable, "-S", "-E", ai2thor_guard.__file__, str(os.getpid()), "1" if is_bound else "0"]
-        return [*guard, *super().unity_command(width, height, headless)]
+        guarded = [sys.executable, "-S", "-E", guard.__file__, str(os.getpid()), "1" if is_bound else "0"]
+        return [*guarded, *super().unity_command(width, height, headless)]
 
     def stop(self) -> None:
         """End the process and remove its pipes; safe to call twice."""

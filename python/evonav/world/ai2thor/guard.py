@@ -1,13 +1,29 @@
-"""Start AI2-THOR's process so that it ends with evonav: `python ai2thor_guard.py PARENT_PID IS_BOUND PROGRAM ...`.
+"""Start AI2-THOR's process so that it ends with evonav: `python guard.py PARENT_PID IS_BOUND PROGRAM ...`.
 
-This is a script. It imports nothing of evonav, to start quickly, and is then replaced by the program.
+This is a script. It imports nothing of evonav, to start quickly, and is then replaced by the program. It also defines
+the error of a process that ended.
 """
 
 import os
 import signal
 import sys
+from contextlib import suppress
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+class ProcessEndedError(Exception):
+    """The process ended, or broke the protocol; the message continues `AI2-THOR's process`."""
+
+    @staticmethod
+    def of(returncode: int | None) -> "ProcessEndedError":
+        """Return the error for an exit status; `None` if the process still runs without its pipe."""
+        if returncode is None:
+            return ProcessEndedError("hung up")
+        if returncode < 0:
+            with suppress(ValueError):
+                return ProcessEndedError(f"was killed by {signal.Signals(-returncode).name}")
+        return ProcessEndedError(f"ended with exit code {returncode}")
 
 
 def main(parent_pid: int, is_bound: bool, command: list[str]) -> None:

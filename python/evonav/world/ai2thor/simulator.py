@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
-from evonav.world.ai2thor_events import InstanceDecoder, depth_of, rgb_of, with_boxes
-from evonav.world.ai2thor_startup import Ai2ThorOptions, ProcessLog, lost, start_controller
+from evonav.world.ai2thor.events import InstanceDecoder, depth_of, rgb_of, with_boxes
+from evonav.world.ai2thor.startup import Ai2ThorOptions, ProcessLog, lost, start_controller
 from evonav.world.embedded import EmbeddedSimulator, nearest_of
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 if TYPE_CHECKING:
-    from evonav.world.ai2thor_process import GuardedController
-
-__all__ = ["Ai2ThorOptions", "Ai2ThorSimulator"]
+    from evonav.world.ai2thor.process import GuardedController
 
 _Position = tuple[float, float, float]
 
