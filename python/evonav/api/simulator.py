@@ -68,7 +68,7 @@ class Simulator:
             house: A house, its JSON, or a file of houses, of which the first is taken.
             pose: Pose of the agent; if it does not fit there, it stands at the nearest place where it does.
             config: Camera, body, steps and style; AI2-THOR's camera and body by default.
-            style: Way in which colours are drawn: `outlined`, `plain` or `default`. Default: that of `config`.
+            style: Way in which colours are drawn: `plain` or `default`. Default: that of `config`.
             allow_unknown_assets: Give assets that are missing from the catalogue the usual size of their category.
 
         Raises:

@@ -79,7 +79,7 @@ class NavConfig(BaseModel):
     """Number of steps of a stage; by default the protocol's, 500 actions or 50 waypoint rounds."""
     success_radius_m: float = Field(ProtocolConfig().success_radius_m, ge=0.01, le=100.0)
     style: Style = SimulatorConfig().style
-    """Way in which the colours of `rgb` are drawn: `outlined`, `plain` (the fastest) or `default`."""
+    """Way in which the colours of `rgb` are drawn: `plain` (the fastest) or `default`."""
     randomize: tuple[Randomized, ...] = ()
     """Properties drawn again for each episode: `materials`, `lighting` (seen in the style `default`) or `colors`."""
     render_view: RenderView = "camera"

@@ -50,14 +50,12 @@ def vertical_fov_deg(horizontal_deg: float, width_px: int, height_px: int) -> fl
     return math.degrees(2.0 * math.atan(math.tan(math.radians(horizontal_deg) / 2.0) * height_px / width_px))
 
 
-Style = Literal["outlined", "plain", "default"]
+Style = Literal["plain", "default"]
 """A way to draw colours.
 
-`outlined`: flat colours with dark corners, and thin lines around silhouettes: clear to people. `plain`: without the
-lines, the cheapest. `default`: lit surfaces with smooth edges, for detectors and models that know photographs.
+`plain`: flat colours with dark corners, the cheapest. `default`: lit surfaces with smooth edges, for people, and for
+models trained on photographs.
 """
-OUTLINED: Style = "outlined"
-"""The style of files that name none: runs and tasks were made in it before there were several."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ fn world() -> Arc<EmbeddedSimulator> {
         camera_height_m: 1.575,
         agent: AgentBody { radius_m: 0.2, height_m: 1.8 },
         unknown: UnknownAssets::Error,
-        style: Style::Outlined,
+        style: Style::Plain,
     };
     let house = House::from_json("house", HOUSE).expect("a valid house");
     Arc::new(EmbeddedSimulator::new(house, config).expect("a usable house"))

@@ -54,7 +54,6 @@ fn bench_raster(c: &mut Criterion) {
         for (name, want) in [
             ("depth", Want { rgb: None, instances: false }),
             ("depth_instances", Want { rgb: None, instances: true }),
-            ("depth_instances_outlined", Want { rgb: Some(Style::Outlined), instances: true }),
             ("depth_instances_plain", Want { rgb: Some(Style::Plain), instances: true }),
             ("depth_instances_default", Want { rgb: Some(Style::Default), instances: true }),
         ] {
@@ -89,13 +88,8 @@ fn bench_raster(c: &mut Criterion) {
         });
     });
     // A reference image of a task.
-    render(
-        &mesh,
-        &cameras_300[0],
-        Want { rgb: Some(Style::Outlined), instances: false },
-        &mut frame,
-    )
-    .expect("a camera in the house");
+    render(&mesh, &cameras_300[0], Want { rgb: Some(Style::Plain), instances: false }, &mut frame)
+        .expect("a camera in the house");
     c.bench_function("png/encode_300x300", |b| {
         b.iter(|| encode_png(black_box(&frame.rgb), [300, 300]));
     });

@@ -45,7 +45,7 @@ class SimulatorSettings(Settings):
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
     style: Style | None = None
-    """Embedded: style of colours: outlined, plain or default. Default: default."""
+    """Embedded: style of colours: plain or default. Default: default."""
     width_px: int | None = Field(default=None, ge=32, le=4096)
     """Width of camera images in pixels. Default: 300."""
     height_px: int | None = Field(default=None, ge=32, le=4096)

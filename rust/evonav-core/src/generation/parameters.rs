@@ -29,7 +29,6 @@ pub struct Parameters {
     /// Factor on the goal weight of a goal room within `goal_room_window`.
     pub previous_goal_room_multiplier: f64,
     /// Number of past stages whose goal rooms have `previous_goal_room_multiplier`, once for each.
-    #[serde(default = "goal_room_window_of_older_files")]
     pub goal_room_window: usize,
     /// Weight of the salient object that just moved; other objects of its room have weight 1.
     pub moved_object_multiplier: f64,
@@ -46,7 +45,6 @@ pub struct Parameters {
     /// Edge length of the reference image.
     pub reference_image_px: usize,
     /// Way in which the reference image is drawn.
-    #[serde(default = "Style::of_older_files")]
     pub reference_style: Style,
     /// Smallest number of pixels of a visible target.
     pub reference_min_visible_px: usize,
@@ -59,10 +57,6 @@ pub struct Parameters {
     /// Parameters of the extensions beyond the paper.
     #[serde(default)]
     pub extensions: Extensions,
-}
-
-fn goal_room_window_of_older_files() -> usize {
-    1
 }
 
 impl Default for Parameters {
@@ -78,7 +72,7 @@ impl Default for Parameters {
             full_shuffle_probability: 0.1,
             changed_room_multiplier: 9.0,
             previous_goal_room_multiplier: 0.2,
-            goal_room_window: goal_room_window_of_older_files(),
+            goal_room_window: 1,
             moved_object_multiplier: 9.0,
             moved_children_multiplier: 9.0,
             goals_on_walls: false,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::recorded::data_set;
+use crate::common::recorded::data_set;
 use evonav_core::{
     Error,
     assets::{Catalogue, UnknownAssets, placement_rule::Place},

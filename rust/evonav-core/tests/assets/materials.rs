@@ -1,6 +1,6 @@
 //! Names of materials, and the kinds that they stand for.
 
-use crate::recorded::data_set;
+use crate::common::recorded::data_set;
 use evonav_core::assets::{
     kind_of_name,
     material::{Material, MaterialKind},

@@ -13,7 +13,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-use crate::solids::{asset, is_filled};
+use crate::common::solids::{asset, is_filled};
 
 /// Triangles that tessellation makes of a part (ellipsoids: 12 meridians, 6 bands).
 fn num_triangles(part: &Part) -> usize {

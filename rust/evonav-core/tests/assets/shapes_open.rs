@@ -12,7 +12,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-use crate::solids::{asset, is_filled};
+use crate::common::solids::{asset, is_filled};
 
 fn at(asset: &Asset, openness: f64) -> Vec<Part> {
     shape_in(asset, Condition { openness: Some(openness), is_on: None })

@@ -3,7 +3,7 @@
 use evonav_core::resampling::{Pcg64, draw_counts};
 use proptest::prelude::*;
 
-/// Chances worked out anew for each draw, and drawn by walking along them.
+/// Chances worked out for each draw, and drawn by walking along them.
 fn draw_naive(source: &mut Pcg64, num: usize) -> Vec<u8> {
     let mut counts = vec![0; num];
     let (mut left, mut rest) = (num, 1.0);

@@ -31,7 +31,7 @@ const CONFIG: SimulatorConfig = SimulatorConfig {
     camera_height_m: 1.5,
     agent: AgentBody { radius_m: 0.2, height_m: 1.8 },
     unknown: UnknownAssets::CategoryDefault,
-    style: Style::Outlined,
+    style: Style::Plain,
 };
 /// Houses within these limits are built; it takes some milliseconds.
 const MAX_EXTENT_M: f64 = 20.0;

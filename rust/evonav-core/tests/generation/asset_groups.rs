@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::recorded::{house_lines, house_of};
+use crate::common::recorded::{house_lines, house_of};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::asset_groups,

@@ -18,11 +18,9 @@ use evonav_core::{
 };
 use serde_json::Value;
 
-use crate::{
-    points::{contains, points_in},
-    solids::holds,
-    tasks::{self, UNKNOWN, delta_of, houses, stage_houses},
-};
+use super::tasks::{self, UNKNOWN, delta_of, houses, stage_houses};
+use crate::common::points::{contains, points_in};
+use crate::common::solids::holds;
 
 const OFTEN: Option<Occurrence> = Some(Occurrence { probability: 1.0, max_count: 6 });
 

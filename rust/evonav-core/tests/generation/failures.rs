@@ -1,6 +1,6 @@
 //! Rooms that cannot take their modification: what is recorded, and that trying again helps.
 
-use crate::tasks::{always, generate};
+use super::tasks::{always, generate};
 use evonav_core::{
     generation::{
         Mode, Parameters,

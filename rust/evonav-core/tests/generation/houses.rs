@@ -3,9 +3,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::points::{interpenetrate, object, points_in};
-use crate::recorded::{house_lines, house_of};
-use crate::tasks::{UNKNOWN, always, navigation_in};
+use super::tasks::{UNKNOWN, always, navigation_in};
+use crate::common::points::{interpenetrate, object, points_in};
+use crate::common::recorded::{house_lines, house_of};
 use evonav_core::{
     assets::Catalogue,
     generation::{

@@ -11,7 +11,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-use crate::tasks::{UNKNOWN, generate, houses, task_in};
+use super::tasks::{UNKNOWN, generate, houses, task_in};
 
 fn small(evolve_probability: f64) -> Parameters {
     Parameters { evolve_probability, reference_image_px: 64, ..Parameters::default() }

@@ -1,6 +1,6 @@
 //! Houses that allow no task and parameters that make no sense are refused.
 
-use crate::tasks::{houses, try_generate};
+use super::tasks::{houses, try_generate};
 use evonav_core::{
     generation::{Generation, Parameters, record::RejectReason},
     house::House,

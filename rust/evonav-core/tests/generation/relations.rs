@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use crate::tasks::{houses, try_generate};
+use super::tasks::{houses, try_generate};
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,

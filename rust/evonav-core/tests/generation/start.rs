@@ -7,7 +7,7 @@ use evonav_core::{
 };
 use serde_json::{Value, json};
 
-use crate::tasks::{navigation_in, try_generate};
+use super::tasks::{navigation_in, try_generate};
 
 fn room(number: usize, kind: &str, [x0, z0, x1, z1]: [f64; 4]) -> Value {
     let corners = [[x0, z0], [x0, z1], [x1, z1], [x1, z0]];

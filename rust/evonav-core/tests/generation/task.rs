@@ -3,8 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::points::{contains, interpenetrate, object, parts_of, points_in};
-use crate::tasks::{UNKNOWN, always, delta_of, generate, houses, navigation_in, stage_houses};
+use super::tasks::{UNKNOWN, always, delta_of, generate, houses, navigation_in, stage_houses};
+use crate::common::points::{contains, interpenetrate, object, parts_of, points_in};
 use evonav_core::{
     assets::{Catalogue, part::Part, placement_rule::Place},
     generation::{
@@ -256,7 +256,7 @@ fn rooms_from(house: &House, start: Vec3) -> BTreeSet<usize> {
 #[test]
 fn references_show_the_target_from_its_room_at_the_reference_distance() {
     for house in houses() {
-        for (seed, reference_style) in (0..4).zip([Style::Outlined, Style::Default].repeat(2)) {
+        for (seed, reference_style) in (0..4).zip([Style::Plain, Style::Default].repeat(2)) {
             let parameters = Parameters { reference_style, ..Parameters::default() };
             let task = generate(&house, seed, &parameters);
             let mut end: Option<Vec3> = None;
@@ -312,19 +312,11 @@ fn references_show_the_target_from_its_room_at_the_reference_distance() {
 #[test]
 fn the_style_of_reference_images_changes_only_them() {
     let house = &houses()[0];
-    let [flat, lit] = [Style::Outlined, Style::Default].map(|reference_style| {
+    let [flat, lit] = [Style::Plain, Style::Default].map(|reference_style| {
         generate(house, 0, &Parameters { reference_style, ..Parameters::default() })
     });
     assert!(flat.images.iter().zip(&lit.images).all(|(a, b)| a != b));
     assert_eq!(GeneratedTask { images: vec![], ..flat }, GeneratedTask { images: vec![], ..lit });
-}
-
-#[test]
-fn parameters_without_a_style_are_of_outlined_images() {
-    let json = Parameters::default().to_json();
-    let named = ["outlined", "default"].map(|name| format!(",\"reference_style\":\"{name}\""));
-    let older = named.iter().fold(json, |text, name| text.replace(name, ""));
-    assert_eq!(Parameters::from_json(&older).unwrap().reference_style, Style::Outlined);
 }
 
 #[test]

@@ -15,7 +15,7 @@ use evonav_core::{
     },
 };
 
-use crate::maker;
+use super::maker;
 
 fn asset(id: &str) -> &'static Asset {
     Catalogue::bundled().get(id).unwrap()
@@ -223,7 +223,7 @@ fn a_house_depends_on_seed_and_number_alone() {
     let first = maker.make(9, 4).unwrap().to_json();
     maker.make(9, 5).unwrap();
     assert_eq!(maker.make(9, 4).unwrap().to_json(), first);
-    assert_eq!(crate::maker(|_| {}).make(9, 4).unwrap().to_json(), first);
+    assert_eq!(super::maker(|_| {}).make(9, 4).unwrap().to_json(), first);
     let others = [maker.make(9, 3), maker.make(8, 4)].map(|house| house.unwrap().to_json());
     assert!(others.iter().all(|other| *other != first));
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use evonav_core::{memory::occupancy::OccupancyMap, sensors::visible_cells::VisibleCells};
 use proptest::prelude::*;
 
-use crate::occupancy::{spec, walked};
+use super::occupancy::{spec, walked};
 
 type Cell = [i32; 2];
 

@@ -12,7 +12,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::points::{
+use super::points::{
     dbscan_naive, distance2, first_of_voxels, overlap_naive, unproject_naive, voxel_filter_naive,
 };
 

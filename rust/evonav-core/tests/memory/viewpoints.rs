@@ -8,7 +8,7 @@ use evonav_core::memory::{
 };
 use proptest::prelude::*;
 
-use crate::occupancy::{Cell, components_naive, walked};
+use super::occupancy::{Cell, components_naive, walked};
 
 /// The centre of the nearest blocked cell closer than `within_m`, and its distance.
 fn nearest_blocked_naive(

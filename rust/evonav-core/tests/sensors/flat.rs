@@ -1,18 +1,16 @@
-//! Colours of the styles `plain` and `outlined` against a picture that is computed pixel by pixel.
+//! Flat colours, with lines around silhouettes and without, against a picture computed pixel by pixel.
 
 use evonav_core::{
     sensors::{
         camera::{CLIP_M, Camera, View},
-        raster::{FrameBuffer, Style, Want, render_view},
+        raster::{FrameBuffer, Style, Want, render_rows_of, render_view},
     },
     world::mesh::{SceneMesh, Triangle},
 };
 use proptest::{collection::vec, prelude::*, test_runner::Config};
 
-use crate::{
-    scenes::dot,
-    tracer::{cuboid_ahead, first_met, look_through, scene_of},
-};
+use super::tracer::{cuboid_ahead, first_met, look_through, scene_of};
+use crate::common::scenes::dot;
 
 /// A view's nearness, which is straight on planes: what bends are measured in.
 struct Bent<'a> {
@@ -99,13 +97,21 @@ proptest! {
         let view = View { camera, clip_m: CLIP_M, roll_rad: 0.0, half_height_m };
         let mesh = SceneMesh::build(&scene_of(&parts));
         let mut frame = FrameBuffer::default();
-        let style = if has_lines { Style::Outlined } else { Style::Plain };
-        render_view(&mesh, &view, Want { rgb: Some(style), instances: true }, &mut frame).unwrap();
+        let want = Want { rgb: Some(Style::Plain), instances: true };
+        render_view(&mesh, &view, want, &mut frame).unwrap();
+        let shown = frame.instances.iter().copied().max().unwrap_or(0);
+        if has_lines {
+            render_rows_of(&mesh, &view, shown, &mut frame).unwrap();
+        }
+        let is_drawn = |row: i64| {
+            let row = &frame.instances[row as usize * width_px..][..width_px];
+            !has_lines || row.contains(&shown)
+        };
         let triangles: Vec<Triangle> = mesh.triangles().collect();
         let size_px = [width_px, height_px].map(|side| side as i64);
         let bent = Bent { size_px, view: &view, depth_m: &frame.depth_m };
         let places = (0..size_px[1]).flat_map(|row| (0..size_px[0]).map(move |column| [column, row]));
-        for (place, found) in places.zip(frame.rgb.chunks_exact(3)) {
+        for (place, found) in places.zip(frame.rgb.chunks_exact(3)).filter(|(at, _)| is_drawn(at[1])) {
             let (own, open) = (colour(&triangles, &view, place), bent.open(place, has_lines));
             for i in 0..3 {
                 let expected = (own[i] * open).min(255.0);

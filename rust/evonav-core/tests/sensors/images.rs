@@ -10,7 +10,7 @@ use evonav_core::{
     world::{mesh::SceneMesh, scene::BodyKind},
 };
 
-use crate::tracer::scene_of;
+use super::tracer::scene_of;
 
 fn red_cuboid(half_m: Vec3, centre_m: Vec3) -> Part {
     Part {
@@ -55,8 +55,7 @@ fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
     let mesh = SceneMesh::build(&scene_of(&[part]));
     let camera = level_camera(16, 16, 1.5, [0.0; 3]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: Some(Style::Outlined), instances: true }, &mut frame)
-        .unwrap();
+    render(&mesh, &camera, Want { rgb: Some(Style::Plain), instances: true }, &mut frame).unwrap();
     assert!(frame.instances.iter().all(|&id| id == 0));
 }
 
@@ -69,8 +68,7 @@ fn colours_show_corners_and_sky() {
     let mesh = SceneMesh::build(&scene_of(&[ahead, beside]));
     let camera = level_camera(301, 301, 90.0_f64.to_radians(), [0.5, 0.0, 0.0]);
     let mut frame = FrameBuffer::default();
-    render(&mesh, &camera, Want { rgb: Some(Style::Outlined), instances: false }, &mut frame)
-        .unwrap();
+    render(&mesh, &camera, Want { rgb: Some(Style::Plain), instances: false }, &mut frame).unwrap();
     let at = |col: usize| &frame.rgb[3 * (150 * 301 + col)..][..3];
     assert_eq!(at(20), [204, 222, 236]);
     assert!(at(160)[0] > 3 * at(160)[1]);
@@ -103,7 +101,7 @@ fn surfaces_are_drawn_between_the_clip_planes() {
     for half_height_m in [None, Some(2.0)] {
         let view = View { half_height_m, ..View::from(camera) };
         let mut frame = FrameBuffer::default();
-        let want = Want { rgb: Some(Style::Outlined), instances: true };
+        let want = Want { rgb: Some(Style::Plain), instances: true };
         for (z, is_seen) in [
             (near_m - 1e-3, false),
             (near_m + 1e-3, true),

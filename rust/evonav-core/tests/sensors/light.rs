@@ -20,7 +20,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*, test_runner::Config};
 
-use crate::scenes::{dot, scene_of};
+use crate::common::scenes::{dot, scene_of};
 
 const HOUSE: &str = include_str!("../data/house_39_objects.json");
 /// Width of a cell of the map of what stands on the floor.

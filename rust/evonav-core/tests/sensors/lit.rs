@@ -15,7 +15,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*, test_runner::Config};
 
-use crate::tracer::{cuboid_ahead, first_met, look_through, scene_of};
+use super::tracer::{cuboid_ahead, first_met, look_through, scene_of};
 
 /// A face: its body and its normal in steps of 0.0001. `None`: nothing is there.
 type Face = Option<(u32, [i32; 3])>;

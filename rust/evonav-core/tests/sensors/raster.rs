@@ -15,10 +15,8 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::{
-    scenes::{cross, dot},
-    tracer::{intersect, look_through, scene_of},
-};
+use super::tracer::{intersect, look_through, scene_of};
+use crate::common::scenes::{cross, dot};
 
 /// Nearest front face along a ray from `least` on: `(distance, body)`. Triangles grown (or, negative, shrunk) by
 /// `margin` of their size.
@@ -201,7 +199,7 @@ proptest! {
     #[test]
     fn wants_do_not_change_images(parts in vec(part(), 0..12), view in view()) {
         let mesh = SceneMesh::build(&scene_of(&parts));
-        let mut frames = [None, Some(Style::Outlined), Some(Style::Plain), Some(Style::Default)].map(|rgb| {
+        let mut frames = [None, Some(Style::Plain), Some(Style::Default)].map(|rgb| {
             let mut frame = FrameBuffer::default();
             render_view(&mesh, &view, Want { rgb, instances: true }, &mut frame).unwrap();
             frame

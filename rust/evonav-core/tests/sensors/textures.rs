@@ -18,7 +18,8 @@ use evonav_core::{
 use evonav_simd::Kernel;
 use proptest::{prelude::*, test_runner::Config};
 
-use crate::{scenes::scene_of, tracer::look_through};
+use super::tracer::look_through;
+use crate::common::scenes::scene_of;
 
 fn textures() -> impl Iterator<Item = (MaterialKind, &'static Texture)> {
     let variants = |&kind: &MaterialKind| {
@@ -237,7 +238,7 @@ proptest! {
         prop_assert_eq!(plain.depth_m, textured.depth_m);
         prop_assert_eq!(plain.instances, textured.instances);
         let [plain, textured] =
-            materials.map(|kind| frame_of(board(kind), yaw_rad, Style::Outlined));
+            materials.map(|kind| frame_of(board(kind), yaw_rad, Style::Plain));
         prop_assert_eq!(plain.rgb, textured.rgb);
     }
 }

@@ -8,7 +8,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-use crate::scenes::{self, cross, dot};
+use crate::common::scenes::{self, cross, dot};
 
 /// A scene with a body for each part.
 pub fn scene_of(parts: &[Part]) -> Scene {

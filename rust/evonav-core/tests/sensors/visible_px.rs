@@ -11,7 +11,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::scenes::scene_of;
+use crate::common::scenes::scene_of;
 
 fn part() -> impl Strategy<Value = Part> {
     let half_m = [0.02..0.8_f64, 0.02..0.8_f64, 0.02..0.8_f64];

@@ -38,7 +38,7 @@ fn world_of(json: &str, image_px: [usize; 2]) -> Arc<EmbeddedSimulator> {
         camera_height_m: 1.575,
         agent: AgentBody { radius_m: 0.2, height_m: 1.8 },
         unknown: UnknownAssets::CategoryDefault,
-        style: Style::Outlined,
+        style: Style::Plain,
     };
     let house = House::from_json("house", json).expect("a valid house");
     Arc::new(EmbeddedSimulator::new(house, config).expect("a usable house"))
@@ -149,7 +149,7 @@ impl Lone {
     /// Depth, colours and labels.
     fn images(&self) -> (Vec<f32>, Vec<u8>, Vec<u8>) {
         let mut frame = FrameBuffer::default();
-        let want = Want { rgb: Some(Style::Outlined), instances: true };
+        let want = Want { rgb: Some(Style::Plain), instances: true };
         self.world.render(&self.world.view(&self.pose), want, &mut frame).expect("a valid view");
         let table = labels_of(&self.world);
         let area_px = |id: i32| frame.instances.iter().filter(|&&other| other == id).count();

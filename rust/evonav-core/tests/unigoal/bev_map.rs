@@ -14,7 +14,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 
-use crate::bev_scenes::room_depth;
+use super::bev_scenes::room_depth;
 
 pub const SIDE_PX: usize = 24;
 

@@ -9,7 +9,7 @@ use evonav_core::unigoal::{
     path_planning::{PlanConfig, plan},
 };
 
-use crate::bev_map::{SIDE_PX, camera};
+use super::bev_map::{SIDE_PX, camera};
 
 /// Floor, and a wall square to the view so far away.
 pub fn room_depth(camera: &Camera, wall_m: f32) -> Vec<f32> {

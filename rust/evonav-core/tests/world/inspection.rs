@@ -14,7 +14,7 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 
-use crate::scenes::{cross, dot, scene_of};
+use crate::common::scenes::{cross, dot, scene_of};
 
 /// Corners, face normals and edges of a part that is no ellipsoid.
 fn polytope(part: &Part) -> (Vec<Vec3>, Vec<Vec3>, Vec<Vec3>) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
+use crate::common::recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
 use evonav_core::{geometry::Vec2, world::navigation::AgentBody};
 use serde_json::Value;
 

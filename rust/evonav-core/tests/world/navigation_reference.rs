@@ -7,7 +7,7 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-use crate::recorded::{house_lines, house_of, navigation_of, scene_of};
+use crate::common::recorded::{house_lines, house_of, navigation_of, scene_of};
 use evonav_core::{
     geometry::{Vec2, distance_2d_m},
     grid::GridSpec,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::solids::holds;
+use crate::common::solids::holds;
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,

@@ -12,7 +12,7 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
-use crate::solids::holds;
+use crate::common::solids::holds;
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 

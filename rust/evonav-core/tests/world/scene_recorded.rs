@@ -10,10 +10,8 @@ use evonav_core::{
     world::scene::Scene,
 };
 
-use crate::{
-    recorded::{bundled_lines, data_folder, lines},
-    solids::holds,
-};
+use crate::common::recorded::{bundled_lines, data_folder, lines};
+use crate::common::solids::holds;
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 

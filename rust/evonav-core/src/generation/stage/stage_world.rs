@@ -192,33 +192,26 @@ impl StageWorld {
                 return Ok(Err(GoalRejection::Unreachable));
             };
             let view = View::from(camera);
-            let style = parameters.reference_style;
             // Words for colours come from flat ones, so they are the same whatever the image's style.
             let instance = body as i32 + 1;
-            match style {
-                Style::Outlined => self.draw(&view, style, frame)?,
-                _ => render_rows_of(&self.mesh, &view, instance, frame)?,
-            }
+            render_rows_of(&self.mesh, &view, instance, frame)?;
             let appearance = appearance_of(
                 &self.layout.items[index].asset,
                 self.house.objects[index].condition(),
                 frame,
                 instance,
             );
-            match style {
-                Style::Outlined => {}
-                Style::Plain => self.draw(&view, style, frame)?,
+            match parameters.reference_style {
+                Style::Plain => {
+                    let want = Want { rgb: Some(Style::Plain), instances: false };
+                    render_view(&self.mesh, &view, want, frame)?;
+                }
                 Style::Default => relight(&self.mesh, self.light(), &view, frame),
             }
             let image = std::mem::take(&mut frame.rgb);
             return Ok(Ok(Reference { pose, visible_px, appearance, image, path_m }));
         }
         Ok(Err(GoalRejection::NotVisible))
-    }
-
-    /// Draw flat colours and instances.
-    fn draw(&self, view: &View, style: Style, frame: &mut FrameBuffer) -> Result<(), Error> {
-        render_view(&self.mesh, view, Want { rgb: Some(style), instances: true }, frame)
     }
 
     fn light(&self) -> &Light {

@@ -69,16 +69,16 @@ pub fn render_lit(
     let lens = draw_solid(mesh, view, want, out)?;
     match want.rgb {
         Some(Style::Default) => light_up(mesh, light, view, &lens, out),
-        Some(flat) => {
-            out.shader.shade_flat(flat, &lens, &out.canvas, |_| true, &mut out.rgb);
+        Some(Style::Plain) => {
+            out.shader.shade_flat(false, &lens, &out.canvas, |_| true, &mut out.rgb);
         }
         None => {}
     }
     Ok(())
 }
 
-/// Render one view in [`Style::Outlined`] with instances as [`render_view`], but only the colours
-/// of rows that show an instance; those of other rows stay as they were.
+/// Render one view in [`Style::Plain`] with instances as [`render_view`], with thin lines around
+/// silhouettes, and only the colours of rows that show an instance; those of other rows stay.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`View::check`].
@@ -88,12 +88,12 @@ pub fn render_rows_of(
     instance: i32,
     out: &mut FrameBuffer,
 ) -> Result<(), Error> {
-    let want = Want { rgb: Some(Style::Outlined), instances: true };
+    let want = Want { rgb: Some(Style::Plain), instances: true };
     let lens = draw_solid(mesh, view, want, out)?;
     let FrameBuffer { shader, canvas, instances, rgb, .. } = out;
     let row_of = |row: usize| &instances[row * canvas.width_px..][..canvas.width_px];
     let shows_it = |row: usize| row_of(row).contains(&instance);
-    shader.shade_flat(Style::Outlined, &lens, canvas, shows_it, rgb);
+    shader.shade_flat(true, &lens, canvas, shows_it, rgb);
     Ok(())
 }
 

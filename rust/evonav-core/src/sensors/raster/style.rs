@@ -8,9 +8,7 @@ use crate::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Style {
-    /// Flat colours with dark corners, and thin lines around silhouettes: clear to people.
-    Outlined,
-    /// Colours of [`Self::Outlined`] without the lines, the cheapest.
+    /// Flat colours with dark corners, the cheapest.
     Plain,
     /// Lit surfaces with smooth edges, for detectors and models that know photographs.
     #[default]
@@ -19,13 +17,7 @@ pub enum Style {
 
 impl Style {
     /// All styles with their names.
-    pub const NAMES: [(&str, Self); 3] =
-        [("outlined", Self::Outlined), ("plain", Self::Plain), ("default", Self::Default)];
-
-    /// Return the style of files that were written before there were several.
-    pub const fn of_older_files() -> Self {
-        Self::Outlined
-    }
+    pub const NAMES: [(&str, Self); 2] = [("plain", Self::Plain), ("default", Self::Default)];
 
     /// Return the style of a name.
     ///

@@ -1,4 +1,4 @@
-//! Surfaces of one colour each, with dark corners and, if outlined, lines around silhouettes.
+//! Surfaces of one colour each, with dark corners and, if wanted, lines around silhouettes.
 //!
 //! A face is lit from above and from one side so that the faces of a box differ, and by a lamp at
 //! the camera, so that walls fade with angle.

@@ -29,9 +29,7 @@ pub(super) struct Shader {
 impl Shader {
     pub fn begin(&mut self, style: Style, mesh: &SceneMesh, lens: &Lens, size_px: [usize; 2]) {
         match style {
-            Style::Outlined | Style::Plain => {
-                self.flat.begin(mesh.faces.len(), size_px, lens.optics);
-            }
+            Style::Plain => self.flat.begin(mesh.faces.len(), size_px, lens.optics),
             Style::Default => {}
         }
     }
@@ -40,21 +38,22 @@ impl Shader {
     #[inline]
     pub fn note(&mut self, style: Style, mesh: &SceneMesh, index: usize, facing: f64) {
         match style {
-            Style::Outlined | Style::Plain => self.flat.light(index, &mesh.faces[index], facing),
+            Style::Plain => self.flat.light(index, &mesh.faces[index], facing),
             Style::Default => {}
         }
     }
 
-    /// Fill rows of `rgb` in a flat style from a drawn canvas whose tags are indices of faces plus 1.
+    /// Fill rows of `rgb` in [`Style::Plain`], with lines around silhouettes or without, from a drawn
+    /// canvas whose tags are indices of faces plus 1.
     pub fn shade_flat(
         &mut self,
-        style: Style,
+        has_lines: bool,
         lens: &Lens,
         canvas: &Canvas,
         is_wanted: impl Fn(usize) -> bool,
         rgb: &mut [u8],
     ) {
-        self.flat.shade(canvas, lens.optics, style == Style::Outlined, is_wanted, rgb);
+        self.flat.shade(canvas, lens.optics, has_lines, is_wanted, rgb);
     }
 
     /// Fill `rgb` in [`Style::Default`] from such a canvas.

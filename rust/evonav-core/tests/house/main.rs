@@ -1,5 +1,0 @@
-//! Reading, checking and changing houses.
-
-mod delta;
-mod malformed;
-mod parse;

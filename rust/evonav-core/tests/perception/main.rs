@@ -1,4 +1,0 @@
-//! The small detector and simulated errors.
-
-mod mini;
-mod simulated_errors;

@@ -1,4 +1,0 @@
-//! Batches of simulated agents, and houses in random looks.
-
-mod batch;
-mod random_looks;
