@@ -7,7 +7,7 @@ LOCK := $(shell $(PYTHON) -c "import sys; sys.version_info < (3, 14) and print('
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test coverage fuzz fuzz-rust notice audit test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
+.PHONY: help setup demo test test-slow coverage fuzz fuzz-rust notice audit test-procthor test-models llm test-llm lint format bench wheel data readme docs lock clean
 
 help:  ## list these commands
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -33,13 +33,16 @@ setup: $(VENV)/.built $(VENV)/.dependencies  ## build the package, and install a
 demo: $(VENV)/.built  ## evaluate three agents on the bundled tasks: a table, and a report in out/demo
 	@$(BIN)/evonav demo --out out/demo
 
-PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal
 
 # The same random cases every time; `cargo test` by itself looks for others.
 test: export PROPTEST_RNG_SEED ?= 20261121
-test: setup  ## run every Rust and Python test
+test: setup  ## run the Rust tests, and the Python tests that are not marked slow
 	cargo test --workspace
-	$(PYTEST)
+	$(PYTEST) -m "not slow"
+
+test-slow: setup  ## run the Python tests that are marked slow: kill campaigns, README's numbers, Ray, browsers
+	$(PYTEST) -m slow
 
 # The tracer takes a quarter of a test's time, so CI measures in a job of its own.
 coverage: setup  ## run every Python test, and fail if they cover less than the floor in pyproject.toml

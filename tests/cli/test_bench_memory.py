@@ -31,6 +31,7 @@ def out(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_run_writes_its_files_and_goes_on(out):
     assert {"report.html", "result.json", "summary.md", "memory.json"} <= {path.name for path in out.iterdir()}
     run = bench(*SMALL, "--memory", "never", "--workers", "0", "--in-process", "--out", out)
@@ -53,6 +54,7 @@ def test_what_became_worse_is_listed(out, tmp_path):
     assert "worse: never: bytes_per_entry: " in worse.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["tum", "replica"])
 def test_answers_to_exported_streams_score_as_the_memory_in_process_does(layout, out, tmp_path):
     streams = tmp_path / "streams"
@@ -107,6 +109,7 @@ def test_mistakes_are_told(tmp_path):
     assert "no memory 'nevr'" in str(bench("--memory", "nevr").exception)
 
 
+@pytest.mark.slow
 def test_bad_memories_get_a_verdict_each_and_the_others_go_on(tmp_path):
     verdicts = {
         "Raises": "observe() raises KeyError: 'no such voxel'",
@@ -144,6 +147,7 @@ def recording(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_recordings_give_speed_and_size_only(recording, tmp_path):
     bare = tmp_path / "bare"
     shutil.copytree(recording, bare)

@@ -119,6 +119,7 @@ def test_completion_does_not_slow_the_start():
     assert printed.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_every_help_is_short_plain_and_complete():
     """Flags have no type, brackets are not taken for styles, and each purpose fits on a line."""
     shown = CliRunner().invoke(app, ["-h"], env={"COLUMNS": "80"}).stdout

@@ -191,6 +191,7 @@ def run(folder: Path, num_workers: int, noise: dict[str, float]) -> list[StageRe
         return [StageRecord.model_validate_json(text) for text in store.record_texts()]
 
 
+@pytest.mark.slow
 def test_a_run_counts_confusions_for_any_number_of_workers(tmp_path: Path) -> None:
     noise = {"confused": 0.5, "wrong": 0.1}
     here = run(tmp_path / "here", 0, noise)

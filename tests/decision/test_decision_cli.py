@@ -35,6 +35,7 @@ def prices(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     tmp_path: Path, prices: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,6 +121,7 @@ def test_options_that_make_no_sense_are_told(
     assert not (tmp_path / "out" / "records.sqlite").exists()
 
 
+@pytest.mark.slow
 def test_a_spent_budget_is_told_with_what_to_do(tmp_path: Path) -> None:
     prices = tmp_path / "prices.json"
     prices.write_text('{"m": {"input_usd": 1.0, "output_usd": 10.0}}')
@@ -135,6 +137,7 @@ def test_a_spent_budget_is_told_with_what_to_do(tmp_path: Path) -> None:
     assert "name a file of prices with --prices" in printed
 
 
+@pytest.mark.slow
 def test_recording_wants_a_new_file(tmp_path: Path) -> None:
     common = ("evaluate", *COMMON, "--decision", "vlm", "--model", "m", "--set", "decision.mode=record")
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
@@ -160,6 +163,7 @@ def _only_task(run_dir: Path) -> str:
     return task_id
 
 
+@pytest.mark.slow
 def test_a_model_is_told_of_changes_in_all_prompts_or_in_none(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with serving(lambda request: {"text": mock_answer(request)}) as stub:

@@ -69,6 +69,7 @@ def test_one_limit_for_all_processes(tmp_path: Path) -> None:
     assert spent.set_aside_usd == pytest.approx(0.6)
 
 
+@pytest.mark.slow
 def test_a_run_of_several_processes_stops_at_its_limit(tmp_path: Path) -> None:
     """A question sets 0.01 $ aside and costs 0.004 $; two workers may ask for 0.03 $ in all."""
     with bundled_tasks() as directory, serving(lambda request: {"text": mock_answer(request)}) as stub:

@@ -148,6 +148,7 @@ def record_texts(folder: Path, decision: Component[Any], num_workers: int) -> li
         return list(store.record_texts())
 
 
+@pytest.mark.slow
 def test_whole_stages_go_by_the_picture_alone_for_any_number_of_workers(tmp_path: Path) -> None:
     Recorder.asked.clear()
     path = f"{__name__}:Recorder"

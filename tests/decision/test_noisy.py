@@ -145,6 +145,7 @@ def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:
         return list(store.record_texts())
 
 
+@pytest.mark.slow
 def test_a_noisy_run_is_the_same_for_any_number_of_workers(tmp_path: Path) -> None:
     here = noisy_run(tmp_path / "here", 0)
     assert noisy_run(tmp_path / "workers", 2) == here

@@ -127,6 +127,7 @@ def test_models_are_loaded_once_and_only_to_be_asked(tmp_path: Path) -> None:
     assert Heavy.num_made == 1
 
 
+@pytest.mark.slow
 def test_the_example_runs_and_replays_without_its_model(tmp_path: Path) -> None:
     """As docs/decision.md tells a user to; the replay finds no picture to look at."""
     command = [sys.executable, "-m", "evonav", "evaluate", "--decision", "own_vlm:OwnVlm", "--agent", "fu"]

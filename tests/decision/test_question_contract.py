@@ -64,6 +64,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Ques
     return ASKED
 
 
+@pytest.mark.slow
 def test_all_agents_ask(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
     assert {"choose", "prefilter", "choose_snapshot", "subgraph", "graph", "goal-objects", "category"} <= set(asked)
 

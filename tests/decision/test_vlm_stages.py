@@ -89,6 +89,7 @@ def words_of(request: dict[str, Any]) -> list[str]:
     return [part["text"] for part in request["messages"][-1]["content"] if part["type"] == "text"]
 
 
+@pytest.mark.slow
 def test_whole_stages_ask_what_the_api_takes_with_images_that_can_be_seen(run: Run, tmp_path: Path) -> None:
     run.max_rounds, run.num_stages = 12, 2
     with serving(answers) as stub:
@@ -251,6 +252,7 @@ def changing() -> Callable[[dict[str, Any]], MockReply]:
     return faulty({"off_topic": 0.2, "refusal": 0.1, "malformed": 0.1, "empty": 0.1}, seed=3)
 
 
+@pytest.mark.slow
 def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(run: Run) -> None:
     run.max_rounds, run.num_stages = 3, 2
     with serving(changing()) as stub:
@@ -276,6 +278,7 @@ def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_pa
         assert stub.requests == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agent", ["3d-mem", "msgnav", "unigoal", "evonav_studies.variants:UniGoalAsPublished"])
 def test_every_agent_asks_what_the_api_takes_and_goes_on_after_bad_answers(run: Run, agent: str) -> None:
     """With rules that follow every grammar nothing is invalid; with a bad model all is counted, and replayed."""

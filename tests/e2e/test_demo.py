@@ -59,6 +59,7 @@ def test_one_worker_leaves_the_same_bytes_as_two(demo: Path, tmp_path: Path) -> 
     assert again == {key: before[key] for key in again}
 
 
+@pytest.mark.slow
 def test_readme_code_runs(tmp_path: Path) -> None:
     blocks = re.findall(r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks

@@ -33,6 +33,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_of_an_agent_outlives_the_run(tmp_path, kill):
     write_tasks(tmp_path / "tasks")

@@ -93,6 +93,7 @@ def run_dir(tasks, tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agent", [*CONTAINED, *LOST, "unruly_agents:Hungry"])
 def test_a_failure_costs_its_stage_alone(run_dir, agent):
     kind, message = (CONTAINED | LOST).get(agent, (ErrorKind.AGENT, "MemoryError"))
@@ -167,6 +168,7 @@ def built_in_runs(tmp_path_factory):
     return own, shared
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agent", BUILT_IN)
 def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
     with RunStore(built_in_runs[0]) as own, RunStore(built_in_runs[1]) as shared:
@@ -210,6 +212,7 @@ def test_a_process_that_does_not_start_is_a_crash(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):
     """A stage after a loss was run without memory: it is not kept when the lost stage is tried again."""
     monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
@@ -228,6 +231,7 @@ def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):
     assert [(record.failed_before, record.memory_lost_at) for record in stages] == [((), None)] * 3
 
 
+@pytest.mark.slow
 def test_a_resumed_run_repeats_its_failures(tasks, tmp_path):
     """An episode that is not finished runs again with its errored stage, which is not recorded twice."""
     config = RunConfig(backend=TOY, protocol=SHORT)

@@ -3,9 +3,12 @@
 import importlib
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_a_round_is_measured_with_any_number_of_views(monkeypatch):
     monkeypatch.syspath_prepend(ROOT)
     bench = importlib.import_module("benches.agent_process")

@@ -97,6 +97,7 @@ def test_importing_is_quick():
     assert printed.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
     pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
     monkeypatch.setenv("HOME", str(tmp_path))

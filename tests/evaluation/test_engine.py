@@ -47,6 +47,7 @@ def records(run_dir, agent):
         return list(store.records(agent))
 
 
+@pytest.mark.slow
 def test_records_are_the_same_for_any_number_of_workers(tasks, tmp_path):
     agents = ["random-walk", "nearest-frontier", "toy_agents:Idle"]
     for workers in (0, 2):
@@ -70,6 +71,7 @@ def test_the_floor_plan_of_a_stage_is_made_once_for_all_agents(tasks, tmp_path, 
         assert sorted(made) == sorted(store.floor_plan_keys()) == [(t.task_id, k) for t in tasks for k in (1, 2, 3)]
 
 
+@pytest.mark.slow
 def test_real_records_are_the_same_for_one_and_two_workers(tmp_path):
     """The same on the embedded simulator with bundled houses: threads, caches and order leave no trace."""
     with bundled_tasks() as directory:
@@ -127,6 +129,7 @@ def test_an_agents_fault_costs_its_stage_alone(tasks, tmp_path, agent, message):
         assert [record.memory_lost_at for record in stages] == [None] * 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("agent", "kind", "message"),
     [
@@ -184,6 +187,7 @@ def test_agents_can_join_a_run(tasks, tmp_path):
     assert len(content["paired_differences"]) == 1
 
 
+@pytest.mark.slow
 def test_errored_stages_run_again_when_asked(tasks, tmp_path, monkeypatch):
     alive = tmp_path / "alive"
     monkeypatch.setenv("TOY_ALIVE", str(alive))
@@ -289,6 +293,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
 def test_a_run_that_was_ended_can_be_resumed(tasks, tmp_path, kill):
     agents = ["random-walk", "nearest-frontier"]

@@ -55,6 +55,7 @@ def check(found, messages, kind=ErrorKind.AGENT):
         assert record.memory_lost_at is None
 
 
+@pytest.mark.slow
 def test_what_an_agent_says_costs_its_stage_alone(tmp_path, num_workers):
     messages = [message for *_, message in STAGES]
     found = evaluate_long("Saying", len(STAGES), tmp_path, num_workers)
@@ -69,6 +70,7 @@ def test_what_an_agent_says_costs_its_stage_alone(tmp_path, num_workers):
     assert "<script>alert(1)" not in page
 
 
+@pytest.mark.slow
 def test_what_an_agent_raises_costs_its_stage_alone(tmp_path, num_workers):
     found = evaluate_long("Raising", len(ERRORS) + 1, tmp_path, num_workers)
     # `str` that exits ends no process either: a description of the error is not the agent's to refuse.
@@ -77,6 +79,7 @@ def test_what_an_agent_raises_costs_its_stage_alone(tmp_path, num_workers):
         assert all(len(failure.traceback) <= 20_000 for failure in store.failures())
 
 
+@pytest.mark.slow
 def test_an_agent_that_exits_ends_its_stage_and_not_the_run(tmp_path, num_workers):
     found = evaluate_long("Ending", len(ENDS) + 1, tmp_path, num_workers)
     kind = ErrorKind.CRASH if num_workers else ErrorKind.AGENT
@@ -84,6 +87,7 @@ def test_an_agent_that_exits_ends_its_stage_and_not_the_run(tmp_path, num_worker
     assert found[-1].is_scored
 
 
+@pytest.mark.slow
 def test_an_agent_in_its_own_process_cannot_forge_answers(tmp_path):
     found = evaluate_long("Forging", len(RAW) + 1, tmp_path, 1)
     check(found, [message for *_, message in RAW])
@@ -92,6 +96,7 @@ def test_an_agent_in_its_own_process_cannot_forge_answers(tmp_path):
             assert all(isinstance(value, int | float) and abs(value) < 1e15 for value in costs.values())
 
 
+@pytest.mark.slow
 def test_all_rounds_of_a_stage_together_are_bounded(tmp_path, num_workers):
     found = evaluate_long("Talkative", 2, tmp_path, num_workers, ProtocolConfig(max_rounds=40))
     check(found, ["bytes of JSON in a stage: must be at most 32000000"])

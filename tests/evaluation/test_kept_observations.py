@@ -31,6 +31,7 @@ HOSTINGS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hosting", HOSTINGS)
 def test_an_agent_may_keep_and_change_all_that_it_is_shown(tmp_path, hosting):
     """It fails if what it keeps changes, and would act otherwise if it were shown what it has written."""

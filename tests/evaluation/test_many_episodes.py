@@ -57,6 +57,7 @@ def faulty_reply(request):
     return {**reply, "hang_s": 0.05}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["bundled", "toy"])
 def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monkeypatch, backend):
     """Bundled tasks ask much and with images; toy ones are many, and all ask the same at once."""
@@ -113,6 +114,7 @@ def test_episodes_share_a_task_unless_their_agents_could_change_it(isolation):
         assert known() is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "kind", "num_retries"),
     [("exit", ErrorKind.CRASH, 0), ("exit", ErrorKind.CRASH, 1), ("hang", ErrorKind.TIMEOUT, 0)],
@@ -137,6 +139,7 @@ def test_an_episode_that_ends_its_worker_is_errored_and_no_other(tmp_path, how, 
     assert len(records) == 15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("agent", ["toy_agents:Dying", "toy_agents:Raising", "toy_agents:Hanging"])
 def test_an_agent_that_fails_costs_its_own_stages(tmp_path, agent):
     tasks = many_tasks(tmp_path / "tasks", 2)
@@ -149,6 +152,7 @@ def test_an_agent_that_fails_costs_its_own_stages(tmp_path, agent):
         assert {record.agent for record in store.records() if record.error is not None} == {agent}
 
 
+@pytest.mark.slow
 def test_cells_with_more_configurations_than_a_worker_keeps_share_it(tmp_path):
     tasks = tuple(many_tasks(tmp_path / "tasks", 2))
     requests = [
@@ -210,6 +214,7 @@ def waited_for(condition, timeout_s=60.0):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
 def test_an_interrupt_ends_all_and_the_run_is_resumed(tmp_path):
     tasks = many_tasks(tmp_path / "tasks", 8)
@@ -227,6 +232,7 @@ def test_an_interrupt_ends_all_and_the_run_is_resumed(tmp_path):
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
 def test_a_killed_driver_leaves_no_process_and_a_second_one_does_not_disturb_it(tmp_path):
     tasks = many_tasks(tmp_path / "tasks", 8)
@@ -246,6 +252,7 @@ def test_a_killed_driver_leaves_no_process_and_a_second_one_does_not_disturb_it(
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
 def test_an_episode_that_waits_needs_little_memory(tmp_path):
     """Proportional set sizes of all processes of a run: with ten more episodes that wait, a tenth of the difference."""

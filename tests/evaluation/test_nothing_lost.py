@@ -65,6 +65,7 @@ def faults(tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "journal", "step"),
     [
@@ -104,6 +105,7 @@ def test_nothing_is_lost_at_any_call_that_changes_the_folder(faults, tmp_path, h
     assert max(one["told"] for one in attempts) >= 2
 
 
+@pytest.mark.slow
 def test_a_loss_of_power_loses_no_stage(faults, tmp_path):
     """After every change of the folder, with all that was not synced lost, or a random half of it."""
     write_tasks(tmp_path / "tasks")
@@ -181,6 +183,7 @@ MANY_AT_ONCE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_once", [1, 4])
 def test_a_wall_clock_that_jumps_changes_nothing(tmp_path, at_once):
     """By up to a day, forwards or backwards, whenever a driver, worker or agent reads it."""
@@ -203,6 +206,7 @@ def resident_mb(pid):
     return int(fields["VmRSS"].split()[0]) / 1024.0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs /proc")
 def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
     """Of the driver (a script without `if __name__ == "__main__"`), its workers and the agents, over 210 stages."""
@@ -252,6 +256,7 @@ def small_disk(tmp_path):
         subprocess.run(["umount", str(small)], check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [HERE_ALONE, MANY_AT_ONCE])
 def test_a_full_disk_is_one_clear_error(small_disk, tmp_path, workers):
     small, remount = small_disk
@@ -266,6 +271,7 @@ def test_a_full_disk_is_one_clear_error(small_disk, tmp_path, workers):
     assert texts(small / "run") == texts(tmp_path / "whole")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [HERE_ALONE, MANY_AT_ONCE])
 def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_path, workers):
     small, remount = small_disk

@@ -50,6 +50,7 @@ def test_the_example_is_short_and_keeps_the_contract():
     assert "│ fail │" not in done.stdout
 
 
+@pytest.mark.slow
 def test_the_example_is_better_than_chance(tmp_path):
     done = evonav("evaluate", "--agent", OWN, "--agent", "random-walk", "--limit", 6, "--workers", 2, "--out", tmp_path)
     assert done.returncode == 0, done.stderr
@@ -103,6 +104,7 @@ print(*(f"{name}={type(new_agent(agent_factory(name))).__name__}" for name in fo
     assert not results(tmp_path)["ftu-early-stop"]["is_incomplete"]
 
 
+@pytest.mark.slow
 def test_an_agent_of_a_package_has_a_name(installed):
     listed = evonav("agents", PYTHONPATH=str(installed)).stdout
     assert "plug-in: asking_agent.agent:AskingAgent" in listed
@@ -124,6 +126,7 @@ class Contrary:
 """
 
 
+@pytest.mark.slow
 def test_its_questions_reach_a_model_of_ones_own(installed, tmp_path):
     (tmp_path / "contrary_model.py").write_text(MODEL)
     path = f"{installed}{os.pathsep}{tmp_path}"

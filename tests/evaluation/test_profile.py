@@ -91,6 +91,7 @@ def evaluate(out: Path, *options: str) -> str:
     return done.output
 
 
+@pytest.mark.slow
 def test_a_run_has_a_flame_graph_and_the_same_records(tmp_path: Path) -> None:
     output = evaluate(tmp_path / "a", "--profile")
     assert "CPU ms a stage by component" in output

@@ -91,6 +91,7 @@ def test_the_heading_view_is_the_last_one_seen(recorded):
         assert shares[-1] < SAME
 
 
+@pytest.mark.slow
 def test_a_crop_shows_the_object_and_a_view_is_where_it_was_last_seen(recorded):
     _, recorder = recorded
     num = 0

@@ -91,6 +91,7 @@ def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
     assert found["write beside"] == 1
 
 
+@pytest.mark.slow
 @NEEDS_SANDBOX
 def test_agents_do_the_same_in_a_sandbox(tmp_path):
     agents = ["fu", "random-walk", "msgnav"]
@@ -109,6 +110,7 @@ def test_agents_do_the_same_in_a_sandbox(tmp_path):
     assert "sandbox (Landlock" in write_report(tmp_path / "shut").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @NEEDS_SANDBOX
 def test_failures_are_contained_as_without_a_sandbox(tmp_path):
     write_tasks(tmp_path / "tasks")

@@ -51,6 +51,7 @@ def contents(path: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 @NEEDS_SANDBOX
 def test_a_model_is_asked_for_an_agent_in_a_sandbox_as_for_any_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -75,6 +76,7 @@ def test_a_model_is_asked_for_an_agent_in_a_sandbox_as_for_any_other(
         assert list(store.record_texts()) == found["process"][0]
 
 
+@pytest.mark.slow
 @NEEDS_SANDBOX
 def test_an_agent_reaches_the_model_and_nothing_else_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)

@@ -87,6 +87,7 @@ def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):
     assert not (tmp_path / "elsewhere" / "starts").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_workers", [0, 1])
 def test_episodes_of_a_worker_share_a_simulator(tmp_path, num_workers):
     write_tasks(tmp_path / "tasks")

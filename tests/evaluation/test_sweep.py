@@ -83,6 +83,7 @@ def small(file, out, *more):
     return run("sweep", file, *(word for change in changes for word in ("--set", change)), "--out", out, *more)
 
 
+@pytest.mark.slow
 def test_a_sweep_that_was_interrupted_goes_on_to_the_same_records(whole, file, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "evonav", "sweep", str(file), "--out", str(out), "--workers", "2"]
@@ -211,6 +212,7 @@ def test_an_errored_stage_makes_a_sweep_incomplete(file, tmp_path):
     assert "--retry-errored" in done.output
 
 
+@pytest.mark.slow
 def test_money_is_held_together_over_all_cells(file, tmp_path, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     prices = tmp_path / "prices.json"

@@ -60,6 +60,7 @@ def runs(tmp_path_factory):
     return folders
 
 
+@pytest.mark.slow
 def test_an_agent_in_its_own_process_finds_no_task_of_its_name(runs):
     known = {name for task_id in candidates() for name in names_of(task_id)}
     for folder in runs:

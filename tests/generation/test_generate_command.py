@@ -115,6 +115,7 @@ def test_an_interrupt_says_how_to_go_on(more_houses, tmp_path, signal_):
     assert num_lines(out) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most_bytes", [100, 6_000])
 def test_a_full_disk_is_one_clear_error_and_loses_nothing(house_file, clean_folder, tmp_path, most_bytes):
     def fill():  # no file may be longer

@@ -48,6 +48,7 @@ def test_what_a_run_leaves(house_file, clean_folder):
         assert load_task(clean_folder / entry.task_id).header.parameters == OPTIONS.parameters
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_workers", [1, 2, 4])
 def test_the_same_for_any_number_of_workers(house_file, clean_folder, tmp_path, num_workers):
     generate_dataset(house_file, tmp_path, options=OPTIONS, workforce=local(num_workers))
@@ -77,6 +78,7 @@ class InterruptError(Exception):
     """Stands for Ctrl-C."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_workers", [0, 2])
 def test_a_run_interrupted_after_every_house_ends_as_one_that_was_not(house_file, clean_folder, tmp_path, num_workers):
     for num_done in range(1, 10, 1 if num_workers == 0 else 4):
@@ -183,6 +185,7 @@ def test_a_damaged_journal_is_told_by_line(house_file, clean_folder, tmp_path, n
         assert_same(out, clean_folder)
 
 
+@pytest.mark.slow
 def test_a_house_that_fails_costs_itself_alone(house_file, clean_folder, tmp_path, faults):
     faults(_0="raise", _3="die", _6="hang")
     summary = generate_dataset(house_file, tmp_path, options=OPTIONS, workforce=local(2), house_timeout_s=4.0)

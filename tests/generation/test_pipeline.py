@@ -143,6 +143,7 @@ def test_instructions_follow_the_grammar_and_are_true(tasks: list[Task]) -> None
     assert num_looks > 40
 
 
+@pytest.mark.slow
 def test_transitions_and_modes_are_drawn_as_the_paper_says(houses: list[House]) -> None:
     """About 500 transitions: 50% evolve; of these 50/40/10% by mode; bounds of three standard deviations and more."""
     outcomes: Counter[str] = Counter()

@@ -69,6 +69,7 @@ def records() -> list[Record]:
     return found
 
 
+@pytest.mark.slow
 def test_the_core_writes_every_record(records: list[Record]) -> None:
     assert {type(record) for record in records} == set(models_in(GenerationResult))
 

@@ -39,6 +39,7 @@ def shuffled() -> Task:
     return generate_task(next(iter(bundled_houses(1))), seed=1, config=parameters(2))
 
 
+@pytest.mark.slow
 def test_bundled_tasks_are_possible() -> None:
     with as_file(files("evonav") / "data" / "tasks") as folder:
         found = [problem for task in load_tasks(folder) for problem in problems_of(task)]
@@ -98,6 +99,7 @@ def moved_roots(task: Task, stage: int) -> list[str]:
     return [change.id for change in changes if change.from_support_id is None and change.to_support_id is None]
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_found(shuffled: Task) -> None:
     """Each of the faults that the tests above say there are none of, made by hand."""
     task, stage = shuffled, 2

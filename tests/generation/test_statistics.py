@@ -218,6 +218,7 @@ def test_what_is_wrong_is_named(folder: Path, tmp_path: Path) -> None:
         check_plot(Path("plot.bmp"))
 
 
+@pytest.mark.slow
 def test_the_page_nests_and_the_plots_are_xml(found: TaskStatistics, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="evonav[viz] is not installed")
     page = write_dataset_report(found, tmp_path)
@@ -256,6 +257,7 @@ def test_without_matplotlib_the_extra_is_named(
     assert not (tmp_path / "statistics.svg").exists()
 
 
+@pytest.mark.slow
 def test_the_command_prints_eighty_columns_and_writes_the_page(folder: Path, tmp_path: Path) -> None:
     arguments = ["tasks", "stats", str(folder), "--reweight", "procthor-10k", "--out", str(tmp_path / "out")]
     done = CliRunner().invoke(app, [*arguments, "--workers", "1"], catch_exceptions=False)

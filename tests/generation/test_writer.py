@@ -300,6 +300,7 @@ def test_marks_around_an_answer_go() -> None:
         assert prompts.cleaned(answer) == "Find it."
 
 
+@pytest.mark.slow
 def test_the_command(stub: Stub, folder: Path, tmp_path: Path) -> None:
     prices = tmp_path / "prices.json"
     prices.write_text('{"gpt-4o": {"input_usd": 2.5, "output_usd": 10}}')

@@ -48,6 +48,7 @@ def violations(module: str, text: str) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 def test_no_string_names_a_module_of_a_higher_layer() -> None:
     found = []
     for path in sorted(PACKAGE.rglob("*.py")):

@@ -26,6 +26,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
+@pytest.mark.slow
 def test_wheel_is_abi3_and_holds_types_and_data(wheel: Path) -> None:
     assert "-cp310-abi3-" in wheel.name
     assert wheel.stat().st_size < MAX_WHEEL_BYTES

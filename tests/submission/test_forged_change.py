@@ -59,6 +59,7 @@ def records_of(run: Path) -> dict[tuple[str, str, int], str]:
         }
 
 
+@pytest.mark.slow
 def test_records_do_not_depend_on_workers_or_episodes_at_once(run: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
     evaluate(AGENTS, tasks, tmp_path / "many", num_workers=2, episodes_at_once=2)
     found = records_of(run)

@@ -39,6 +39,7 @@ def assert_accepted(run: Path, tasks: list[TaskFile], **options: Any) -> None:
         assert [check.name for check in verdict.checks][-1] == ("scores" if scores_only else "actions")
 
 
+@pytest.mark.slow
 def test_several_agents_of_a_seed_of_its_own(tasks: list[TaskFile], tmp_path: Path) -> None:
     agents = ["stage-reset", "msgnav", "unigoal", "3d-mem"]
     evaluate(agents, tasks[:1], tmp_path / "run", config=RunConfig(seed=5), num_workers=0)
@@ -51,6 +52,7 @@ def test_a_prefix_and_a_superset_of_what_is_required(tasks: list[TaskFile], tmp_
     assert_accepted(tmp_path / "run", tasks, limit=1)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_of_several_workers(tasks: list[TaskFile], tmp_path: Path) -> None:
     evaluate(["fu"], tasks[:2], tmp_path / "run", num_workers=0)
     with RunStore(tmp_path / "run") as store:
