@@ -40,7 +40,7 @@ PARSED_ONLY = {
     "evonav demo": "what `make demo` does; tests/e2e",
     "evonav doctor": "depends on the machine; tests of its own",
     "evonav houses fetch": "network",
-    "evonav sweep": "minutes: tests/evaluation/test_sweep.py runs these files, smaller",
+    "evonav sweep": "minutes: tests/sweeps/test_sweep.py runs these files, smaller",
     "--houses procthor-10k": "needs what the network brings",
     "evonav-10k": "minutes: tests/house/test_evonav10k.py makes smaller sets",
     "test-90": "needs a whole dataset",

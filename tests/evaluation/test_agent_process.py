@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from short_tasks import short_tasks
-from test_engine import CONFIG, TOY, records, texts
+from test_run import CONFIG, TOY, records, texts
 from toy_house import write_tasks
 
 from evonav.agents.registry import BUILT_IN

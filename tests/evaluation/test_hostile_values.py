@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from hostile_values import ENDS, ERRORS, RAW, STAGES
-from test_engine import TOY, records, texts
+from test_run import TOY, records, texts
 from toy_house import write_tasks
 
 from evonav.agents.hosting import wire

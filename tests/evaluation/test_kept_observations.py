@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from short_tasks import short_tasks
 from test_agent_process import acted, view
-from test_engine import texts
+from test_run import texts
 from test_sandbox import NEEDS_SANDBOX
 
 from evonav.agents.hosting.shared_slots import NUM_SLOTS

@@ -17,8 +17,8 @@ from chaos import num_recorded
 from processes import children
 from short_tasks import short_tasks
 from test_agent_end import is_running
-from test_engine import TOY, texts
 from test_nothing_lost import many_tasks
+from test_run import TOY, texts
 
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer

@@ -13,7 +13,7 @@ import pytest
 from chaos import disturb, num_recorded, texts
 from power_loss import Disk, read_log
 from processes import children
-from test_engine import CONFIG
+from test_run import CONFIG
 from toy_house import EPISODES, write_tasks
 from typer.testing import CliRunner
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from short_tasks import short_tasks
 from test_agent_end import have_ended
-from test_engine import TOY, records, texts
+from test_run import TOY, records, texts
 from toy_house import write_tasks
 
 from evonav.agents.hosting import sandbox

@@ -1,7 +1,7 @@
 """A simulator's process that is lost costs time, not results."""
 
 import pytest
-from test_engine import CONFIG, records, texts
+from test_run import CONFIG, records, texts
 from toy_house import write_tasks
 
 from evonav.component import Component

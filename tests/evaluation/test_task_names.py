@@ -7,7 +7,7 @@ from collections import defaultdict
 import pytest
 from regenerating_agent import candidates, names_of, task_named
 from short_tasks import short_tasks
-from test_engine import TOY, records, texts
+from test_run import TOY, records, texts
 from toy_house import write_tasks
 
 import evonav

@@ -5,7 +5,7 @@ import tempfile
 from dataclasses import replace
 
 import pytest
-from test_engine import TOY
+from test_run import TOY
 from toy_house import write_tasks
 
 from evonav.agents.hosting import sandbox

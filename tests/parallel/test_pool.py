@@ -8,7 +8,7 @@ import time
 
 import pytest
 from processes import children
-from test_engine import CONFIG, texts
+from test_run import CONFIG, texts
 from toy_house import write_tasks
 
 from evonav.component import Component

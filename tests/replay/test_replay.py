@@ -33,7 +33,7 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import write_task
 from evonav.tasks.listing import task_files
 
-TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("test_trace:colour_simulator"))
+TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("test_replay:colour_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
 
 
@@ -220,7 +220,7 @@ def test_maps_and_questions_are_those_of_the_round(fu_stages):
 
 
 def test_an_agent_that_is_not_deterministic_is_found_out(tmp_path):
-    stages = replay_of(run_of(tmp_path, "test_trace:Fickle"), "test_trace:Fickle")
+    stages = replay_of(run_of(tmp_path, "test_replay:Fickle"), "test_replay:Fickle")
     assert stages[0].is_replayed
     assert any(difference.startswith("num_rounds: ") for difference in stages[0].differences)
     assert len(stages[0].rounds) == stages[0].record.num_rounds
@@ -236,7 +236,7 @@ def test_a_changed_record_is_told_with_field_and_values(own_fu_run):
 
 
 def test_a_stage_that_errored_has_the_round_in_which_it_did(tmp_path):
-    stages = replay_of(run_of(tmp_path, "test_trace:Failing"), "test_trace:Failing")
+    stages = replay_of(run_of(tmp_path, "test_replay:Failing"), "test_replay:Failing")
     assert [stage.record.state for stage in stages][1] is EndState.ERRORED
     assert all(stage.differences == () for stage in stages)
     last = stages[1].rounds[-1]
@@ -247,7 +247,7 @@ def test_a_stage_that_errored_has_the_round_in_which_it_did(tmp_path):
 
 @pytest.mark.parametrize("num_rounds", [0, 1])
 def test_the_loss_of_an_agents_process_is_repeated_without_asking_it(tmp_path, num_rounds):
-    agent = "test_trace:Deadly"
+    agent = "test_replay:Deadly"
     run_dir = run_of(tmp_path, agent)
 
     def lose(record):
@@ -297,7 +297,7 @@ def test_what_cannot_be_run_again_is_shown_as_recorded(own_fu_run):
 
 
 def test_an_agent_that_cannot_tell_its_belief_costs_nothing_but_that(tmp_path):
-    stages = replay_of(run_of(tmp_path, "test_trace:Reticent"), "test_trace:Reticent")
+    stages = replay_of(run_of(tmp_path, "test_replay:Reticent"), "test_replay:Reticent")
     assert all(stage.differences == () for stage in stages)
     step = stages[0].rounds[0]
     assert (step.map, step.entries) == (None, ())
