@@ -1,6 +1,6 @@
 """Score recorded actions again: executed again, they must give the same records, byte for byte.
 
-No agent runs. A stand-in answers with the recorded actions, diagnostics and entries. The evaluator computes poses,
+No agent runs. A stand-in answers with the recorded actions and explanations. The evaluator computes poses,
 paths, visibility, staleness, distances, SPL and success again.
 """
 
@@ -18,7 +18,7 @@ from evonav.agents.agent import (
     SensorConfig,
     Stop,
 )
-from evonav.agents.explanation import RoundDiagnostics
+from evonav.agents.explanation import Explanation
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
@@ -70,12 +70,15 @@ class RecordedAgent:
 
 
 class ExplainingRecordedAgent(RecordedAgent):
-    """Answer also with the recorded diagnostics and entries."""
+    """Answer also with the recorded explanation."""
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the recorded diagnostics of the round."""
+    def explain(self) -> Explanation:
+        """Return the recorded explanation of the round, with the entries at the stage's end."""
+        if self._num_acted == 0:
+            return Explanation(objects=self._entries)
         recorded = self._here.trace[self._num_acted - 1]
-        return RoundDiagnostics(
+        return Explanation(
+            objects=self._entries,
             choice=recorded.choice,
             chosen_entry=None if recorded.chosen_entry is None else _belief_of(recorded.chosen_entry),
             num_entries=recorded.num_entries,
@@ -84,8 +87,7 @@ class ExplainingRecordedAgent(RecordedAgent):
             details=recorded.details,
         )
 
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the recorded entries at the end."""
+    def _entries(self) -> Sequence[EntryBelief]:
         return [_belief_of(entry) for entry in self._here.entries]
 
 
