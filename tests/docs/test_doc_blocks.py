@@ -53,6 +53,7 @@ PARSED_ONLY = {
     "--open": "opens a browser",
     "--assets": "a file of sizes that is not here: tests/house",
     "delay=": "waits",
+    "--isolation sandbox": "needs workers, and Linux: tests/agents",
 }
 """Commands with these words are not run here, only parsed."""
 STUDIES = Path("docs/studies")
