@@ -146,9 +146,8 @@ def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:
 
 
 @pytest.mark.slow
-def test_a_noisy_run_is_the_same_for_any_number_of_workers(tmp_path: Path) -> None:
+def test_a_noisy_run_counts_mistakes_and_follows_its_seed(tmp_path: Path) -> None:
     here = noisy_run(tmp_path / "here", 0)
-    assert noisy_run(tmp_path / "workers", 2) == here
     counted = Counter[str]()
     for text in here:
         record = StageRecord.model_validate_json(text)

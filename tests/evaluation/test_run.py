@@ -9,7 +9,6 @@ import time
 from itertools import pairwise
 
 import pytest
-from short_tasks import short_tasks
 from toy_house import write_tasks
 
 from evonav.component import Component
@@ -24,7 +23,6 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.parallel.folders import writing
 from evonav.report.run import load_run
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
 TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator"))
@@ -69,18 +67,6 @@ def test_the_floor_plan_of_a_stage_is_made_once_for_all_agents(tasks, tmp_path, 
         evaluate(["random-walk", "nearest-frontier", "stay-still"], tasks, tmp_path, config=CONFIG, num_workers=0)
     with RunStore(tmp_path) as store:
         assert sorted(made) == sorted(store.floor_plan_keys()) == [(t.task_id, k) for t in tasks for k in (1, 2, 3)]
-
-
-@pytest.mark.slow
-def test_real_records_are_the_same_for_one_and_two_workers(tmp_path):
-    """The same on the embedded simulator with bundled houses: threads, caches and order leave no trace."""
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, 2, limit=2)
-        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=6))
-        for workers in (1, 2):
-            evaluate(["ftu", "stage-reset"], tasks, tmp_path / str(workers), config=config, num_workers=workers)
-    assert texts(tmp_path / "1") == texts(tmp_path / "2")
-    assert (tmp_path / "1" / "summary.json").read_bytes() == (tmp_path / "2" / "summary.json").read_bytes()
 
 
 def test_seeds_make_a_difference(tasks, tmp_path):

@@ -49,11 +49,13 @@ def run_here(folder: Path, parts: dict[str, Any], settings: dict[str, Any]) -> N
         evonav.evaluate(*agents, **parts, **options)
         return
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
-        parts["decision"] |= {"base_url": stub.url, "exchanges": folder.parent / "exchanges"}
+        parts["decision"] |= {"base_url": stub.url, "exchanges": str(folder.parent / "exchanges")}
         evonav.evaluate(*agents, **parts, **options)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=() if kind == "text" else pytest.mark.slow) for kind in KINDS]
+)
 def test_records_do_not_depend_on_workers_episodes_at_once_or_isolation(
     kind: str, run: Callable[..., list[Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
