@@ -49,7 +49,7 @@ def test_the_store_keeps_the_text_of_the_worker(tmp_path, monkeypatch):
     assert json.loads(stage.record)["path_length_m"] == 3.0
     assert '"path_length_m":3.0' in stage.record  # as a validated record is written
     received = EVENT.validate_json(EVENT.dump_json(stage))
-    for name in ("model_validate", "model_validate_json", "to_json"):
+    for name in ("model_validate", "model_validate_json", "model_dump_json"):
         monkeypatch.setattr(StageRecord, name, None)
     with RunStore(tmp_path, create=True) as store:
         store.add_stage(received)
