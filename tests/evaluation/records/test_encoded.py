@@ -54,4 +54,4 @@ def test_the_store_keeps_the_text_of_the_worker(tmp_path, monkeypatch):
     with RunStore(tmp_path, create=True) as store:
         store.add_stage(received)
         assert list(store.record_texts()) == [stage.record]
-        assert [text for _, _, text in store.encoded_metrics()] == [stage.metrics]
+        assert [text for _, text in store.encoded_metrics()] == [stage.metrics]
