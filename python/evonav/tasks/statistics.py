@@ -13,6 +13,7 @@ from evonav.records import Record
 from evonav.statistics import effective_size
 
 Range = tuple[float, float]
+Unit = Literal["share", "m", "stages", "median share", "goals"]
 
 
 class Estimate(Record):
@@ -29,7 +30,7 @@ class Metric(Record):
     key: str
     label: str
     group: str
-    unit: Literal["share", "m", "stages", "median share", "goals"]
+    unit: Unit
     n: NonNegativeInt
     """Number of tasks, transitions or goals in the estimate."""
     raw: Estimate | None

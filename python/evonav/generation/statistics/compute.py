@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from evonav.generation.statistics.metrics import (
     DISTRIBUTIONS,
     MEDIANS,
     METRICS,
+    OF_TASKS,
     PAPER_EVOLUTIONS,
     PAPER_MODES,
     QUANTITIES,
@@ -133,26 +133,24 @@ def _metrics(tally: Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
     raw = _estimates(tally, None)
     reweighted = {} if weighting is None else _estimates(tally, weighting)
     sums = tally.ratio_rows().sum(axis=0)
-    trials = {info.key: round(n) for info, n in zip(RATIOS, sums[:, 1], strict=True)}
+    trials = {metric.key: round(n) for metric, n in zip(RATIOS, sums[:, 1], strict=True)}
     is_one_task_a_house = len(set(tally.houses)) == tally.num_tasks
     metrics = []
-    for info in METRICS:
-        estimate = raw.get(info.key)
-        n = trials.get(info.key, len(tally.values.get(info.key, ())))
-        is_wilson = estimate is not None and info.unit == "share" and info.is_of_tasks and is_one_task_a_house
+    for metric in METRICS:
+        estimate = raw.get(metric.key)
+        n = trials.get(metric.key, len(tally.values.get(metric.key, ())))
+        is_wilson = estimate is not None and metric.unit == "share" and metric.key in OF_TASKS and is_one_task_a_house
         # Resampling gives no interval for events that never or always happened.
-        is_wilson |= estimate is not None and info.unit == "share" and estimate.value in (0.0, 1.0)
+        is_wilson |= estimate is not None and metric.unit == "share" and estimate.value in (0.0, 1.0)
         if estimate is not None and is_wilson:
             estimate = Estimate(value=estimate.value, ci95=wilson(estimate.value * n, n))
-        metrics.append(
-            Metric(
-                **{one.name: getattr(info, one.name) for one in fields(info) if one.name != "is_of_tasks"},
-                n=n,
-                raw=estimate,
-                interval="wilson" if is_wilson else "bootstrap",
-                reweighted=reweighted.get(info.key),
-            )
-        )
+        found = {
+            "n": n,
+            "raw": estimate,
+            "interval": "wilson" if is_wilson else "bootstrap",
+            "reweighted": reweighted.get(metric.key),
+        }
+        metrics.append(metric.model_copy(update=found))
     return tuple(metrics)
 
 
@@ -163,16 +161,16 @@ def _estimates(tally: Tally, weighting: Reweighting | None) -> dict[str, Estimat
     weights = np.ones(tally.num_tasks) if weighting is None else weighting.weights
     rows = tally.ratio_rows() * weights[:, None, None]
     found = {}
-    for i, info in enumerate(RATIOS):
+    for i, metric in enumerate(RATIOS):
         numerators, denominators = houses.sums(rows[:, i]).T
         ratio = houses.ratio(numerators, denominators, tally.num_tasks)
         if ratio.value is not None:
-            found[info.key] = Estimate(value=ratio.value, ci95=ratio.ci95)
-    for info in MEDIANS:
-        values, tasks = tally.values_of(info.key)
+            found[metric.key] = Estimate(value=ratio.value, ci95=ratio.ci95)
+    for metric in MEDIANS:
+        values, tasks = tally.values_of(metric.key)
         median = houses.weighted_median(values, weights[tasks], houses.cluster_of[tasks])
         if median.value is not None:
-            found[info.key] = Estimate(value=median.value, ci95=median.ci95)
+            found[metric.key] = Estimate(value=median.value, ci95=median.ci95)
     return found
 
 

@@ -1,26 +1,31 @@
 """List the metrics over tasks, with their labels and the paper's values."""
 
-from dataclasses import dataclass
-from typing import Literal
-
-from evonav.tasks.statistics import Range
-
-Unit = Literal["share", "m", "stages", "median share", "goals"]
+from evonav.tasks.statistics import Metric, Range, Unit
 
 
-@dataclass(frozen=True, slots=True)
-class MetricInfo:
-    """A metric; the fields are those of `evonav.tasks.statistics.Metric`."""
-
-    key: str
-    label: str
-    group: str
-    unit: Unit = "share"
-    is_of_tasks: bool = False
-    """Whether each task is one trial, so that Wilson's interval is valid."""
-    paper: float | None = None
-    expected: float | None = None
-    accepted: Range | None = None
+def _metric(
+    key: str,
+    label: str,
+    group: str,
+    unit: Unit = "share",
+    *,
+    paper: float | None = None,
+    expected: float | None = None,
+    accepted: Range | None = None,
+) -> Metric:
+    """Return a metric over no tasks yet."""
+    return Metric(
+        key=key,
+        label=label,
+        group=group,
+        unit=unit,
+        n=0,
+        raw=None,
+        interval="bootstrap",
+        paper=paper,
+        expected=expected,
+        accepted=accepted,
+    )
 
 
 _EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", "Objects", "Tasks"
@@ -29,44 +34,46 @@ _DURING = "Changes during stages"
 # `paper`: Sec. 3.2 and its plot. `expected` of evolutions: binomial, K uniform on {3, 4, 5}. Other `expected`: a trial
 # of Algorithm 1 in ProcTHOR-10k's mix, without images and rejected goals (docs/studies/task-statistics.md).
 METRICS = (
-    MetricInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
-    MetricInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),
-    MetricInfo("static", "static transitions", _EVOLUTION, paper=0.494, expected=0.5),
-    MetricInfo("unchanged", "triggered, but nothing moved", _EVOLUTION),
-    MetricInfo("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
-    MetricInfo("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
-    MetricInfo("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
-    MetricInfo("room_again", "same room as just before", _EVOLUTION, expected=0.036, accepted=(0.03, 0.05)),
-    MetricInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.39, accepted=(0.36, 0.41)),
-    MetricInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.795),
-    MetricInfo("goal_moved", "moved by the change", _GOALS, expected=0.685),
-    MetricInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.575),
-    MetricInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.795),
-    MetricInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.8),
-    MetricInfo("goal_is_salient", "the salient object itself", _GOALS),
-    MetricInfo("goal_room_again", "in the previous goal's room", _GOALS),
-    MetricInfo("goal_again", "an earlier goal of the task", _GOALS),
-    MetricInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.295),
-    MetricInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
-    MetricInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.1458),
-    MetricInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True),
-    MetricInfo("room_relocated", "relocated in changed room", _OBJECTS),
-    MetricInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
-    MetricInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
-    MetricInfo("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
-    MetricInfo("unmoved", "found no other place", _OBJECTS),
-    MetricInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
-    MetricInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
-    MetricInfo("during", "stages with a change", _DURING),
-    MetricInfo("during_target", "  that moved the target", _DURING),
-    MetricInfo("num_stages", "stages per task", _TASKS, "stages", paper=4.010, expected=4.0),
-    MetricInfo("goals_refused", "goals rejected per stage", _TASKS, "goals"),
+    _metric("evolved_once", "tasks with an evolution", _EVOLUTION, paper=0.859, expected=0.8542),
+    _metric("evolved_twice", "tasks with two or more", _EVOLUTION, paper=0.484, expected=0.4792),
+    _metric("static", "static transitions", _EVOLUTION, paper=0.494, expected=0.5),
+    _metric("unchanged", "triggered, but nothing moved", _EVOLUTION),
+    _metric("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
+    _metric("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
+    _metric("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
+    _metric("room_again", "same room as just before", _EVOLUTION, expected=0.036, accepted=(0.03, 0.05)),
+    _metric("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.39, accepted=(0.36, 0.41)),
+    _metric("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.795),
+    _metric("goal_moved", "moved by the change", _GOALS, expected=0.685),
+    _metric("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.575),
+    _metric("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.795),
+    _metric("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.8),
+    _metric("goal_is_salient", "the salient object itself", _GOALS),
+    _metric("goal_room_again", "in the previous goal's room", _GOALS),
+    _metric("goal_again", "an earlier goal of the task", _GOALS),
+    _metric("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.295),
+    _metric("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
+    _metric("ratio_zero", "tasks with none relocated", _OBJECTS, expected=0.1458),
+    _metric("ratio_above_80", "tasks above 80%", _OBJECTS),
+    _metric("room_relocated", "relocated in changed room", _OBJECTS),
+    _metric("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
+    _metric("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    _metric("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    _metric("unmoved", "found no other place", _OBJECTS),
+    _metric("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    _metric("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    _metric("during", "stages with a change", _DURING),
+    _metric("during_target", "  that moved the target", _DURING),
+    _metric("num_stages", "stages per task", _TASKS, "stages", paper=4.010, expected=4.0),
+    _metric("goals_refused", "goals rejected per stage", _TASKS, "goals"),
 )
 
-RATIOS = tuple(info for info in METRICS if info.unit != "median share")
+RATIOS = tuple(metric for metric in METRICS if metric.unit != "median share")
 """Metrics that are ratios of sums over tasks."""
-MEDIANS = tuple(info for info in METRICS if info.unit == "median share")
+MEDIANS = tuple(metric for metric in METRICS if metric.unit == "median share")
 """Metrics that are medians of a quantity."""
+OF_TASKS = ("evolved_once", "evolved_twice", "ratio_zero", "ratio_above_80")
+"""Keys of metrics for which each task is one trial, so that Wilson's interval is valid."""
 
 DISTRIBUTIONS = {
     "num_evolutions": "Evolutions per task",

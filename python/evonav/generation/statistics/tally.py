@@ -43,8 +43,8 @@ class Tally:
         self.houses.append(summary.house_sha256)
         self.num_rooms.append(summary.num_rooms)
         self.plans.append(summary.plan)
-        for info in RATIOS:
-            self.rows.extend(summary.sums.get(info.key, (0.0, 0.0)))
+        for metric in RATIOS:
+            self.rows.extend(summary.sums.get(metric.key, (0.0, 0.0)))
         for key, counts in summary.counts.items():
             by_house = self.counts_by_house.setdefault(key, {})
             by_house.setdefault((summary.num_rooms, summary.plan), Counter()).update(counts)
