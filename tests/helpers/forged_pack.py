@@ -9,8 +9,9 @@ from typing import Any
 
 from evonav.evaluation.episode.motion import polyline_length_m
 from evonav.evaluation.metrics.scoring import score_stage
+from evonav.evaluation.metrics.stage_metrics import metrics_of
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.submission.pack import packed_summary
+from evonav.submission.pack import brief, packed_summary
 from evonav.submission.verify import PackVerdict
 
 
@@ -38,11 +39,11 @@ class ForgedPack:
 
     def claim(self) -> None:
         """Claim the scores that follow from the records."""
-        records = {
-            agent: [StageRecord.model_validate(row, strict=False) for row in mine]
+        rows = {
+            agent: [metrics_of(brief(StageRecord.model_validate(row, strict=False))) for row in mine]
             for agent, mine in zip(self.header["agents"], self.rows, strict=True)
         }
-        summary = packed_summary(records, sum(task["num_stages"] for task in self.header["tasks"]))
+        summary = packed_summary(rows, sum(task["num_stages"] for task in self.header["tasks"]))
         self.header["summary"] = summary
 
     def write(self, path: Path, lines: list[bytes] | None = None) -> Path:

@@ -19,6 +19,7 @@ from evonav.decision.vlm.ledger import Ledger
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
 from evonav.evaluation.metrics.navigation import rates
+from evonav.evaluation.metrics.stage_metrics import metrics_of
 from evonav.evaluation.records.store import RunStore
 from evonav.sweeps.summary import sweep_rows
 from vlm_stub import KEY, serving
@@ -148,7 +149,7 @@ def test_the_summary_is_of_the_records(whole):
     for cell in CELLS[:2]:
         with RunStore(whole / "runs" / cell) as store:
             records += store.records("fu")
-    expected = rates(records)
+    expected = rates([metrics_of(record) for record in records])
     assert [(row.n, row.sr, row.sr_ci95, row.spl) for row in pooled] == [
         (14, expected.sr, expected.sr_ci95, expected.spl)
     ]

@@ -12,6 +12,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
+from evonav.evaluation.metrics.stage_metrics import RecordMetrics, metrics_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.summary import isolations_of
@@ -36,10 +37,10 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
     return header
 
 
-def packed_summary(records: Mapping[str, Sequence[StageRecord]], num_stages: int) -> dict[str, Any]:
-    """Compute the scores that a submission claims from each agent's records, of which there should be `num_stages`."""
-    summaries = [summarise(agent, mine, num_stages) for agent, mine in records.items()]
-    summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, agent_pairs(records))))
+def packed_summary(rows: Mapping[str, Sequence[RecordMetrics]], num_stages: int) -> dict[str, Any]:
+    """Compute the scores that a submission claims from each agent's stages, of which there should be `num_stages`."""
+    summaries = [summarise(agent, mine, num_stages) for agent, mine in rows.items()]
+    summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, agent_pairs(rows))))
     return summary
 
 
@@ -56,14 +57,14 @@ def _header(store: RunStore, run_dir: Path, agents: Sequence[str] | None, about:
         raise InvalidArgumentError(f"{run_dir}: no agent to pack")
     stages: dict[str, int] = store.meta("num_stages") or {}
     num_stages = sum(stages.values())
-    records: dict[str, list[StageRecord]] = {}
+    rows: dict[str, list[RecordMetrics]] = {}
     for agent in chosen:
         if agent not in there:
             raise InvalidArgumentError(f"{run_dir}: no agent {agent!r}; it has {', '.join(there)}")
         if agent in BASELINES:
             raise InvalidArgumentError(f"{agent} is a baseline and no contestant: leave it out")
-        records[agent] = [brief(record) for record in store.records(agent)]
-        num_scored = sum(record.is_scored or record.state is EndState.GUIDED for record in records[agent])
+        rows[agent] = [metrics_of(brief(record)) for record in store.records(agent)]
+        num_scored = sum(row.is_scored or row.state == EndState.GUIDED for row in rows[agent])
         if num_scored != num_stages:
             raise InvalidArgumentError(
                 f"{agent} is incomplete: {num_scored} of {num_stages} stages have a score;"
@@ -77,5 +78,5 @@ def _header(store: RunStore, run_dir: Path, agents: Sequence[str] | None, about:
         config={key: value for key, value in config.items() if key not in ("evonav", "tasks", "num_tasks")},
         tasks=tuple(PackedTask(task_id=name, num_stages=stages[name], digest=digests[name]) for name in sorted(stages)),
         agents=tuple(chosen),
-        summary=packed_summary(records, num_stages),
+        summary=packed_summary(rows, num_stages),
     )

@@ -16,6 +16,7 @@ from typing import Any
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.metrics.stage_metrics import RecordMetrics, metrics_of
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
@@ -98,8 +99,8 @@ class _Records:
         Raises:
             SubmissionError: The file is damaged, or a line is not a record as evonav writes it.
         """
-        self.brief: dict[str, list[StageRecord]] = {agent: [] for agent in header.agents}
-        """Records without rounds and memory, by agent."""
+        self.rows: dict[str, list[RecordMetrics]] = {agent: [] for agent in header.agents}
+        """Metrics of the records without their rounds and memory, by agent."""
         self.complete, self.targets, self.paths = _Findings(), _Findings(), _Findings()
         self._known = known
         self._protocol = ProtocolConfig(**header.config["protocol"])
@@ -143,7 +144,7 @@ class _Records:
             self.targets.add(change_findings(record, stage, self._protocol), where)
         self.paths.add(path_findings(record, self._before, self._protocol), where)
         self._before = brief(record)
-        self.brief[record.agent].append(self._before)
+        self.rows[record.agent].append(metrics_of(self._before))
 
     def _read_spec(self, task_id: str) -> EpisodeSpec | None:
         try:
@@ -211,7 +212,7 @@ def _verdict(
         unread = PackCheck("file", True, _shown(f"the header; the records of {agents} were not read"))
         return PackVerdict((unread, *checks), header, False, len(required))
     records = _Records(path, header, known)
-    num_records = sum(map(len, records.brief.values()))
+    num_records = sum(map(len, records.rows.values()))
     checks.insert(0, PackCheck("file", True, _shown(f"records: {num_records}, agents: {agents}")))
     checks.append(records.complete.check("complete", "every stage once, and scored"))
     if not all(check.is_passed for check in checks):
@@ -219,11 +220,11 @@ def _verdict(
     checks.append(records.targets.check("targets", "houses, goals, targets and changes are those of the tasks"))
     follows = "lengths, distances, success and SPL follow from the recorded paths"
     checks.append(records.paths.check("paths", follows))
-    checks.append(_check("scores", _claims(header, records.brief), "the claimed summary is that of the records"))
+    checks.append(_check("scores", _claims(header, records.rows), "the claimed summary is that of the records"))
     if replay is not None:
         found = _rescore(path, header, known, required, *replay)
         checks.append(_check("actions", found, "replayed, they give the same records, byte for byte"))
-    chosen = {agent: [r for r in mine if r.task_id in set(required)] for agent, mine in records.brief.items()}
+    chosen = {agent: [row for row in mine if row.task_id in set(required)] for agent, mine in records.rows.items()}
     num_stages = sum(task.num_stages for task in header.tasks if task.task_id in set(required))
     summary = packed_summary(chosen, num_stages)
     return PackVerdict(tuple(checks), header, replay is not None, len(required), summary, records.digests)
@@ -283,9 +284,9 @@ def _task_findings(header: Submission, known: Mapping[str, TaskFile], required: 
         yield f"{name} is missing"
 
 
-def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
+def _claims(header: Submission, rows: Mapping[str, Sequence[RecordMetrics]]) -> Iterator[str]:
     num_stages = sum(task.num_stages for task in header.tasks)
-    claimed, computed = header.summary, packed_summary(records, num_stages)
+    claimed, computed = header.summary, packed_summary(rows, num_stages)
     for one in json_differences(claimed, computed, is_equal=_is_close):
         yield f"{one.path} is {one.left}, the records give {one.right}"
 

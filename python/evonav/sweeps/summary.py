@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from evonav.evaluation.metrics.navigation import Rates, rates
-from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
+from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.summary import SUMMARY_NAME, write_summary
 from evonav.statistics import Interval
@@ -157,12 +159,12 @@ def _over_seeds(out: Path, cells: Mapping[str, Mapping[str, Any]], rows: list[Sw
 
 
 def _pooled(run_dirs: list[Path], agent: str) -> Rates:
-    records: list[StageRecord] = []
+    rows: list[StageMetrics] = []
     for run_dir in run_dirs:
         if (run_dir / FILE_NAME).exists():
             with RunStore(run_dir) as store:
-                records += store.records(agent, is_brief=True)
-    return rates(records)
+                rows += read_stage_metrics(store, [agent])
+    return rates(rows)
 
 
 def _interval(ends: Any) -> Interval | None:  # noqa: ANN401 - JSON

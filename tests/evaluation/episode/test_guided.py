@@ -74,7 +74,7 @@ def test_every_agent_is_walked_along_the_same_way(walked, name):
 def test_nothing_of_a_walk_is_scored(walked, name):
     first, _, third = walked[name]
     assert (first.spl, first.soft_spl, first.reference_length_m, first.has_stopped) == (None, None, None, False)
-    summary = summarise(name, walked[name], 3)
+    summary = summarise(name, [metrics_of(record) for record in walked[name]], 3)
     assert (summary.n, summary.counts["guided"], summary.is_incomplete) == (1, 2, False)
     assert metrics_of(first).success is None
     assert metrics_of(first).cause is None

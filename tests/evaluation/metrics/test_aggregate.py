@@ -67,7 +67,7 @@ def test_a_rate_has_the_interval_of_the_summary(tmp_path):
     with RunStore(tmp_path, create=True) as store:
         for record in records:
             store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=1.0))
-    told, summary = values(tmp_path, SUCCESS), summarise("fu", records, 24)
+    told, summary = values(tmp_path, SUCCESS), summarise("fu", _rows(tmp_path), 24)
     assert (told["sr"].num_clusters, told["sr"].value) == (8, summary.sr)
     assert told["sr"].ci95 == told["sr_2m"].ci95 == summary.sr_ci95 is not None
     assert told["spl"].ci95 == pytest.approx(summary.spl_ci95)

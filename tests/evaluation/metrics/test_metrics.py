@@ -1,6 +1,7 @@
 """Measures against a second implementation, and the units of intervals."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -16,6 +17,7 @@ from evonav.evaluation.metrics.navigation import (
     summary_json,
 )
 from evonav.evaluation.metrics.scoring import score_stage, stage_soft_spl, stage_spl
+from evonav.evaluation.metrics.stage_metrics import metrics_of
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
@@ -55,7 +57,11 @@ def test_a_stage_without_a_reference_path_has_no_spl() -> None:
 
 
 def made(agent, successes):
-    """Records of `successes`: (task, stage, success, spl, is_relocated)."""
+    """Rows of `successes`: (task, stage, success, spl, is_relocated)."""
+    return [metrics_of(record) for record in made_records(agent, successes)]
+
+
+def made_records(agent, successes):
     blank = episode_spec("toy-moved").blank_record(agent, 1)
     return [
         blank.model_copy(
@@ -100,13 +106,14 @@ def test_a_summary_agrees_with_arithmetic(outcomes):
 
 
 def test_errored_stages_are_no_failures():
-    records = made("x", [("a", 1, True, 1.0, False), ("a", 2, True, 0.5, False)])
+    records = made_records("x", [("a", 1, True, 1.0, False), ("a", 2, True, 0.5, False)])
     records.append(as_errored(records[0].model_copy(update={"stage": 3}), ErrorKind.CRASH, "died"))
-    summary = summarise("x", records, num_stages=5)
+    rows = [metrics_of(record) for record in records]
+    summary = summarise("x", rows, num_stages=5)
     assert (summary.sr, summary.n) == (1.0, 2)
     assert summary.counts == {"success": 2, "failure": 0, "errored": 1, "not_run": 2}
     assert summary.is_incomplete
-    assert rates(records[2:]).sr is None
+    assert rates(rows[2:]).sr is None
 
 
 def test_pairs_are_compared_on_common_stages():
@@ -118,24 +125,26 @@ def test_pairs_are_compared_on_common_stages():
     assert pair.spl.difference == pytest.approx(-0.1)
 
 
+def failed(row):
+    return replace(row, state="failure", success=False, spl=0.0)
+
+
 def test_a_house_with_several_tasks_is_one_unit():
     """Tasks of one house are one piece of evidence: more of them leave an interval as wide as it was."""
     outcomes = [(f"t{i}", 1, i % 3 > 0, 0.5, False) for i in range(12)]
-    once = [record.model_copy(update={"house": record.task_id}) for record in made("a", outcomes)]
-    twice = once + [record.model_copy(update={"task_id": f"{record.task_id}-again"}) for record in once]
+    once = [replace(row, house=row.task_id) for row in made("a", outcomes)]
+    twice = once + [replace(row, task_id=f"{row.task_id}-again") for row in once]
     assert rates(twice).sr_ci95 == rates(once).sr_ci95 is not None
-    none = [record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0}) for record in twice]
+    none = [failed(row) for row in twice]
     (pair,) = agent_pairs({"none": none, "a": twice})
     assert (pair.n, pair.num_tasks, pair.sr.num_clusters) == (24, 24, 12)
-    assert rates([record.model_copy(update={"house": ""}) for record in once]).sr_ci95 == rates(once).sr_ci95
+    assert rates([replace(row, house="") for row in once]).sr_ci95 == rates(once).sr_ci95
 
 
 def test_few_houses_give_no_verdict_however_many_tasks():
     outcomes = [(f"t{i}", 1, True, 1.0, False) for i in range(20)]
-    a = [record.model_copy(update={"house": f"house {i % 4}"}) for i, record in enumerate(made("a", outcomes))]
-    b = [
-        record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0} if i % 3 else {}) for i, record in enumerate(a)
-    ]
+    a = [replace(row, house=f"house {i % 4}") for i, row in enumerate(made("a", outcomes))]
+    b = [failed(row) if i % 3 else row for i, row in enumerate(a)]
     (pair,) = agent_pairs({"a": a, "b": b})
     assert pair.sr.ci95 is not None
     assert pair.sr.ci95[1] < 0
@@ -144,8 +153,8 @@ def test_few_houses_give_no_verdict_however_many_tasks():
 
 def test_the_summary_has_verdicts_that_allow_for_the_number_of_pairs():
     outcomes = [(f"t{i:02}", 1, i < 6, 1.0, False) for i in range(24)]
-    some = [record.model_copy(update={"house": record.task_id}) for record in made("some", outcomes)]
-    none = [record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0}) for record in some]
+    some = [replace(row, house=row.task_id) for row in made("some", outcomes)]
+    none = [failed(row) for row in some]
     alone = summary_json([], agent_pairs({"none": none, "some": some}))["paired_differences"]
     assert [(pair["sr_p"], pair["sr_holm_p"], pair["sr_verdict"]) for pair in alone] == [(0.03125, 0.03125, "b")]
     three = summary_json([], agent_pairs({"none": none, "some": some, "others": some}))["paired_differences"]
@@ -154,7 +163,7 @@ def test_the_summary_has_verdicts_that_allow_for_the_number_of_pairs():
 
 
 def test_a_stage_is_recorded_once(tmp_path):
-    (record,) = made("a", [("t", 1, True, 1.0, False)])
+    (record,) = made_records("a", [("t", 1, True, 1.0, False)])
     with RunStore(tmp_path, create=True) as store:
         store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
         with pytest.raises(StoreError):

@@ -7,59 +7,20 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
+from evonav.evaluation.metrics.stage_metrics import RecordMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
 
-class HouseStage(Protocol):
-    """A stage in a house."""
-
-    @property
-    def house(self) -> str: ...  # noqa: D102
-    @property
-    def task_id(self) -> str: ...  # noqa: D102
-
-
-class Stage(HouseStage, Protocol):
-    """A stage as rates see it: a record (`StageRecord`), or a row made of one (`StageMetrics`)."""
-
-    @property
-    def stage(self) -> int: ...  # noqa: D102
-    @property
-    def state(self) -> str: ...  # noqa: D102
-    @property
-    def is_scored(self) -> bool: ...  # noqa: D102
-    @property
-    def spl(self) -> float | None: ...  # noqa: D102
-    @property
-    def soft_spl(self) -> float | None: ...  # noqa: D102
-    @property
-    def has_stopped(self) -> bool: ...  # noqa: D102
-    @property
-    def path_length_m(self) -> float | None: ...  # noqa: D102
-    @property
-    def terminal_distance_m(self) -> float | None: ...  # noqa: D102
-    @property
-    def mode(self) -> str: ...  # noqa: D102
-    @property
-    def stratum(self) -> str: ...  # noqa: D102
-    @property
-    def during_stratum(self) -> str | None: ...  # noqa: D102
-
-
-def house_of(stage: HouseStage) -> str:
-    """Return the house that a stage is resampled with; its task where the record does not name a house.
-
-    Args:
-        stage: A record, or a row made of one.
-    """
-    return stage.house or stage.task_id
+def house_of(row: RecordMetrics) -> str:
+    """Return the house that a stage is resampled with; its task where the record does not name a house."""
+    return row.house or row.task_id
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +82,13 @@ class AgentPair:
         return self.sr.n
 
 
-def rates(records: Sequence[Stage]) -> Rates:
-    """Return SR and SPL over the scored stages among `records`."""
-    scored = [record for record in records if record.is_scored]
+def rates(rows: Sequence[RecordMetrics]) -> Rates:
+    """Return SR and SPL over the scored stages among `rows`."""
+    scored = [row for row in rows if row.is_scored]
     if not scored:
         return Rates(n=0, sr=None, spl=None)
     values = success_and_spl(scored)
-    sr, spl = ClusterBootstrap([house_of(record) for record in scored]).column_means(values)
+    sr, spl = ClusterBootstrap([house_of(row) for row in scored]).column_means(values)
     return Rates(
         n=len(scored),
         sr=sr.value,
@@ -138,38 +99,37 @@ def rates(records: Sequence[Stage]) -> Rates:
     )
 
 
-def summarise(agent: str, records: Sequence[Stage], num_stages: int) -> AgentSummary:
+def summarise(agent: str, rows: Sequence[RecordMetrics], num_stages: int) -> AgentSummary:
     """Summarise an agent as a table row. Stages of the run without a record count as not run.
 
     Raises:
         StoreError: There are more records than stages, or two of one stage: the states would not add up to the run.
     """
-    if len({(record.task_id, record.stage) for record in records}) != len(records) or len(records) > num_stages:
-        raise StoreError(f"{agent}: {len(records)} records of {num_stages} stages, each at most once: not a run's")
-    counts = Counter(EndState(record.state) for record in records)
-    counts[EndState.NOT_RUN] += num_stages - len(records)
-    scored = [record for record in records if record.is_scored]
+    if len({(row.task_id, row.stage) for row in rows}) != len(rows) or len(rows) > num_stages:
+        raise StoreError(f"{agent}: {len(rows)} records of {num_stages} stages, each at most once: not a run's")
+    counts = Counter(EndState(row.state) for row in rows)
+    counts[EndState.NOT_RUN] += num_stages - len(rows)
+    scored = [row for row in rows if row.is_scored]
     overall = rates(scored)
     return AgentSummary(
         **asdict(overall),
         agent=agent,
-        soft_spl=_mean(record.soft_spl for record in scored),
+        soft_spl=_mean(row.soft_spl for row in scored),
         counts={state.value: counts[state] for state in EndState if state is not EndState.GUIDED or counts[state]},
         is_incomplete=overall.n + counts[EndState.GUIDED] != num_stages,
         num_stages=num_stages,
-        num_tasks=len({record.task_id for record in records}),
-        num_stopped=sum(record.has_stopped for record in scored),
-        mean_path_length_m=_mean(record.path_length_m for record in scored),
-        mean_terminal_distance_m=_mean(record.terminal_distance_m for record in scored),
+        num_tasks=len({row.task_id for row in rows}),
+        num_stopped=sum(row.has_stopped for row in scored),
+        mean_path_length_m=_mean(row.path_length_m for row in scored),
+        mean_terminal_distance_m=_mean(row.terminal_distance_m for row in scored),
         splits={name: rates(part) for name, part in _splits(scored).items()},
     )
 
 
-def agent_pairs(records_by_agent: Mapping[str, Sequence[Stage]]) -> list[AgentPair]:
+def agent_pairs(rows_by_agent: Mapping[str, Sequence[RecordMetrics]]) -> list[AgentPair]:
     """Compare every two agents on the stages that both scored; two without such a stage are left out."""
     scored = {
-        agent: {(record.task_id, record.stage): record for record in records if record.is_scored}
-        for agent, records in records_by_agent.items()
+        agent: {(row.task_id, row.stage): row for row in rows if row.is_scored} for agent, rows in rows_by_agent.items()
     }
     pairs = [
         _agent_pair(a, b, [(scored[a][key], scored[b][key]) for key in sorted(scored[a].keys() & scored[b].keys())])
@@ -180,13 +140,13 @@ def agent_pairs(records_by_agent: Mapping[str, Sequence[Stage]]) -> list[AgentPa
     return [replace(pair, sr=sr, spl=spl) for pair, sr, spl in zip(pairs, srs, spls, strict=True)]
 
 
-def _agent_pair(a: str, b: str, stages: Sequence[tuple[Stage, Stage]]) -> AgentPair:
-    values_a, values_b = (success_and_spl(records) for records in zip(*stages, strict=True))
-    sr, spl = paired_effects(values_a, values_b, [house_of(record) for record, _ in stages])
+def _agent_pair(a: str, b: str, stages: Sequence[tuple[RecordMetrics, RecordMetrics]]) -> AgentPair:
+    values_a, values_b = (success_and_spl(rows) for rows in zip(*stages, strict=True))
+    sr, spl = paired_effects(values_a, values_b, [house_of(row) for row, _ in stages])
     return AgentPair(
         a=a,
         b=b,
-        num_tasks=len({record.task_id for record, _ in stages}),
+        num_tasks=len({row.task_id for row, _ in stages}),
         num_only_a=int((values_a[:, 0] > values_b[:, 0]).sum()),
         num_only_b=int((values_b[:, 0] > values_a[:, 0]).sum()),
         sr=sr,
@@ -227,21 +187,21 @@ def _effect_json(name: str, effect: PairedEffect) -> dict[str, Any]:
     }
 
 
-def _splits(scored: Sequence[Stage]) -> dict[str, list[Stage]]:
-    splits: dict[str, list[Stage]] = defaultdict(list)
-    has_changes = any(record.during_stratum is not None for record in scored)
-    for record in scored:
+def _splits(scored: Sequence[RecordMetrics]) -> dict[str, list[RecordMetrics]]:
+    splits: dict[str, list[RecordMetrics]] = defaultdict(list)
+    has_changes = any(row.during is not None for row in scored)
+    for row in scored:
         if has_changes:
-            splits[record.during_stratum or "unchanged_during"].append(record)
-        splits[record.stratum].append(record)
-        if record.stage > 1:
-            splits[record.mode].append(record)
+            splits[row.during or "unchanged_during"].append(row)
+        splits[row.stratum].append(row)
+        if row.stage > 1:
+            splits[row.mode].append(row)
     return dict(sorted(splits.items()))
 
 
-def success_and_spl(scored: Sequence[Stage]) -> NDArray[np.float64]:
+def success_and_spl(scored: Sequence[RecordMetrics]) -> NDArray[np.float64]:
     """Return `(N, 2)` success, 0 or 1, and SPL of scored stages."""
-    rows = [(float(record.state == EndState.SUCCESS), record.spl or 0.0) for record in scored]
+    rows = [(float(row.state == EndState.SUCCESS), row.spl or 0.0) for row in scored]
     return np.array(rows, dtype=np.float64)
 
 

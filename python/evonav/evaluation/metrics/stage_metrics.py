@@ -134,6 +134,11 @@ class RecordMetrics:
     spl_after_change: float | None = None
     """SPL from the change during the stage on: the paths are those from the agent's place at the change."""
 
+    @property
+    def is_scored(self) -> bool:
+        """True if the stage counts in rates."""
+        return self.success is not None
+
 
 _OWN = {"state", "during"}
 _COPIED = tuple(field.name for field in fields(RecordMetrics) if field.name in {*StageRecord.model_fields} - _OWN)
@@ -152,16 +157,6 @@ class StageMetrics(StageCosts, RecordMetrics):
     num_conflicts: int | None
     num_verifications: int | None
     num_rejected_entries: int | None
-
-    @property
-    def is_scored(self) -> bool:
-        """True if the stage counts in rates."""
-        return self.success is not None
-
-    @property
-    def during_stratum(self) -> str | None:
-        """`during`, by the name that a record has for it."""
-        return self.during
 
     def is_success_at(self, radius_m: float) -> bool | None:
         """Return whether the stage were a success with another radius; `None` where the stage has no score."""

@@ -16,6 +16,7 @@ from typing import Any
 from evonav import __version__
 from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise, summary_json
+from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import write_atomically
 from evonav.perception.shorthand import short_name_of
@@ -42,9 +43,10 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
     with RunStore(run_dir) as store:
         agents: list[str] = store.meta("agents") or []
         num_stages = sum(store.meta("num_stages").values())
-        records = {agent: list(store.records(agent, is_brief=True)) for agent in agents_in_order(agents)}
-    summaries = {agent: summarise(agent, mine, num_stages) for agent, mine in records.items()}
-    save_summary(run_dir, list(summaries.values()), agent_pairs(records))
+        rows = read_stage_metrics(store)
+    by_agent = {agent: [row for row in rows if row.agent == agent] for agent in agents_in_order(agents)}
+    summaries = {agent: summarise(agent, mine, num_stages) for agent, mine in by_agent.items()}
+    save_summary(run_dir, list(summaries.values()), agent_pairs(by_agent))
     return [summaries[agent] for agent in only or agents]
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from evonav.counted import counted
-from evonav.evaluation.metrics.navigation import Stage
+from evonav.evaluation.metrics.stage_metrics import RecordMetrics
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, RoundRecord, StageRecord
 from evonav.report.tables.table import mode_words
@@ -75,7 +75,7 @@ def describe_change(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
     return ", ".join(phrases)
 
 
-def describe_outcome(stage: Stage) -> str:
+def describe_outcome(stage: RecordMetrics | StageRecord) -> str:
     """Return `success, SPL 0.83` and the like."""
     if stage.state == EndState.SUCCESS:
         return "success" if stage.spl is None else f"success, SPL {stage.spl:.2f}"

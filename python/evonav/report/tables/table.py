@@ -18,7 +18,8 @@ from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics.navigation import AgentSummary, Rates, Stage, rates
+from evonav.evaluation.metrics.navigation import AgentSummary, Rates, rates
+from evonav.evaluation.metrics.stage_metrics import RecordMetrics
 from evonav.evaluation.records.changes import DURING_STRATA
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
@@ -232,12 +233,11 @@ def mode_table(summaries: Sequence[AgentSummary]) -> Table:
     return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and later.",))
 
 
-def stage_table(records: Mapping[str, Sequence[Stage]]) -> Table:
+def stage_table(rows: Mapping[str, Sequence[RecordMetrics]]) -> Table:
     """Build the table of SR by stage index."""
-    stages = sorted({record.stage for part in records.values() for record in part})
+    stages = sorted({row.stage for part in rows.values() for row in part})
     cells = {
-        agent: [rates([record for record in part if record.stage == stage]) for stage in stages]
-        for agent, part in records.items()
+        agent: [rates([row for row in part if row.stage == stage]) for stage in stages] for agent, part in rows.items()
     }
     return _rates_table("By stage", [f"stage {k}" for k in stages], cells, ())
 
