@@ -85,8 +85,8 @@ def test_include_keeps_and_exclude_takes_away(tmp_path):
 def test_what_is_set_goes_before_the_file(tmp_path):
     path = write(tmp_path, SMALL + '[protocol]\nmax_rounds = 5\n[decisions.gpt]\nkind = "vlm"\nmodel = "gpt-4o"\n')
     sweep = read_sweep(path, ["protocol.max_rounds=7", "decisions.gpt.temperature=0", "agents=ftu,fu", "workers=3"])
-    assert sweep.protocol.config().max_rounds == 7
-    assert sweep.protocol.config().max_views == 7  # the paper's
+    assert sweep.protocol.max_rounds == 7
+    assert sweep.protocol.max_views == 7  # the paper's
     assert sweep.decisions["gpt"].temperature == 0.0
     assert (sweep.agents, sweep.workers) == (("ftu", "fu"), 3)
 

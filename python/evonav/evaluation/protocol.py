@@ -1,28 +1,35 @@
 """Hold the constants of the paper's evaluation protocol (Sec. C.1)."""
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import ConfigDict, Field, with_config
 
 from evonav.agents.agent import SensorConfig
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 
+_Count = Annotated[int, Field(ge=1)]
+_Metres = Annotated[float, Field(gt=0.0)]
 
+
+@with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))
 @dataclass(frozen=True, slots=True)
 class ProtocolConfig:
-    """The rules that all agents of a run share."""
+    """The rules that all agents of a run share. Values that a file gives are checked by these limits."""
 
-    max_rounds: int = 50
+    max_rounds: _Count = 50
     """Decision rounds per stage."""
-    max_actions: int = 500
+    max_actions: _Count = 500
     """Discrete actions per stage, for agents whose `SensorConfig.motion` is `actions`."""
-    success_radius_m: float = SUCCESS_RADIUS_M
-    waypoint_m: float = 0.25
+    success_radius_m: _Metres = SUCCESS_RADIUS_M
+    waypoint_m: _Metres = 0.25
     """Longest teleport while following planner waypoints."""
-    max_travel_m: float = 1.0
-    max_views: int = 7
+    max_travel_m: _Metres = 1.0
+    max_views: _Count = 7
     """Largest number of views per round that an agent may request."""
-    max_occupancy_range_m: float = 3.0
-    min_visible_px: int = 25
+    max_occupancy_range_m: _Metres = 3.0
+    min_visible_px: Annotated[int, Field(ge=0)] = 25
     """Number of visible pixels from which the target counts as seen in a view (diagnostics and oracle baselines)."""
 
     def budget(self, sensors: SensorConfig) -> int:

@@ -40,23 +40,6 @@ class TaskSet(Settings):
     """Named subset, SPLIT-N, such as test-90."""
 
 
-class ProtocolSettings(Settings):
-    """The protocol of every run; values left out are the paper's."""
-
-    max_rounds: int | None = Field(default=None, ge=1)
-    max_actions: int | None = Field(default=None, ge=1)
-    success_radius_m: float | None = Field(default=None, gt=0.0)
-    waypoint_m: float | None = Field(default=None, gt=0.0)
-    max_travel_m: float | None = Field(default=None, gt=0.0)
-    max_views: int | None = Field(default=None, ge=1)
-    max_occupancy_range_m: float | None = Field(default=None, gt=0.0)
-    min_visible_px: int | None = Field(default=None, ge=0)
-
-    def config(self) -> ProtocolConfig:
-        """Return the paper's protocol with the given values in place of its own."""
-        return ProtocolConfig(**self.model_dump(exclude_none=True))
-
-
 class Pattern(Settings):
     """Combinations of agent and cell: a name, a glob such as `noisy-*`, or a list of them, for any of the axes."""
 
@@ -89,7 +72,8 @@ class SweepFile(RunSettings, SpendingSettings):
     """Short: a list of text, text:wrong=0.1 (with mistakes), vlm:MODEL, module:name."""
     seeds: tuple[Seed, ...] = Field(default=(0,), min_length=1)
     """Seeds of every random choice, one run each."""
-    protocol: ProtocolSettings = ProtocolSettings()
+    protocol: ProtocolConfig = Field(default_factory=ProtocolConfig)
+    """The protocol of every run; values left out are the paper's."""
     include: tuple[Pattern, ...] = ()
     """Run only combinations that match one of these patterns. Default: all."""
     exclude: tuple[Pattern, ...] = ()

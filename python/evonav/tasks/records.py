@@ -7,6 +7,7 @@ import inspect
 import math
 import zlib
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -42,14 +43,14 @@ class PoseRecord(Record):
         return Pose(x_m, y_m, z_m, math.radians(self.yaw_deg), math.radians(self.horizon_deg))
 
 
-def descriptions(model: type[Record]) -> dict[str, str]:
-    """Return the strings below a record's fields in the source.
+def descriptions(model: type) -> dict[str, str]:
+    """Return the strings below the fields of a record or a dataclass in the source.
 
     Pydantic can read them, too, but whenever records are imported, which takes as long as all else of the import.
     """
     found = {}
     for kind in reversed(model.__mro__):
-        if issubclass(kind, Record):
+        if issubclass(kind, Record) or is_dataclass(kind):
             (source,) = ast.parse(dedent(inspect.getsource(kind))).body
             assert isinstance(source, ast.ClassDef)
             for field, below in pairwise(source.body):
@@ -70,12 +71,16 @@ def described_schema(model: type[Record]) -> dict[str, Any]:
     return schema
 
 
-def _records_in(annotation: Any) -> Iterator[type[Record]]:  # noqa: ANN401 - a type hint
-    """Yield the records that a type consists of, and all that they consist of."""
+def _records_in(annotation: Any) -> Iterator[type]:  # noqa: ANN401 - a type hint
+    """Yield the records and dataclasses that a type consists of, and all that they consist of."""
     if isinstance(annotation, type) and issubclass(annotation, Record):
         yield annotation
         for field in annotation.model_fields.values():
             yield from _records_in(field.annotation)
+    elif isinstance(annotation, type) and is_dataclass(annotation):
+        yield annotation
+        for part in fields(annotation):
+            yield from _records_in(part.type)
     for part in get_args(annotation):
         yield from _records_in(part)
 

@@ -5,7 +5,7 @@ Small commands use these: nothing heavy is imported here.
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -32,6 +32,9 @@ MAX_SHOWN = 80
 """Characters of the longest value that an error shows."""
 VLM_EPISODES_AT_ONCE = 16
 """Episodes that a worker runs at once where a server is asked, which takes most of the time."""
+
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+"""Pydantic's types of errors for a key that a model, or a dataclass, does not have."""
 
 SettingsT = TypeVar("SettingsT", bound="Settings")
 RunSettingsT = TypeVar("RunSettingsT", bound="RunSettings")
@@ -81,6 +84,8 @@ def keys_of(model: type[Settings]) -> Iterator[str]:
     for name, field in model.model_fields.items():
         if isinstance(field.annotation, type) and issubclass(field.annotation, Settings):
             yield from (f"{name}.{key}" for key in keys_of(field.annotation))
+        elif isinstance(field.annotation, type) and is_dataclass(field.annotation):
+            yield from (f"{name}.{key.name}" for key in fields(field.annotation))
         else:
             yield name
 
@@ -101,12 +106,12 @@ def unknown_key(model: type[Settings], key: str, known: Sequence[str], hint: str
 def _first_problem(model: type[Settings], error: ValidationError) -> SettingError:
     found = error.errors(include_url=False, include_context=True)
     # A key that nobody knows explains what is missing.
-    first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
+    first = next((one for one in found if one["type"] in _UNKNOWN), found[0])
     key = ".".join(str(part) for part in first["loc"] if part != "[key]")
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    if first["type"] == "extra_forbidden":
+    if first["type"] in _UNKNOWN:
         before = "".join(f"{part}." for part in first["loc"][:-1])
-        unknown = unknown_key(model, key, [f"{before}{name}" for name in _model_at(model, first["loc"]).model_fields])
+        unknown = unknown_key(model, key, [f"{before}{name}" for name in _names_at(model, first["loc"])])
         return SettingError(model, key, f"{unknown.problem}{more}")
     if first["type"] == "missing":
         return SettingError(model, key, f"is missing{more}")
@@ -118,16 +123,19 @@ def _first_problem(model: type[Settings], error: ValidationError) -> SettingErro
     return SettingError(model, key, f"= {shown}: {first['msg']}{more}")
 
 
-def _model_at(model: type[Settings], place: Sequence[int | str]) -> type[Settings]:
-    """Return the settings that a place of an error is in."""
+def _names_at(model: type[Settings], place: Sequence[int | str]) -> list[str]:
+    """Return the keys of the settings, or of the dataclass, that a place of an error is in."""
     for part in place[:-1]:
         if part in model.model_fields:
-            model = next(_models_in(model.model_fields[str(part)].annotation), model)
-    return model
+            found = next(_models_in(model.model_fields[str(part)].annotation), model)
+            if is_dataclass(found):
+                return [field.name for field in fields(found)]
+            model = found
+    return [*model.model_fields]
 
 
-def _models_in(annotation: Any) -> Iterator[type[Settings]]:  # noqa: ANN401 - a type hint
-    if isinstance(annotation, type) and issubclass(annotation, Settings):
+def _models_in(annotation: Any) -> Iterator[Any]:  # noqa: ANN401 - a type hint
+    if isinstance(annotation, type) and (issubclass(annotation, Settings) or is_dataclass(annotation)):
         yield annotation
     for part in get_args(annotation):
         yield from _models_in(part)
