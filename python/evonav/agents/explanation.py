@@ -122,11 +122,7 @@ class Explanation:
         return self.places() if callable(self.places) else self.places
 
     def diagnostics(self, *, is_first: bool) -> RoundDiagnostics:
-        """Return what records state of the round.
-
-        Args:
-            is_first: Whether it is the first round of a stage.
-        """
+        """Return what records state of the round, which may be the first of a stage."""
         objects = None if callable(self.objects) else self.objects
         frontiers = () if self.map is None or callable(self.map) else self.map.frontiers
         chosen = self.chosen_entry
@@ -151,11 +147,7 @@ def explains(agent: object) -> bool:
 
 
 def explanation_of(agent: Any) -> Explanation:  # noqa: ANN401 - any class may be an agent
-    """Return the explanation of an agent that `explains`.
-
-    Raises:
-        InvalidArgumentError: The method returns something else.
-    """
+    """Return the explanation of an agent that `explains`; `InvalidArgumentError` if the method returns another type."""
     found = agent.explain()
     if not isinstance(found, Explanation):
         raise InvalidArgumentError(f"explain = {str(found)[:100]!r}: must be an evonav.Explanation")

@@ -128,11 +128,7 @@ class Explorer:
         return [frontier for frontier in self.map.frontiers if frontier.id not in self._given_up]
 
     def go_to(self, frontier: Frontier) -> tuple[Point2, Point2]:
-        """Remember that the agent goes to a frontier.
-
-        Returns:
-            Where to stand, and a point to face.
-        """
+        """Remember that the agent goes to a frontier; return where to stand, and a point to face."""
         self._last = frontier
         x_m, z_m = frontier.position_m
         ahead = (x_m + math.sin(frontier.direction_rad), z_m + math.cos(frontier.direction_rad))

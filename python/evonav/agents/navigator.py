@@ -73,7 +73,6 @@ class Navigator:
         """Create an empty memory.
 
         Args:
-            map_frame: Shape and place of the map.
             names_colours: True to keep what views show by name, for rules that look, in place of their images.
             keeps_layouts: True to keep, with `names_colours`, what surrounds objects in views, too.
             keeps_detections: False to keep no detections of views, for an agent that never looks at them again.

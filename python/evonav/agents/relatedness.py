@@ -23,7 +23,6 @@ class Relatedness:
         """Make a comparison.
 
         Args:
-            matcher: Compares labels with the goal.
             feature: `(D,)` unit feature of the goal's text; `None` compares labels.
         """
         self._matcher = matcher

@@ -21,7 +21,6 @@ def observation_point(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        object_m: `(x, z)` of the object's middle.
 
     Returns:
         `(x, z)` of a cell's middle, or `None` if no cell within `distance_m` is known to be free.
@@ -62,8 +61,6 @@ def places_around(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        object_m: `(x, z)` of the object's middle.
-        first_m: `(x, z)` of the first place.
         distance_m: Wanted distance from the object. Places may be up to two cells farther away.
         min_turn_rad: Smallest angle at the object between the first place and another.
         num_directions: Number of directions around the object. For each on another side, the free cell nearest to the
@@ -128,7 +125,6 @@ def widest_direction_rad(
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        here_m: `(x, z)` of the agent.
         reach_m: Distance over which the floor has to be free.
         num_directions: Number of directions to try, evenly spaced from +z clockwise.
 

@@ -46,9 +46,6 @@ def show_tables(tables: "Iterable[Table]", *, notes: "Sequence[str]" = ()) -> No
 
     A table that is wider than the terminal is printed with rows as columns if that fits, else in parts, below each
     other. Agents of files and modules are shown by their classes.
-
-    Args:
-        notes: Notes on all tables.
     """
     from textwrap import fill
 
@@ -208,11 +205,7 @@ def _percent_interval(interval: tuple[float, float] | None) -> str:
 
 
 def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> None:
-    """Print a table of checks.
-
-    Args:
-        checks: Name, result, style of the result, and finding of each check.
-    """
+    """Print a table of checks: name, result, style of the result, and finding of each."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -49,7 +49,6 @@ class CustomClient(CachingClient):
         Args:
             name: Name of the model in the keys of the cache: another name, other exchanges.
             mode: Default `auto` with a store, else `live`.
-            account: Account that counts questions.
             keeps_images: True to store the images' files beside their hashes.
 
         Raises:

@@ -64,11 +64,7 @@ class NoiseRates:
 
     @classmethod
     def read(cls, options: Mapping[str, Any]) -> "NoiseRates":
-        """Read rates by name from JSON.
-
-        Raises:
-            InvalidArgumentError: A name is unknown, or a rate makes no sense.
-        """
+        """Read rates by name from JSON; `InvalidArgumentError` if a name is unknown, or a rate makes no sense."""
         names = [field.name for field in fields(cls)]
         for name, value in options.items():
             if name not in names or isinstance(value, bool) or not isinstance(value, int | float):
@@ -91,8 +87,6 @@ class Noisy(ModelWrapper):
         """Create a model that makes mistakes.
 
         Args:
-            rates: Shares of the mistakes.
-            seed: Seed of the episode's agent.
             sleep: Waits for a number of seconds.
 
         Raises:

@@ -63,11 +63,7 @@ class AskedOptions(PromptOptions):
 
     @classmethod
     def read(cls: type[O], options: Mapping[str, Any]) -> O:
-        """Read options from JSON.
-
-        Raises:
-            InvalidArgumentError: It names the option and its value.
-        """
+        """Read options from JSON; an `InvalidArgumentError` names the option and its value."""
         try:
             return cls.model_validate(options)
         except ValidationError as error:
@@ -86,11 +82,7 @@ class AskedOptions(PromptOptions):
         return self.model_dump(exclude=_IDENTITY, exclude_defaults=True)
 
     def store(self) -> ResponseCache | None:
-        """Open the cache.
-
-        Raises:
-            StoreError: The file cannot be opened.
-        """
+        """Open the cache; `StoreError` if that fails."""
         return None if self.cache is None else ResponseCache(Path(self.cache))
 
     def new_account(self, model: str, price: Price | None = None, max_cost_usd: float | None = None) -> Account:
@@ -132,11 +124,7 @@ class VlmOptions(AskedOptions):
 
     @property
     def config(self) -> VlmConfig:
-        """Configuration of the client.
-
-        Raises:
-            InvalidArgumentError: A name is unknown, or a value makes no sense.
-        """
+        """Configuration of the client; `InvalidArgumentError` if a name is unknown, or a value makes no sense."""
         try:
             return VlmConfig(self.model, **{**SAMPLING, **self.request, **self.server})
         except TypeError as error:

@@ -24,20 +24,12 @@ class Picture:
 
     @property
     def pixels(self) -> NDArray[np.uint8]:
-        """`(H, W, 3)` RGB.
-
-        Raises:
-            InvalidArgumentError: The file is no JPEG.
-        """
+        """`(H, W, 3)` RGB; `InvalidArgumentError` if the file is no JPEG."""
         return pixels_of(self.source) if isinstance(self.source, bytes) else self.source
 
     @cached_property
     def size_px(self) -> tuple[int, int]:
-        """Width and height.
-
-        Raises:
-            InvalidArgumentError: The file is no JPEG.
-        """
+        """Width and height; `InvalidArgumentError` if the file is no JPEG."""
         if isinstance(self.source, bytes):
             return jpeg_size(self.source)
         height, width = self.source.shape[:2]

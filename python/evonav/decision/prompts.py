@@ -82,7 +82,6 @@ def goal_prompt(goal: Goal, *contents: str | tuple[str, Picture | None]) -> Prom
     picture.
 
     Args:
-        goal: The stage's goal.
         contents: Texts, and titles with the image below each, if there is one. Texts that follow each other without an
             image in between are joined by line breaks.
     """

@@ -29,11 +29,7 @@ class AnswerError(DecisionError):
     """A model gave no usable answer to this question; asking again may help."""
 
     def __init__(self, fault: Fault, message: str, text: str = "") -> None:
-        """Create an error.
-
-        Args:
-            text: The model's text, which is no valid answer.
-        """
+        """Create an error; `text` is the model's text, which is no valid answer."""
         super().__init__(f"{fault}: {message}")
         self.fault: Fault = fault
         self.text = text
@@ -86,7 +82,6 @@ class Question(ABC, Generic[A]):
 
         Args:
             answer: The answer that is left out, and with it all answers that go to the same object.
-            matcher: Compares goals with what the agent remembers.
         """
         return ()
 
@@ -100,9 +95,6 @@ class Question(ABC, Generic[A]):
 
     def by_rule(self, matcher: "Matcher") -> tuple[A, str]:
         """Return the text matcher's answer and the reason for it.
-
-        Args:
-            matcher: Compares goals with what the agent remembers.
 
         Raises:
             AnswerError: Nothing fits, and there is nothing to choose.

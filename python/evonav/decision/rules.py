@@ -50,7 +50,6 @@ class AppearanceMatch(TextMatch):
             eagerness: 0 to 1; more ends exploration for an object that is less likely the goal.
             mistakes: Temperature, 0 or more, at which objects are drawn from the posterior; 0 draws none.
             goal_input: Form of the goal that agents go by: the sentence, the picture, or both.
-            seed: Seed of these draws.
 
         Raises:
             InvalidArgumentError: A number is out of range, or there is no such input.

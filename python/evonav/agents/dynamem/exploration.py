@@ -67,10 +67,6 @@ class LastSeen:
     def best_edge(self, occupancy: OccupancyMap, here_m: Point2) -> tuple[Point2, Point2, float] | None:
         """Return the cell beside the reachable floor with the largest value.
 
-        Args:
-            occupancy: The agent's map.
-            here_m: `(x, z)` of the agent.
-
         Returns:
             Middle of the floor's cell beside it, its own middle, and its value; of equal values the nearest, then the
             first. `None` if no floor can be reached.

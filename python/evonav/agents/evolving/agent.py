@@ -214,7 +214,6 @@ def hidden_behind(
     """Return how much of what is unknown is behind each frontier, and the unknown share of the home.
 
     Args:
-        cells: `(R, C)` of the agent's map.
         coarse: A coarser grid over it, whose cells are counted.
 
     Returns:

@@ -106,7 +106,6 @@ def belief_of(
         seen: Sites where an object of the goal's name was seen.
         places: Other sites, and how likely an object of its kind is there, relative to one another.
         unknown_share: Share of the home that the agent does not know, 0 to 1.
-        coverage: The evidence of this stage.
     """
     total_ratio = 1.0 + sum(one.ratio for one in seen.values())  # 1: the target was never seen
     prior = {site: one.ratio / total_ratio * config.persistence**one.num_stages for site, one in seen.items()}

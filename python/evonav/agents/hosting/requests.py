@@ -49,12 +49,7 @@ def write_request(
 
 
 def read_request(request: bytes | bytearray, get: Callable[[Places], list[Any]]) -> tuple[int, str, tuple[Any, ...]]:
-    """Return number, operation and arguments of a request.
-
-    Args:
-        request: Bytes that `write_request` returned.
-        get: Returns arrays of the shared memory.
-    """
+    """Return number, operation and arguments of a request."""
     number, operation, places, content = pickle.loads(request)  # noqa: S301 - from the evaluator
     arrays = get(places)
     if operation == "act":

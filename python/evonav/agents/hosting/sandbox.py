@@ -139,11 +139,7 @@ def begin(socket_fd: int) -> None:
 
 
 def own_status() -> str:
-    """Return the text of `/proc/self/status`, also where `/proc` is shut.
-
-    Raises:
-        OSError: The system has no such file.
-    """
+    """Return the text of `/proc/self/status`, also where `/proc` is shut; `OSError` if the system has no such file."""
     return Path("/proc/self/status").read_text() if _status is None else os.pread(_status, 1 << 16, 0).decode()
 
 

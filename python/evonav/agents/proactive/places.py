@@ -56,7 +56,6 @@ def prior_of(
     Args:
         sightings: Everything that was detected and is no entry.
         unknown: `(R, C)` coarse cells that the map does not know.
-        config: The agent's parameters.
 
     Returns:
         `(R, C)` expected numbers. Without a support in the text, they are the same in all cells. With one, most of

@@ -73,7 +73,6 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
 
     Args:
         placed: Middles of the entries and sightings, and their weights.
-        coarse: The grid of the posterior.
     """
     weights = posterior.moved + posterior.unseen
     for place_m, weight in placed:
@@ -130,12 +129,10 @@ def posterior_of(
     """Return where the target may be.
 
     Args:
-        matcher: Compares the goal with what is remembered.
         sightings: Everything that was detected and is no entry.
         searched: Probabilities that the views of this stage, and of all stages, missed the target.
         factors: Further factors of entries, such as of those whose identity was denied; 1 if not given.
         replaced: Entries whose objects were found at other places.
-        config: The agent's parameters.
     """
     named = [one for one in around.remembered if matcher.names_goal(goal, one)]
     appearances = matcher.appearance_ratios(goal, named) if config.uses_text else [1.0] * len(named)

@@ -24,7 +24,6 @@ def rooms_of(cells: NDArray[np.uint8], frame: MapFrame, furniture: list[ObjectCa
     """Return the room of each cell.
 
     Args:
-        cells: `(R, C)` of the agent's map.
         furniture: Remembered objects; the floor under them belongs to a room, as they are no walls.
 
     Returns:

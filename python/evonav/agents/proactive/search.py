@@ -74,7 +74,6 @@ def places_to_search(
     Args:
         weights: `(R, C)` of the posterior, of the coarse cells that can be searched.
         radius_m: Distance within which a place shows the target.
-        config: The agent's parameters.
 
     Returns:
         Number of the coarse cell, place to stand, middle of what is found there, and its weight.
@@ -113,7 +112,6 @@ def shown_from(
     """Return rows and columns of the coarse cells within a distance of a place that no wall hides from it.
 
     Args:
-        place_m: `(x, z)`.
         walls: `(R, C)` cells of the agent's map that are blocked, and by nothing remembered.
     """
     frame = coarse.frame
@@ -160,9 +158,7 @@ def best_option(
     """Return the option with the largest gain a metre; the last one is kept unless another is clearly better.
 
     Args:
-        last: The last round's option.
         abandoned: Options from which the agent turned away before it was there.
-        config: The agent's parameters.
     """
 
     def rate(one: Option) -> float:

@@ -31,7 +31,6 @@ def place_by(places: Sequence[Point2], placed: Placed, occupancy: OccupancyMap, 
 
     Args:
         placed: Middles of the entries with the goal's name, and their weights.
-        occupancy: The agent's map.
 
     Returns:
         `(x, z)`; `None` if no known floor leads there.
@@ -51,7 +50,6 @@ def likeliest_places(
 
     Args:
         placed: Middles of entries and sightings, and their weights.
-        coarse: The grid of the posterior.
     """
     weights = posterior.moved + posterior.unseen
     for (x_m, z_m), weight in placed:

@@ -28,11 +28,7 @@ class SnapshotMemory:
     """
 
     def __init__(self, reach_m: float = RECLUSTER_REACH_M) -> None:
-        """Create a memory without snapshots.
-
-        Args:
-            reach_m: Entries nearer to the agent than this are clustered again at each update.
-        """
+        """Create a memory that clusters entries nearer to the agent than `reach_m` again at each update."""
         self.reach_m = reach_m
         self.snapshots: list[Snapshot] = []
         """Snapshots by ascending id of their views."""
@@ -49,7 +45,6 @@ class SnapshotMemory:
 
         Args:
             views: The view store, the same at each call.
-            agent_m: `(x, z)` of the agent.
         """
         self._add_frames(views, {entry.id for entry in entries})
         frame_of_view = {view_id: index for index, view_id in enumerate(self._frames)}

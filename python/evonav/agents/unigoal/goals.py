@@ -64,7 +64,6 @@ class GoalWatch:
         Otherwise an agent that turns towards one chair would see another, and turn back, for ever.
 
         Args:
-            category: The goal's category, if it has one.
             seen_ids: Ids of the scene nodes in view.
         """
         mask = None if category is None else largest_detection(view, category)

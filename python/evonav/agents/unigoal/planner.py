@@ -91,7 +91,6 @@ class UniGoalPlanner:
 
         Args:
             bev: The agent's map; the planner adds visited cells and collisions.
-            seed: Seed of the random goals to get unstuck.
         """
         self.bev = bev
         self.config = config or PlannerConfig()
@@ -118,7 +117,6 @@ class UniGoalPlanner:
         """Note the present pose; call this once before each `step`.
 
         Args:
-            pose: The agent's pose.
             action: The agent's own action that has led there. `None`, as at the beginning of a stage or after a guided
                 move, reveals no obstacles.
         """
@@ -181,7 +179,6 @@ class UniGoalPlanner:
         """Choose an exploration target, which stays until the next choice.
 
         Args:
-            pose: The agent's pose.
             mid_term_goal_m: `(x, z)` that decides among frontiers about as near; ignored off the map.
 
         Returns:
@@ -226,7 +223,6 @@ class UniGoalPlanner:
         is shut in by what it has bumped into tries in turn to move and to turn.
 
         Args:
-            pose: The agent's pose.
             goal: Cells, or a point `(x, z)`; `None` for nowhere.
             kind: The kind of goal, which decides how it is grown; only a `confirmed` one ends in `STOP`.
         """

@@ -27,9 +27,6 @@ class Pursuit:
     def choice(self, places: Sequence[Place], here_m: Point2) -> Place | None:
         """Return the place to go to: the last one, else the one with the largest value that was not chosen before.
 
-        Args:
-            here_m: `(x, z)` of the agent.
-
         Returns:
             Of equal values the nearest; if all were chosen before, the nearest; `None` without places.
         """

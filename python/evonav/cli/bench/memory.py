@@ -272,11 +272,7 @@ def chosen_streams(
 
 
 def read_recordings(folders: "Sequence[Path]", up: str) -> "list[RecordingSpec]":
-    """Read recordings except for their images, and say what each has.
-
-    Raises:
-        StoreError: A file is missing or malformed.
-    """
+    """Read recordings except for their images, and say what each has; `StoreError` for a missing or malformed file."""
     from evonav.memory_benchmark.streams.export import read_recording
     from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
 

@@ -39,10 +39,7 @@ def decision_component(
     """Return the component of the decision model, after a check that it can be asked from here.
 
     Args:
-        decisions: The command's settings.
-        spending: Prices and limit.
         out: Folder of the run, which stores answers and costs.
-        seed: The run's.
         num_askers: Number of episodes that may ask the model at once.
         dry_run: Return a model that cannot be asked, for estimates.
 

@@ -65,10 +65,7 @@ def make_pages(
 
     Args:
         task: Id of a task; default: the best highlight.
-        agents: Names; default: all of the run's.
         stages: The stages to show, each on a page of its own; default: all, on one page.
-        tasks: Folder of the run's tasks.
-        exchanges: File of a model's answers.
     """
     from evonav.replay.run_pages import highlight_task
     from evonav.report.run import load_run

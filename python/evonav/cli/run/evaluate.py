@@ -257,11 +257,7 @@ def print_results(out: Path, summaries: "list[AgentSummary]") -> None:
 
 
 def profiled(run: "CommandSettings") -> "CommandSettings":
-    """Return settings with which all processes of a run can be sampled.
-
-    Raises:
-        BadParameter: They cannot.
-    """
+    """Return settings with which all processes of a run can be sampled; `BadParameter` if they cannot."""
     from evonav.parallel.profiling import IS_SUPPORTED
 
     if not IS_SUPPORTED:

@@ -125,11 +125,7 @@ def write_sweep_summary(out: Path) -> "list[SweepRow]":
 
 
 def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
-    """Print tables and files, and how to run errored stages again.
-
-    Returns:
-        True if a stage of the selected cells is missing.
-    """
+    """Print tables, files and how to run errored stages again; true if a stage of the selected cells is missing."""
     from evonav.cli.options.decisions import print_spending
     from evonav.sweeps.report import sweep_tables
 

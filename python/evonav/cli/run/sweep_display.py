@@ -63,11 +63,7 @@ class SweepProgress:
         return progress
 
     def take(self, cell: "Cell", progress: "Progress") -> bool:
-        """Update a cell.
-
-        Returns:
-            True if the cell is now finished.
-        """
+        """Update a cell; return whether it is now finished."""
         state = self.cells[cell.name]
         was_done = state.is_done
         now_s = time.monotonic()

@@ -70,11 +70,7 @@ class AppearanceMatcher(Matcher):
     """Compares goals with remembered objects by what their views show."""
 
     def __init__(self, config: AppearanceConfig | None = None, *, eagerness: float = 0.0) -> None:
-        """Create a matcher.
-
-        Args:
-            eagerness: 0 believes an object at `threshold`, 1 at `eager_threshold`.
-        """
+        """Create a matcher: `eagerness` 0 believes an object at `threshold`, 1 at `eager_threshold`."""
         super().__init__(TextMatchConfig())
         self._pictured: tuple[Goal, Layout] | None = None
         """The last goal with a picture, and the picture's layout, which takes a millisecond."""
@@ -109,7 +105,6 @@ class AppearanceMatcher(Matcher):
         """Return the probability that each object is the goal; the rest is that of "not seen yet".
 
         Args:
-            named: Objects with the goal's name.
             around: Everything remembered; of it, only what an object's own views show counts.
             unseen_m2: Area that the map does not know.
         """
@@ -233,7 +228,6 @@ class MistakenMatcher(AppearanceMatcher):
 
         Args:
             temperature: Above 0; at 1 each object and "not seen yet" is drawn as often as it is likely.
-            seed: Seed of the episode's agent.
             eagerness: See `AppearanceMatcher`; it counts where the draw is "not seen yet".
         """
         super().__init__(eagerness=eagerness)

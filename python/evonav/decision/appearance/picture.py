@@ -31,12 +31,7 @@ def goal_layout(goal: Goal) -> Layout:
 
 
 def picture_ratio(pictured: Layout, seen: Layout, config: PictureConfig) -> float:
-    """Return the probability of what is seen if it is the goal, over that if it is another object of its type.
-
-    Args:
-        pictured: Layout of the goal's picture.
-        seen: Layout around a remembered object.
-    """
+    """Return the probability of what is seen if it is the goal, over that if it is another object of its type."""
     near, whole = distance(pictured.near, seen.near), distance(pictured.whole, seen.whole)
     low, high = config.range
     return min(max(math.exp(config.constant + config.near * near + config.whole * whole), low), high)

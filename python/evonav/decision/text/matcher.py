@@ -150,7 +150,6 @@ class Matcher:
 
         Args:
             named: Objects with the goal's name, at least one.
-            around: Everything remembered.
             unseen_m2: Area that the map does not know; only rules that look use it.
         """
         shares = self.scores(goal, named, around, unseen_m2)

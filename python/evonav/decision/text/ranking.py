@@ -24,11 +24,6 @@ def rank_entries(matcher: Matcher, goal: Goal, entries: Sequence[ObjectCandidate
 
     Stands for the paper's CLIP similarity (Sec. C.4), which ground-truth perception lacks. Ties go to more detections,
     then to the nearer entry, then to the older one.
-
-    Args:
-        matcher: Reads the goal.
-        goal: The stage's goal.
-        position_m: `(x, z)` of the agent.
     """
     return _ranked(matcher.label_scores(matcher.parsed(goal)), entries, position_m)
 
@@ -37,10 +32,6 @@ def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Poi
     """Rank as `rank_entries` does, by the meaning of labels and instruction (extra `evonav[text]`).
 
     It stands for CLIP's image features where a perception has none; the paper (Sec. C.4) compares images with text.
-
-    Args:
-        goal: The stage's goal.
-        position_m: `(x, z)` of the agent.
 
     Raises:
         InvalidArgumentError: The extra is missing or broken.
@@ -75,11 +66,7 @@ def rank_by_feature(
 
 @lru_cache(maxsize=4096)
 def text_feature(text: str) -> NDArray[np.float32]:
-    """Return the `(384,)` unit feature of a sentence.
-
-    Raises:
-        InvalidArgumentError: The extra is missing or broken.
-    """
+    """Return the `(384,)` unit feature of a sentence; `InvalidArgumentError` if the extra is missing or broken."""
     feature = encoder().encode(text)
     feature.setflags(write=False)
     return feature
@@ -119,11 +106,8 @@ def choose_candidate(
     """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near.
 
     Args:
-        matcher: Reads the goal.
         objects: Remembered objects, the best first.
-        frontiers: Frontiers that can be explored.
         surroundings: Everything remembered.
-        num_rounds_left: Number of decision rounds that are left in the stage.
         unseen_m2: Area that the map does not know, for rules that look.
         is_final: Settle for the object that fits best if it is of the goal's kind, even if its relations do not hold;
             without frontiers, for whatever may help.

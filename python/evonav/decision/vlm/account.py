@@ -56,7 +56,6 @@ def image_tokens(size_px: tuple[int, int], detail: str) -> int:
     """Return the tokens of an image, as gpt-4o counts them; other models differ.
 
     Args:
-        size_px: Width and height.
         detail: `low`, `high` or `auto`, which is taken for `high`.
     """
     if detail == "low":

@@ -24,11 +24,7 @@ class ModelAnswer:
 
 
 def read_response(text: str) -> JsonObject:
-    """Read the body of a response.
-
-    Raises:
-        VlmError: It is no JSON object.
-    """
+    """Read the body of a response; `VlmError` if it is no JSON object."""
     try:
         response = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -47,11 +43,7 @@ def usage_of(response: JsonObject) -> Usage | None:
 
 
 def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
-    """Return the answer in a response.
-
-    Raises:
-        VlmError: There is no complete answer.
-    """
+    """Return the answer in a response; `VlmError` if there is no complete one."""
     choices = response.get("choices")
     choice = choices[0] if isinstance(choices, list) and choices else None
     message = choice.get("message") if isinstance(choice, dict) else None

@@ -157,11 +157,7 @@ class CachingClient(ABC):
 
     @abstractmethod
     def _ask_model(self, prompt: Prompt, attempt: int) -> JsonObject:
-        """Ask the model itself.
-
-        Args:
-            attempt: Number of earlier tries without a valid answer.
-        """
+        """Ask the model itself."""
 
     @abstractmethod
     def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:

@@ -69,11 +69,7 @@ class VlmConfig:
     """Largest rate of tokens of this process, by estimate."""
 
     def __post_init__(self) -> None:
-        """Check all fields.
-
-        Raises:
-            InvalidArgumentError: It names the field.
-        """
+        """Check all fields; an `InvalidArgumentError` names the one that is wrong."""
         ranges = {
             "timeout_s": (1e-3, 1e6),
             "max_retries": (0, 1000),

@@ -50,11 +50,7 @@ class VlmDecision(DecisionModel):
     """Answers every question by asking a model."""
 
     def __init__(self, client: CachingClient | RelayedClient, options: PromptOptions = _USUAL) -> None:
-        """Create a decision model.
-
-        Raises:
-            InvalidArgumentError: A model without images is to go by a picture.
-        """
+        """Create a decision model; `InvalidArgumentError` if one without images is to go by a picture."""
         check_goal_input(options.goal_input, sees_images=options.images)
         self.client = client
         self.goal_input = options.goal_input

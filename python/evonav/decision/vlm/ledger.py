@@ -57,11 +57,7 @@ class Ledger(SharedFile):
     """A ledger file; any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
-        """Open or create the file.
-
-        Raises:
-            StoreError: It cannot be opened.
-        """
+        """Open or create the file; `StoreError` if that fails."""
         super().__init__(path, _SCHEMA, "spending")
 
     def reserve(self, model: str, cost_usd: float, max_cost_usd: float | None) -> None:

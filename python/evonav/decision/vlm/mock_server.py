@@ -101,7 +101,6 @@ def faulty(
     Args:
         rates: Share of requests, by name in `FAULTS`.
         seed: Seed that selects the faulty requests, by their number.
-        answer: Answers the other requests.
 
     Raises:
         InvalidArgumentError: A fault is unknown, or the shares are not within 0 to 1.
@@ -129,22 +128,14 @@ def faulty(
 
 
 def without_schemas(request: JsonObject) -> None:
-    """Check requests as a server does that supports no schema.
-
-    Raises:
-        InvalidArgumentError: The request has a schema.
-    """
+    """Check requests as a server does that supports no schema: `InvalidArgumentError` for a request with one."""
     if "response_format" in request:
         raise InvalidArgumentError("Unsupported parameter: 'response_format' of type 'json_schema'")
 
 
 @contextmanager
 def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> Iterator[MockServer]:
-    """Serve while the context lasts; `server.url` has the address.
-
-    Raises:
-        InvalidArgumentError: The port is not available.
-    """
+    """Serve while the context lasts, at `server.url`; `InvalidArgumentError` if the port is not available."""
     try:
         http = _QuietServer((host, port), _handler(server))
     except OSError as error:

@@ -86,11 +86,7 @@ class RelayedClient:
     """Stands in for a client of a model that another process asks."""
 
     def __init__(self, descriptor: int, *, never_asks: bool) -> None:
-        """Use an inherited connection.
-
-        Args:
-            never_asks: True if only cached answers are returned.
-        """
+        """Use an inherited connection; `never_asks` if only cached answers are returned."""
         self._descriptor = descriptor
         self.never_asks = never_asks
         os.set_inheritable(descriptor, False)

@@ -63,11 +63,7 @@ class ResponseCache(SharedFile):
     """A cache of exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
-        """Open or create the file.
-
-        Raises:
-            StoreError: It cannot be opened or is no such file.
-        """
+        """Open or create the file; `StoreError` if that fails, or it is no such file."""
         super().__init__(path, _SCHEMA, "exchanges")
 
     def __len__(self) -> int:
@@ -116,7 +112,6 @@ class ResponseCache(SharedFile):
 
         Args:
             request: The request, with names in place of its images.
-            pictures: The images to store.
 
         Returns:
             Its key.

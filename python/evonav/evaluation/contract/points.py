@@ -30,11 +30,7 @@ class Check:
 
 
 def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
-    """Yield the checks of an agent that has run one episode.
-
-    Args:
-        records: The records of the episode's stages.
-    """
+    """Yield the checks of an agent that has run one episode."""
     yield _sensors(probe)
     calls = {"begin_task": "a new house", "begin_stage": "a new goal in the same house", "act": "a decision round"}
     for name, what in calls.items():

@@ -69,12 +69,7 @@ class Script:
 def check_situations(
     backend: Backend, tasks: Path, name: str, new_agent: Callable[[], Agent | HostedAgent], seed: int
 ) -> Iterator[Check]:
-    """Run an agent through all scripts, and yield a check for each situation.
-
-    Args:
-        backend: The parts of the evaluation.
-        new_agent: Makes a fresh agent for each script.
-    """
+    """Run an agent through all scripts, and yield a check for each situation."""
     with closing(backend.simulator.create()) as simulator:
         for script in _scripts(backend, tasks, simulator):
             perception = backend.perception.create()

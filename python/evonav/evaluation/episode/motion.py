@@ -220,7 +220,6 @@ def walk(simulator: Simulator, leg_m: Sequence[Point2], yaw_rad: float | None = 
     """Move the agent along a piece of a path that is known to be free.
 
     Args:
-        simulator: The simulator whose agent is moved.
         leg_m: Points, the agent's own first.
         yaw_rad: Heading at the end; default: that of travel.
     """

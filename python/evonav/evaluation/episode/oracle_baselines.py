@@ -106,7 +106,6 @@ def new_oracle_baseline(name: str, decision: DecisionModel | None = None) -> Ora
     """Make an oracle baseline.
 
     Args:
-        name: A name in `ORACLE_BASELINES`.
         decision: Handed to one that takes one; default: its own.
 
     Raises:

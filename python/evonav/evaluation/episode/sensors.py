@@ -43,9 +43,6 @@ class Sensors:
         """Create sensors at the simulator's pose.
 
         Args:
-            simulator: A simulator with the stage's house.
-            perception: The run's perception.
-            sensors: The sensors that the agent was granted.
             scene: The stage as the perception may know it.
             staleness: Receives every frame.
             stopwatch: Measures rendering and perception.

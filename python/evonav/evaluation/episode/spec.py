@@ -81,11 +81,7 @@ class EpisodeSpec:
     """The name that agents are given instead of `task_id`: see `opaque_task_id`."""
 
     def parsed_house(self, stage: int) -> House:
-        """Parse the house as it is in a stage (1-based).
-
-        Raises:
-            HouseError: The house is malformed.
-        """
+        """Parse the house as it is in a stage (1-based); `HouseError` if it is malformed."""
         return _parsed(self.stages[stage - 1].house_json, self.house)
 
     def floor_plan(self, stage: int) -> FloorPlan:
@@ -122,11 +118,7 @@ class EpisodeSpec:
 
 
 def episode_spec(task: Task) -> EpisodeSpec:
-    """Describe a task for the evaluator.
-
-    Raises:
-        TaskError: A stage house is malformed.
-    """
+    """Describe a task for the evaluator; `TaskError` if a stage house is malformed."""
     numbers = range(1, task.num_stages + 1)
     return EpisodeSpec(
         task_id=task.task_id,

@@ -66,7 +66,6 @@ class Stage:
         Args:
             state: The episode's state, which the stage updates.
             requested: Pose at which the agent should start.
-            stopwatch: Adds up the time that the stage takes.
         """
         self._state = state
         self._spec = context.spec

@@ -131,7 +131,6 @@ def change_around(
     Args:
         delta_json: The change, as `House.apply` takes it.
         config: The simulator's, for the agent's body.
-        pose: The agent's pose.
         target_id: The object that has to stay within reach.
 
     Returns:

@@ -37,8 +37,6 @@ def matched_object(label: str, centre_m: Point3, bodies: Mapping[str, Sequence[S
     """Return the object that an entry stands for; `None` for a stale entry.
 
     Args:
-        label: The entry's label.
-        centre_m: The entry's centre, `(x, y, z)`.
         bodies: The objects of the stage's house by category.
 
     Returns:
@@ -68,12 +66,7 @@ def matched_objects(
 
 
 def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]]) -> EntryRecord:
-    """Return an entry for the record, with the evaluator's judgement whether it is stale.
-
-    Args:
-        belief: The entry as the agent believes it.
-        bodies: The objects of the stage's house by category.
-    """
+    """Return an entry for the record, with the evaluator's judgement whether it is stale."""
     return EntryRecord(
         entry_id=belief.entry_id,
         label=belief.label,
@@ -102,7 +95,6 @@ def shows_place(frame: Frame, belief: EntryBelief) -> bool:
     """Return whether a view shows the centre of an entry: in the image, near enough, and not hidden.
 
     Args:
-        frame: A view with depth.
         belief: An entry; what stands in its own box does not hide it.
     """
     pose, intrinsics = frame.pose, frame.intrinsics

@@ -41,11 +41,7 @@ class SharedBlock:
     """Memory that the evaluator writes and another process can read."""
 
     def __init__(self, *, saves_memory: bool = False) -> None:
-        """Create an empty block.
-
-        Args:
-            saves_memory: Give back what the next arrays in a slot do not need, which takes time (Linux).
-        """
+        """Create an empty block; `saves_memory` gives back what a slot's next arrays do not need, slowly (Linux)."""
         self._saves_memory = saves_memory and hasattr(mmap, "MADV_REMOVE")
         if hasattr(os, "memfd_create"):
             import fcntl

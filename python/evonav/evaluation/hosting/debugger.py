@@ -13,11 +13,7 @@ from evonav.tasks.public import Goal, TaskInfo
 
 
 def check_terminal() -> None:
-    """Check that a debugger can be used here.
-
-    Raises:
-        InvalidArgumentError: Input or output is no terminal.
-    """
+    """Check that a debugger can be used here; `InvalidArgumentError` if input or output is no terminal."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise InvalidArgumentError(
             "--pdb needs a terminal to type in; without one, --fail-fast prints the traceback of the first error"

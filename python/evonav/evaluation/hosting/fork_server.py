@@ -72,11 +72,7 @@ class ForkedProcess:
         return self._code
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait for the exit code.
-
-        Raises:
-            subprocess.TimeoutExpired: The process still runs.
-        """
+        """Wait for the exit code; `subprocess.TimeoutExpired` if the process still runs."""
         if self._code is None:
             if not select.select([self._state], [], [], timeout)[0]:
                 raise subprocess.TimeoutExpired("agent", timeout or 0.0)
@@ -130,7 +126,6 @@ class ForkServer:
 
         Args:
             environment: Environment of the server; default: this process's. Forks can find it in their memory.
-            path: Import path of the server.
         """
         self._environment = environment
         self._path = path

@@ -116,11 +116,7 @@ def isolation_facts(hosting: AgentHosting) -> str:
 
 
 def environment(scratch: Path) -> dict[str, str]:
-    """Return the environment of a process in a sandbox.
-
-    Args:
-        scratch: The one folder in which it may write.
-    """
+    """Return the environment of a process in a sandbox, which may write in the folder `scratch` only."""
     given = {name: os.environ[name] for name in _VARIABLES if name in os.environ}
     own = {"HOME": str(scratch), "TMPDIR": str(scratch), "PYTHONDONTWRITEBYTECODE": "1", "HF_HUB_OFFLINE": "1"}
     return {**given, **{name: str(folder) for name, folder in _caches().items()}, **own}

@@ -119,9 +119,6 @@ class Backend:
     def check_perception(self, agents: Sequence[str]) -> dict[str, Any]:
         """Check that the perception finds all that it needs here.
 
-        Args:
-            agents: The agents that will use it.
-
         Returns:
             Hashes of weights and versions of libraries, where they decide what the agents see.
 
@@ -239,10 +236,6 @@ def _config(hfov_deg: float = USUAL_CAMERA["hfov_deg"], **values: Any) -> Simula
 
 
 def check_sandbox(decision: Component[DecisionModel]) -> None:
-    """Check that agents which ask this decision model can run in a sandbox.
-
-    Raises:
-        InvalidArgumentError: They cannot, and why.
-    """
+    """Check that agents which ask this decision model can run in a sandbox; an `InvalidArgumentError` says why not."""
     if reason := sandbox_problem() or sandboxed_model_problem(decision):
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")

@@ -151,11 +151,7 @@ class Schedule:
     """The jobs of several runs: those that wait for a worker, and those that a pool runs."""
 
     def __init__(self, runs: Sequence[Evaluation], num_retries: int) -> None:
-        """Let all jobs wait.
-
-        Args:
-            num_retries: Number of retries of a stage whose worker was lost.
-        """
+        """Let all jobs wait."""
         self._runs = runs
         self._num_retries = num_retries
         self._waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
@@ -163,11 +159,7 @@ class Schedule:
         self._numbers = count()
 
     def fill(self, pool: Pool) -> bool:
-        """Submit waiting jobs, as the pool has room.
-
-        Returns:
-            True while a job is under way, so that there will be another answer.
-        """
+        """Submit waiting jobs, as the pool has room; true while a job is under way, so that an answer will come."""
         while self._waiting and len(self._under_way) < pool.capacity:
             episode, number = self._waiting.popleft(), next(self._numbers)
             self._under_way[number] = episode

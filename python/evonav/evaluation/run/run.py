@@ -105,7 +105,6 @@ class Evaluation:
 
         Args:
             scratch: Folder in which agents in sandboxes may write.
-            num_retries: Number of retries of a stage.
         """
         config, hosting, is_one_of_many = self.config, self.config.hosting, workforce.jobs_at_once > 1
         if not hosting.is_in_process and (workforce.num_workers == 0 or not IS_SUPPORTED):
@@ -283,11 +282,7 @@ class Evaluation:
         return True
 
     def left_behind(self, job: EpisodeJob, failure: StageFailure) -> Iterator[EncodedStage]:
-        """Make up the missing stages of a job that ended early: the first is errored, the rest are not run.
-
-        Yields:
-            Stages to `add`.
-        """
+        """Yield the missing stages of a job that ended early, to `add`: the first is errored, the rest are not run."""
         task = next(task for task in self.tasks if task.task_id == job.task_id)
         plans: dict[int, FloorPlan | None] = {}
         try:

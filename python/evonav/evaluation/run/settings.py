@@ -197,11 +197,7 @@ class DecisionSettings(Settings):
         return ANSWER_TIMEOUT_S if self.asks_rules else VLM_ANSWER_TIMEOUT_S
 
     def named_model(self) -> str:
-        """Return the name of the model on the server.
-
-        Raises:
-            SettingError: No model is named.
-        """
+        """Return the name of the model on the server; `SettingError` if none is named."""
         model = self.model or os.environ.get(MODEL_VARIABLE)
         if not model:
             raise SettingError(
@@ -240,11 +236,7 @@ class DecisionSettings(Settings):
             raise SettingError(type(self), "exchanges", "is of no use with mode live, which stores nothing")
 
     def identity(self, seed: int) -> dict[str, Any]:
-        """Return the options that decide the model's answers: part of a run's identity.
-
-        Raises:
-            SettingError: No model is named.
-        """
+        """Return the options that decide the answers, part of a run's identity; `SettingError` if no model is named."""
         changed: dict[str, Any] = {"noise": dict(self.noise)} if self.noise else {}
         if self.goal_input != "text":
             changed["goal_input"] = self.goal_input
@@ -283,7 +275,6 @@ class DecisionSettings(Settings):
         """Return the component of this decision model.
 
         Args:
-            seed: The run's.
             resources: The files for answers and costs; without them the model cannot be asked, which is
                 enough for estimates.
 

@@ -84,11 +84,7 @@ class EpisodeJob:
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
     def text(self, run: int) -> str:
-        """Return the text of the job for a worker.
-
-        Args:
-            run: Number of the job's run among the setups that the worker has.
-        """
+        """Return the text of the job for a worker; `run` numbers its run among the setups that the worker has."""
         return f"{run}\n{json.dumps(asdict(self))}"
 
 
