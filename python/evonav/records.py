@@ -13,6 +13,8 @@ Point2 = tuple[Real, Real]
 """`(x, z)` in metres."""
 Point3 = tuple[Real, Real, Real]
 """`(x, y, z)` in metres, or Unity Euler angles in degrees."""
+Version = Annotated[int, Field(ge=1, le=1, strict=True)]
+"""The version of a file's format, of which there is one so far. `Literal[1]` would take `true` for it."""
 
 
 class Record(BaseModel):

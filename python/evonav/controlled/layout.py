@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 
 from evonav.errors import TaskError
 from evonav.parallel.folders import write_atomically
-from evonav.records import Record
+from evonav.records import Record, Version
 from evonav.tasks.dataset import HouseRejection, SourceFile
 from evonav.tasks.manifest import TaskId
 from evonav.tasks.parameters import GenerationParameters
@@ -34,7 +34,7 @@ class Arm(Record):
 class ControlledRecord(Record):
     """All of `controlled.json`."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Version = 1
     kind: Kind
     arms: Annotated[tuple[Arm, ...], Field(min_length=2)]
     generator: Id

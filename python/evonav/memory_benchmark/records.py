@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import FailureKind, Hosting
@@ -10,10 +10,8 @@ from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
 from evonav.memory_benchmark.metrics.staleness import Spell
 from evonav.memory_benchmark.metrics.updates import UpdateCounts
+from evonav.records import Version
 from evonav.report.measurements import MeasurementRecord, read_model
-
-SCHEMA_VERSION: Literal[1] = 1
-"""Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
 
 
 class MemoryFailure(MeasurementRecord):
@@ -96,7 +94,7 @@ class MemoryResult(MeasurementRecord):
 class BenchmarkResult(MeasurementRecord):
     """All memories of one run of the benchmark."""
 
-    schema_version: Literal[1] = SCHEMA_VERSION
+    schema_version: Version = 1
     evonav_version: str
     machine: str
     """The processor and the number of its cores: times of different machines do not compare."""

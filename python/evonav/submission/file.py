@@ -9,14 +9,14 @@ import stat
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.schema import StageRecord
 from evonav.parallel.folders import replacing
-from evonav.records import Record, sentence_of
+from evonav.records import Record, Version, sentence_of
 from evonav.tasks.manifest import TaskId
 from evonav.tasks.records import Sha256
 
@@ -65,7 +65,7 @@ class About(Record):
 class Submission(Record):
     """The header of a packed run."""
 
-    format_version: Literal[1] = 1
+    format_version: Version = 1
     evonav: _Name
     """Version of evonav that packed the file."""
     about: About

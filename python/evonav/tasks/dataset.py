@@ -9,10 +9,10 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 
 from evonav.errors import StoreError, TaskError
 from evonav.parallel.folders import write_atomically
-from evonav.records import Record
+from evonav.records import Record, Version
 from evonav.tasks.manifest import Task, TaskId
 from evonav.tasks.parameters import GenerationParameters
-from evonav.tasks.records import Id, Sha256, Version, field_error, parse_record, read_file, record_bytes, sha256_of
+from evonav.tasks.records import Id, Sha256, field_error, parse_record, read_file, record_bytes, sha256_of
 
 DATASET_NAME = "dataset.json"
 

@@ -16,11 +16,11 @@ from pydantic import (
 )
 
 from evonav.house import House
-from evonav.records import Record
+from evonav.records import Record, Version
 from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.public import Goal
-from evonav.tasks.records import Id, PoseRecord, Sha256, Version, record_bytes, sha256_of
+from evonav.tasks.records import Id, PoseRecord, Sha256, record_bytes, sha256_of
 from evonav.world.pose import Pose
 
 TaskId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,127}$")]

@@ -9,8 +9,8 @@ from pydantic import (
     PositiveInt,
 )
 
-from evonav.records import Point2, Point3, Record
-from evonav.tasks.records import Id, PoseRecord, Probability, Sha256, Version
+from evonav.records import Point2, Point3, Record, Version
+from evonav.tasks.records import Id, PoseRecord, Probability, Sha256
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
 """Modification of a room (paper, Sec. 3.2)."""

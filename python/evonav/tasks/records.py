@@ -25,8 +25,6 @@ MAX_FILE_BYTES = 64 * 2**20
 
 Id = Annotated[str, Field(min_length=1, max_length=256)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
-Version = Annotated[int, Field(ge=1, le=1)]
-"""The schema version of a file, of which there is one so far. `Literal[1]` would take `true` for it."""
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, NonNegativeInt
 
 from evonav.errors import InvalidArgumentError
-from evonav.records import Record
+from evonav.records import Record, Version
 from evonav.statistics import effective_size
 
 Range = tuple[float, float]
@@ -116,7 +116,7 @@ class Weighting(Record):
 class TaskStatistics(Record):
     """The content of `statistics.json`."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Version = 1
     sources: tuple[str, ...]
     """Folders of the tasks, as given on the command line."""
     generators: tuple[str, ...]

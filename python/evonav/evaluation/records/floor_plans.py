@@ -2,7 +2,6 @@
 
 from base64 import b64encode
 from io import BytesIO
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from pydantic import ValidationError
 from evonav.drawing.plan import HousePlan, ObjectFootprint, plan_of
 from evonav.evaluation.records.base import Whole
 from evonav.house import House
+from evonav.records import Version
 
 _OBJECTS, _AFTER, _OBJECT = '"objects":[', '],"schema_version":', '{"object_id":'
 """Texts before, behind and within the objects, as evonav writes them.
@@ -21,7 +21,7 @@ JSON has no quotation mark within a string that is not escaped, so none of these
 class FloorPlan(HousePlan):
     """A stage's house from above, the background of maps. It is the same for all agents."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Version = 1
     task_id: str
     house: str
     stage: Whole

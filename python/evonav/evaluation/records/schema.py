@@ -13,7 +13,7 @@ from pydantic import Field
 
 from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Whole, WholeRecord
 from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
-from evonav.records import Point2, Point3, Real
+from evonav.records import Point2, Point3, Real, Version
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
@@ -238,7 +238,7 @@ class RoundRecord(CheckedRecord):
 class StageRecord(WholeRecord):
     """One stage of one agent's episode. Metrics are `None` unless the state is success or failure."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Version = 1
     agent: str
     """The name by which the agent was requested: `fu`, `stage-reset`, `my_package:MyAgent`."""
     task_id: str

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from evonav.memory_benchmark.truth import TrueChange
-from evonav.records import Record
+from evonav.records import Record, Version
 from evonav.world.simulator import SceneObject
 
 LayoutName = Literal["tum", "replica"]
@@ -59,7 +59,7 @@ class LayoutCamera(Record):
 class StreamFile(Record):
     """The public part of an exported stream, `stream.json`."""
 
-    format: Literal[1] = 1
+    format: Version = 1
     name: str
     kind: str
     house: str
