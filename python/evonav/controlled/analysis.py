@@ -98,12 +98,7 @@ class Analysis:
 
 
 def load_analysis(directory: Path) -> Analysis:
-    """Read the runs of a controlled analysis, finished or not.
-
-    Raises:
-        TaskError: There is no controlled analysis.
-        StoreError: No agent was run in it, or a run cannot be read.
-    """
+    """Read the runs of a controlled analysis, finished or not."""
     record = read_controlled(directory)
     outcomes: dict[tuple[str, str], dict[Key, RecordedStage]] = {}
     agents: set[str] = set()

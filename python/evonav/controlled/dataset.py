@@ -20,12 +20,7 @@ from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.records import Record
-from evonav.tasks.dataset import (
-    DatasetRecord,
-    SourceFile,
-    TaskEntry,
-    write_dataset,
-)
+from evonav.tasks.dataset import DatasetRecord, SourceFile, TaskEntry, write_dataset
 from evonav.tasks.files import read_house
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import Task, TaskHeader
@@ -91,12 +86,7 @@ def generate_controlled(
         on_progress(num_before, num_all)
         if num_before < num_all:
             settings = ArmWorkerSettings(out=str(out), options=options).model_dump_json()
-            with open_pool(
-                WORK,
-                settings,
-                workforce,
-                timeout_s=HOUSE_TIMEOUT_S,
-            ) as pool:
+            with open_pool(WORK, settings, workforce, timeout_s=HOUSE_TIMEOUT_S) as pool:
                 left = [index for index in range(num_all) if index not in journal.outcomes]
                 for answer in answers(pool, (_job(index, houses, options) for index in left)):
                     journal.add(outcome_of(answer, houses[answer.key // options.per_house].name))
@@ -124,9 +114,6 @@ class ArmWorkerSettings(Record):
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
-
-    Args:
-        settings: `ArmWorkerSettings` as JSON.
 
     Returns:
         See `worker_of`; a seed heads a house, beside the name.

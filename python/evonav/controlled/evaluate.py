@@ -28,20 +28,8 @@ def evaluate_controlled(
     task.
 
     Args:
-        directory: Holds `controlled.json`.
-        agents: Names, see `evonav agents`.
         workforce: The workers that all arms share. Default: one process, with one episode at a time.
-        num_retries: Number of retries of a stage, see `evaluate_all`.
-        retry_errored: Run errored stages again.
         on_progress: Called with an arm's name after each of its recorded stages.
-
-    Returns:
-        By arm, one summary an agent.
-
-    Raises:
-        TaskError: There is no controlled analysis, or a task is malformed.
-        InvalidArgumentError: An agent is unknown, or asked for twice.
-        StoreError: A run's folder holds another run, or cannot be written.
     """
     arms = [arm.name for arm in read_controlled(directory).arms]
     runs = [

@@ -43,11 +43,7 @@ class ControlledOptions(Record):
     allow_unknown_assets: bool = False
 
     def model_post_init(self, _context: object) -> None:
-        """Check the domains of the values.
-
-        Raises:
-            InvalidArgumentError: A value is outside its domain.
-        """
+        """Check the domains of the values."""
         if self.per_house < 1:
             raise InvalidArgumentError(f"per_house = {self.per_house}: must be at least 1")
         are_probabilities = all(0.0 <= rate <= 1.0 for rate in self.rates)

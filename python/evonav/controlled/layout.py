@@ -54,11 +54,7 @@ class ControlledRecord(Record):
 
 
 def write_controlled(record: ControlledRecord, directory: Path) -> Path:
-    """Write `controlled.json`, all of it or nothing.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
+    """Write `controlled.json`, all of it or nothing."""
     return write_atomically(directory / FILE_NAME, record_bytes(record))
 
 

@@ -59,13 +59,6 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     Args:
         directory: Folder of the analysis; its runs may be unfinished.
         out: Default: its folder `report`.
-
-    Returns:
-        Path of the page.
-
-    Raises:
-        TaskError: There is no controlled analysis.
-        StoreError: A run cannot be read, or a file not written.
     """
     out = out or directory / "report"
     analysis = load_analysis(directory)

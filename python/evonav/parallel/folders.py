@@ -138,9 +138,6 @@ def put_folder(written: Path, root: Path, *, aside: Path) -> None:
 
     Args:
         aside: A path in the same file system for the old folder meanwhile; what is there is removed.
-
-    Raises:
-        OSError: It cannot be moved.
     """
     if root.exists():
         if aside.exists():
@@ -174,11 +171,7 @@ def _mount_of(path: Path) -> tuple[str, str]:
 
 
 def sha256_of_file(path: Path) -> str:
-    """Return the SHA-256 of a file's bytes, hexadecimal.
-
-    Raises:
-        OSError: It cannot be read.
-    """
+    """Return the SHA-256 of a file's bytes, hexadecimal."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(1 << 20):

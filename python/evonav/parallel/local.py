@@ -69,8 +69,6 @@ class ProcessHost:
         """Remember the program and its settings; no process is started.
 
         Args:
-            program: The code of a worker.
-            settings: Text with which the factory is called.
             has_threads: Run each job on a thread of its own.
         """
         self._program, self._settings, self._has_threads = program, settings, has_threads

@@ -98,10 +98,8 @@ def open_pool(
 
     Args:
         work: `module:factory`.
-        settings: Text with which the factory is called.
         timeout_s: Longest silence of a job before it is abandoned.
         max_losses: Number of workers that a job may lose before it fails.
-        prelude: See `evonav.parallel.local.Program`.
 
     Raises:
         EngineError: Ray is not installed or cannot be reached.
@@ -124,7 +122,6 @@ def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
     """Run jobs that send no progress, in any order, and yield their answers.
 
     Args:
-        pool: The pool that runs them; it is kept busy.
         jobs: Taken one by one, as the pool has room.
     """
     left, num_open = iter(jobs), 0

@@ -21,7 +21,6 @@ class RayHost:
 
         Args:
             work: `module:factory`, see `evonav.parallel.pool.open_pool`.
-            settings: Text with which the factory is called.
             workforce: The address of the cluster to join, and what is reserved for each worker. A cluster that is
                 started here has CPUs for all workers.
 

@@ -79,8 +79,6 @@ def serve(
     """Be a worker: load the work, run all jobs, and send their messages.
 
     Args:
-        work_name: `module:factory`.
-        settings: Text with which the factory is called.
         has_threads: Run each job on a thread of its own, as it comes. Otherwise the next one is taken when the one
             before has ended.
     """

@@ -44,7 +44,6 @@ def write_episode(
     """Write an episode's page, or one per stage where one would be too large.
 
     Args:
-        budget: Rounds that the agent had in a stage.
         success_radius_m: Radius of the ring around the target.
         only: The one stage to show.
         records_sha256: Digest of the episode's records as stored.
@@ -68,11 +67,7 @@ def write_episode(
 
 
 def write_index(pages: Iterable[ListedPage], out_dir: Path, run_name: str) -> Path:
-    """Write `index.html`, which links to these pages and to those that were written there before.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
+    """Write `index.html`, which links to these pages and to those that were written there before."""
     rows = {page.href: page for page in listed_pages(out_dir)}
     rows |= {page.href: page for page in pages}
     ordered = sorted(rows.values(), key=lambda row: (row.task_id, row.agent, row.stages[0][0]))

@@ -47,10 +47,6 @@ def write_recording(
 ) -> Path:
     """Write an episode as a recording, with the timelines `step`, `stage` and `round`.
 
-    Args:
-        maps: Floor plans of the task, by stage.
-        success_radius_m: Radius of the ring around the target.
-
     Raises:
         InvalidArgumentError: The file's suffix is another one, or there is no stage.
         StoreError: rerun is not installed, or the file cannot be written.

@@ -36,9 +36,6 @@ def write_pages(
 
     Returns:
         The pages, and the path of the index.
-
-    Raises:
-        TaskError: A task is not there.
     """
     replay = RunReplay(run.run_dir, task_path(run.run_dir, tasks), exchanges)
     out_dir = out or run.run_dir / VIEW_DIR

@@ -40,7 +40,6 @@ def write_video(stages: Iterable[Iterable[Image.Image]], path: Path, *, fps: flo
 
     Args:
         stages: Pictures of each stage, all of the same size; the last of each is shown for `END_S`.
-        fps: Pictures a second.
         width_px: Width of the video; its height follows, both even.
 
     Returns:

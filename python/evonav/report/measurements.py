@@ -32,17 +32,11 @@ def finished(
     """Run jobs on workers, in the order in which they end.
 
     Args:
-        work: Import path of the function that makes a worker, see `evonav.parallel.pool`.
-        settings: Text for that function.
-        text_of: Returns the text that a worker is sent for a job.
         num_workers: Number of processes; 0 runs everything in this one.
         timeout_s: Time without a sign of life after which a job is given up.
 
     Yields:
         The job, its answer or `None`, and the last line of what went wrong.
-
-    Raises:
-        EngineError: Workers cannot be started.
     """
     if not jobs:
         return

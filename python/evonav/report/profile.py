@@ -52,11 +52,7 @@ def profiling(run_dir: Path) -> Iterator[None]:
 
 
 def write_profile(run_dir: Path) -> RunProfile:
-    """Write the flame graph and the tables of a run that `profiling` sampled.
-
-    Raises:
-        StoreError: Samples or records cannot be read, or a file cannot be written.
-    """
+    """Write the flame graph and the tables of a run that `profiling` sampled."""
     folder = run_dir / FOLDER
     samples = read_samples(folder / SAMPLES_NAME)
     tables = (component_table(run_dir), *map(function_table, samples))

@@ -89,11 +89,7 @@ _Line = TypeVar("_Line", Submission, StageRecord)
 
 
 def write_submission(path: Path, header: Submission, records: Iterable[str]) -> None:
-    """Write a packed run, whole or not at all. The same contents give the same bytes.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
+    """Write a packed run, whole or not at all. The same contents give the same bytes."""
     with replacing(path) as beside, beside.open("wb") as raw, gzip.GzipFile("", "wb", fileobj=raw, mtime=0) as file:
         for text in (header.model_dump_json(), *records):
             file.write(f"{text}\n".encode())

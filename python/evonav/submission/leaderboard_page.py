@@ -30,11 +30,7 @@ _SPLITS = ("relocated", "not_relocated")
 
 
 def write_leaderboard(board: Leaderboard, path: Path, title: str) -> Path:
-    """Write the page, and return its path.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
+    """Write the page, and return its path."""
     tables = sorted(board.tables.items(), key=lambda table: (-len(table[1]), str(table[0])))
     text = page_text(
         "leaderboard.html.j2",

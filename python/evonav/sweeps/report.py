@@ -19,14 +19,7 @@ from evonav.sweeps.summary import AXES, STATES, SweepRow
 
 
 def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str, Any]) -> None:
-    """Write `summary.json`, `summary.csv` and `summary.md` of a sweep.
-
-    Args:
-        content: Content of `summary.json`.
-
-    Raises:
-        StoreError: They cannot be written.
-    """
+    """Write `summary.json`, `summary.csv` and `summary.md` of a sweep."""
     write_atomically(out / "summary.json", json.dumps(content, indent=2, sort_keys=True) + "\n")
     write_atomically(out / "summary.csv", sweep_csv(rows))
     title = content["name"] or out.resolve().name
@@ -137,17 +130,7 @@ def _series(rows: Sequence[SweepRow], axes: Sequence[str], groups: Sequence[str]
 
 
 def write_sweep_page(out_dir: Path, name: str, rows: Sequence[SweepRow], reports: Sequence[tuple[str, Path]]) -> Path:
-    """Write `report.html`: a plot of what was swept, tables, and links to the reports of cells.
-
-    Args:
-        rows: Rows of `evonav.sweeps.summary.sweep_rows`.
-
-    Returns:
-        The page.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
+    """Write `report.html`: a plot of what was swept, tables, and links to the reports of cells."""
     axes = swept_axes([row for row in rows if row.cell])
     titles = {row.cell: cell_words(row, axes) for row in rows if row.cell}
     cells = [

@@ -111,11 +111,7 @@ def chosen(cells: Sequence[Cell], patterns: Sequence[str]) -> list[Cell]:
 
 @contextmanager
 def task_sets(sweep: SweepFile) -> Iterator[dict[str, list[TaskFile]]]:
-    """Lend the tasks of every set.
-
-    Raises:
-        TaskError: A folder holds none, too few, or malformed ones.
-    """
+    """Lend the tasks of every set."""
     with ExitStack() as stack:
         yield {name: tasks_of(tasks, stack) for name, tasks in sweep.tasks.items()}
 
@@ -132,9 +128,6 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
 
 def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:
     """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
-
-    Args:
-        resources: Files for answers and costs.
 
     Raises:
         EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
@@ -240,10 +233,6 @@ def run_sweep(
         only: Patterns of cells' names; others are left as they are.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called as a cell begins and after each of its recorded stages.
-
-    Raises:
-        StoreError: The folder holds another sweep, is being written, or cannot be.
-        EvonavError: An agent is unknown, a simulator does not start, a task is malformed.
     """
     names = {cell.name for cell in chosen([run.cell for run in runs], only)}
     todo = [run for run in runs if run.cell.name in names]

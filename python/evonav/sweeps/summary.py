@@ -54,11 +54,7 @@ class SweepRow:
 
 
 def sweep_rows(out: Path) -> list[SweepRow]:
-    """Return the rows of a sweep, finished or not: cell by cell, then those over seeds.
-
-    Raises:
-        StoreError: There is no sweep, or it cannot be read.
-    """
+    """Return the rows of a sweep, finished or not: cell by cell, then those over seeds."""
     cells: dict[str, dict[str, Any]] = read_claim(out)["cells"]
     rows: list[SweepRow] = []
     groups: dict[tuple[str, ...], list[str]] = {}
@@ -73,11 +69,7 @@ def sweep_rows(out: Path) -> list[SweepRow]:
 
 
 def sweep_title(out: Path) -> str:
-    """Return the name that the sweep's file gives it, else that of its folder.
-
-    Raises:
-        StoreError: There is no sweep, or it cannot be read.
-    """
+    """Return the name that the sweep's file gives it, else that of its folder."""
     return str(read_claim(out)["settings"]["name"] or out.resolve().name)
 
 

@@ -14,14 +14,7 @@ from evonav.report.tables.table import (
     markdown_tables,
     mode_words,
 )
-from evonav.report.tables.verdicts import (
-    VERDICTS,
-    effect_cells,
-    p_heading,
-    paired_table,
-    sentence,
-    verdict_words,
-)
+from evonav.report.tables.verdicts import VERDICTS, effect_cells, p_heading, paired_table, sentence, verdict_words
 from evonav.statistics import Interval
 
 RATES = frozenset(

@@ -20,11 +20,7 @@ class Moment(NamedTuple):
 
 
 def moments(record: StageRecord, maps: Mapping[int, FloorPlan]) -> list[Moment]:
-    """Return the moments of a stage: one, or two if its house changed before the stage ended.
-
-    Args:
-        maps: Floor plans of the task's stages.
-    """
+    """Return the moments of a stage: one, or two if its house changed before the stage ended."""
     k, during, here = record.stage, record.during, maps.get(record.stage)
     before = maps.get(k - 1)
     found = [Moment(0, record, maps if before is None else {**maps, k - 1: before.at_end})]

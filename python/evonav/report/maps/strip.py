@@ -31,7 +31,6 @@ def write_strip(
     Args:
         task_id: One of its tasks; `None` for the `best_highlight` one.
         agents: One of its agents, or several: a row each.
-        path: The `.svg`, `.png` or `.pdf` file to write.
         stages: Numbers of stages; default all that have a record (of the most telling task, three).
 
     Raises:

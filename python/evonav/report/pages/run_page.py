@@ -52,12 +52,6 @@ def write_report(
         out_dir: Folder to write to; default the run's own folder.
         has_maps: Write every stage's map as a file of its own too, `maps/*.svg`.
         max_replay_bytes: Limit for the pages of `evonav view` in the report; it links to those that do not fit.
-
-    Returns:
-        Path of the page.
-
-    Raises:
-        StoreError: There is no run, or a file cannot be read or written.
     """
     run = run_dir if isinstance(run_dir, RecordedRun) else load_run(run_dir)
     out_dir = out_dir or run.run_dir

@@ -42,7 +42,6 @@ def page_text(
 
     Args:
         has_drawings: Whether the page holds drawings, which carry styles of their own.
-        values: Other values of the template.
     """
     allowed = policy(None if has_drawings else (css,), () if js is None else (js,))
     return page_environment().get_template(template).render(css=css, js=js, policy=allowed, **values)

@@ -30,11 +30,7 @@ _CAPTIONS = {
 
 
 def run_breakdowns(run: RecordedRun) -> Breakdowns:
-    """Return the breakdowns of a run that have a table or a plot, without those that have no group.
-
-    Raises:
-        StoreError: The run cannot be read.
-    """
+    """Return the breakdowns of a run that have a table or a plot, without those that have no group."""
     agents = [one for one in agents_of(run) if any(row.is_scored for row in one.rows.values())]
     wanted = dict.fromkeys((*TABLED, *PLOTTED)) if agents else ()
     found = {(by, metric): breakdown(agents, by, metric) for by, metric in wanted}

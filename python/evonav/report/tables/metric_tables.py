@@ -24,15 +24,7 @@ _DIGITS = {"%": 1, "": 1, "m": 2, "rounds": 1, "s": 3, "$": 4, "MB": 0}
 
 
 def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[Table]:
-    """Build one table per kind of metric; one row per metric, one column per agent.
-
-    Args:
-        run_dir: A run, finished or not.
-        agents: Only these, in this order.
-
-    Raises:
-        StoreError: There is no run, or it cannot be read.
-    """
+    """Build one table per kind of metric; one row per metric, one column per agent: in the order of `agents`."""
     with RunStore(run_dir) as store:
         rows = read_stage_metrics(store, agents)
     if agents is not None:

@@ -11,8 +11,6 @@ def number(value: float | None, *, scale: float = 1, digits: int = 1, is_signed:
 
     Args:
         value: `None` where there is nothing to show.
-        digits: Digits after the point.
-        is_signed: Show the sign of a positive number, too.
     """
     return NONE if value is None else f"{scale * value:{_form(digits, is_signed)}}{unit}"
 
@@ -29,10 +27,7 @@ def with_interval(
     """Return a number with its interval: `61.1 [54.0, 68.2]`.
 
     Args:
-        value: `None` where there is nothing to show.
         interval: `None` where resampling gives none, for a single house or houses that all agree: `61.1 [–]`.
-        digits: Digits after the point.
-        is_signed: Show the sign of a positive number, too.
     """
     if value is None:
         return NONE

@@ -19,9 +19,6 @@ def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
     """Write `statistics.html`, `statistics.json` and, with the extra `viz`, `statistics.svg`.
 
     The same statistics give the same bytes. Returns the path of the page.
-
-    Raises:
-        StoreError: A file cannot be written.
     """
     write_atomically(out_dir / DATA_NAME, record_bytes(found))
     if has_renderer():

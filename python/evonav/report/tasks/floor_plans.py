@@ -59,11 +59,7 @@ class TaskDrawing:
 
 
 def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
-    """Read a task's houses.
-
-    Raises:
-        HouseError: One is malformed.
-    """
+    """Read a task's houses."""
     maps = {}
     for stage in range(1, task.num_stages + 1):
         house = House(task.house_json(stage), name=f"{task.task_id}/houses/stage_{stage}.json.gz")

@@ -34,12 +34,7 @@ CAPTION_PX = 40
 
 
 def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None) -> Path:
-    """Write all of a task's stages, or only some, as one HTML file that needs no other; return its path.
-
-    Raises:
-        HouseError: A stage house is malformed.
-        StoreError: The file cannot be written.
-    """
+    """Write all of a task's stages, or only some, as one HTML file that needs no other; return its path."""
     return write_atomically(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1)))
 
 
@@ -61,13 +56,8 @@ def write_gallery(
     """Write a page for each task, and `index.html` with a card for each.
 
     Args:
-        tasks: Any number, taken one at a time.
         out_dir: Folder of the pages; the path of the index is returned.
         on_task: Called with each task's id when its page is written.
-
-    Raises:
-        HouseError: A stage house is malformed.
-        StoreError: A file cannot be written.
     """
     cards = []
     for i, task in enumerate(tasks):
