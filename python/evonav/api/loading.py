@@ -37,12 +37,7 @@ class LazyList(Sequence[T], Generic[S, T]):
     """A list whose items are read when they are first used, each once."""
 
     def __init__(self, sources: Sequence[S], read: Callable[[S], T]) -> None:
-        """Remember where the items are.
-
-        Args:
-            sources: The source of each item.
-            read: Reads an item from its source.
-        """
+        """Remember where the items are."""
         self.sources = tuple(sources)
         self._read = read
         self._items: dict[int, T] = {}

@@ -220,8 +220,6 @@ def main(connection: str, life: str, work: str, prelude: str) -> None:
     Args:
         connection: Descriptor of the connection to the parent.
         life: Descriptor of a pipe that is closed when the parent ends, however it ends.
-        work: See `Program`.
-        prelude: See `Program`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.disable()  # imports leave hardly any garbage, and looking for it takes a tenth of their time

@@ -22,7 +22,6 @@ class OneCore:
     """
 
     def __init__(self) -> None:
-        """Bind nothing yet."""
         self._cores: AbstractSet[int] = frozenset()
         self._is_patient = False
 

@@ -142,7 +142,6 @@ class InlinePool(Pool):
     capacity = 1
 
     def __init__(self, work: str, settings: str) -> None:
-        """Load the work."""
         self._work = load_work(work, settings, lambda: None)
         self._key = 0
         self._job: Generator[tuple[str, str]] | None = None

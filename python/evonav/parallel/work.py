@@ -55,7 +55,6 @@ class Heartbeat(threading.local):
     """A worker's `alive`: for the job of each thread, sends at most one heartbeat every `HEARTBEAT_S`."""
 
     def __init__(self, send: Callable[[Message], None]) -> None:
-        """Belong to no job yet."""
         self._send = send
         self.key: int | None = None
         """Key of the job that this thread runs."""

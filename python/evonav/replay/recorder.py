@@ -76,7 +76,6 @@ class Recorder:
             on_round: Called with the stage and the round, from 0, as they begin.
             losses: Losses of the agent's process, by stage: there the agent does not act.
             heading_px: Longer edge of the heading views, where pages' own size is too small.
-            keeps_depth: Keep depth images, too.
             tells_of_change: True if the run's prompts say that things may have been moved, see `with_notice`.
         """
         self._tells_of_change = tells_of_change

@@ -59,7 +59,6 @@ class RunReplay:
             task_path: Folder of a task, by its id.
             response_cache: Stored answers of a model; default: the file in the run's folder.
             heading_px: Longer edge of the heading views; default: that of the pages of `evonav view`.
-            keeps_depth: Keep depth images, too.
 
         Raises:
             StoreError: There is no run, or its header cannot be read.
@@ -105,7 +104,6 @@ class RunReplay:
         """Yield the stages of an episode that have a record.
 
         Args:
-            agent: One of the run's.
             on_round: Called with the stage and the round, from 0, as they begin.
             last_stage: Last stage to yield; default all.
 

@@ -167,11 +167,7 @@ class RecordedRun:
         return counts
 
     def tasks(self) -> Iterator[RecordedTask]:
-        """Yield every task with whole records and maps, one at a time: a run's traces may not fit in memory.
-
-        Raises:
-            StoreError: The run cannot be read.
-        """
+        """Yield every task with whole records and maps, one at a time: a run's traces may not fit in memory."""
         with RunStore(self.run_dir) as store:
             for task_id, num_stages in self.num_stages.items():
                 records = {

@@ -94,11 +94,7 @@ class _Records:
     """The records of a file, read one after the other; what scores need of them is kept."""
 
     def __init__(self, path: Path, header: Submission, known: Mapping[str, TaskFile]) -> None:
-        """Read the records of a file whose tasks are all known.
-
-        Raises:
-            SubmissionError: The file is damaged, or a line is not a record as evonav writes it.
-        """
+        """Read the records of a file whose tasks are all known."""
         self.rows: dict[str, list[RecordMetrics]] = {agent: [] for agent in header.agents}
         """Metrics of the records without their rounds and memory, by agent."""
         self.complete, self.targets, self.paths = _Findings(), _Findings(), _Findings()

@@ -155,11 +155,7 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
 
 
 def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
-    """Return a run whose agents can ask their model, after a check that it can be reached.
-
-    Raises:
-        EvonavError: The model cannot be asked from here.
-    """
+    """Return a run whose agents can ask their model, after a check that it can be reached."""
     if sweep.decisions[run.cell.decision].asks_rules:
         return run
     resources = DecisionResources(
