@@ -1,6 +1,6 @@
 """Questions of MSGNav (arXiv 2511.10376): a subgraph, the next place, a frontier, and whether the target is reached.
 
-docs/parity.md lists where these questions differ from the original's.
+docs/agents/msgnav.md lists where these questions differ from the original's.
 Images are at most 512 px (`MsgNavConfig`); evonav's views have 300 px, so that they are shown as they were seen.
 
 The rules look at no image. They know an image by the labels that were recorded with it, and the surroundings of an
