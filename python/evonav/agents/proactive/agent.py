@@ -86,36 +86,40 @@ class Proactive(NavigatorAgent):
 
     def act(self, observation: Observation) -> AgentAction:
         """Look, update all beliefs, and stop or go on."""
+        navigator, here = self._navigator, (observation.pose.x_m, observation.pose.z_m)
+        # Look.
         self._queries.begin_round()
         self._candidates = ()
-        navigator, last = self._navigator, self._last
         self._belief.begin_round()
         navigator.observe(observation)
-        here = (observation.pose.x_m, observation.pose.z_m)
         self._belief.note_place(here)
-        is_done = observation.has_arrived or not observation.is_action_success
-        arrived_at = None
         around = self._belief.surroundings()
-        if last is not None and last.kind == "place" and is_done:
-            shown = shown_from(last.position_m, self._belief.searched.coarse, around.walls, self._radius_m)
-            self._belief.searched.give_up(*shown, self.config.searched)
-            self._searched_from.append(last.position_m)
-            self._last = None
-        if last is not None and last.kind == "object" and is_done and self._stands_by(last, here):
-            arrived_at = navigator.views.resolve(last.key)
-            self._inspected.add(arrived_at)
+        # Where the way of the last round has ended, there may be an entry, a place that is now searched, or a sighting.
+        ended = self._last if observation.has_arrived or not observation.is_action_success else None
+        arrived_at = sighting = None
+        if ended is not None and ended.kind == "object":
+            # Else it is at a frontier on the way to the entry.
+            if ended.is_reached or math.dist(here, ended.face_m) < self.config.stop_within_m:
+                arrived_at = navigator.views.resolve(ended.key)
+                self._inspected.add(arrived_at)
+        elif ended is not None and ended.kind == "place":
+            self._give_up(ended, around)
+        elif ended is not None and ended.kind == "sighting" and ended.is_reached:
+            sighting = ended
+        # Stop at what is likely the goal.
         self._belief.presence.update()
         posterior = self._belief.posterior(around)
         stopped = self._stop_in_reach(posterior, around, observation, arrived_at)
-        is_at_sighting = last is not None and last.kind == "sighting" and is_done and last.is_reached
-        if stopped is None and last is not None and is_at_sighting:
-            stopped = self._stop_at_sighting(posterior, last, observation)
+        if stopped is None and sighting is not None:
+            stopped = self._stop_at_sighting(posterior, sighting, observation)
         if stopped is not None:
             return stopped
+        # Take in that something was denied, or a way was in vain.
         if arrived_at is not None:
             self._leave(arrived_at, observation)
-        if self._queries.log or is_at_sighting or arrived_at is not None:  # something was denied, or a way was in vain
+        if self._queries.log or sighting is not None or arrived_at is not None:
             posterior = self._belief.posterior(around)
+        # Go where most is found a metre; if nothing is left to go to, search all again.
         chosen = self._chosen(posterior, around, observation)
         if self._may_have_missed(chosen, observation):
             self._counters["maps_forgotten"] += 1
@@ -127,9 +131,12 @@ class Proactive(NavigatorAgent):
             chosen = self._chosen(posterior, around, observation)
         return self._go(chosen, posterior, around, here)
 
-    def _stands_by(self, last: Option, here: Point2) -> bool:
-        """Return whether the agent, which went to an entry, is at its place: not at a frontier on the way to it."""
-        return last.is_reached or math.dist(here, last.face_m) < self.config.stop_within_m
+    def _give_up(self, place: Option, around: Surroundings) -> None:
+        """Take a place that the agent went to for searched, with all that it shows."""
+        shown = shown_from(place.position_m, self._belief.searched.coarse, around.walls, self._radius_m)
+        self._belief.searched.give_up(*shown, self.config.searched)
+        self._searched_from.append(place.position_m)
+        self._last = None
 
     def _may_have_missed(self, chosen: Option | None, observation: Observation) -> bool:
         """Return whether nothing is left to go to but what was denied, while there is time to search all again."""
@@ -285,14 +292,15 @@ class Proactive(NavigatorAgent):
             if last_place is not None:
                 self._is_final = True
                 return last_place
+        is_verified = self._belief.presence.is_verified
         if best is not None:
             self._is_final = False
-            is_verified = self._belief.presence.is_verified(best.key)
             if posterior.share(best.key) >= config.commit_share or (
-                is_verified and self._is_settled(best.key, posterior)
+                is_verified(best.key) and self._is_settled(best.key, posterior)
             ):
                 return best
-        options += [one for one in entries if self._is_worth_a_look(one.key)]
+        # An entry that is not verified, or was only seen in passing, is worth a look: what is around it tells more.
+        options += [one for one in entries if not is_verified(one.key) or one.key not in self._inspected]
         found = best_option(options, self._last, self._abandoned, config)
         if found is None or found.gain <= 0.0:
             self._is_final = True
@@ -308,10 +316,6 @@ class Proactive(NavigatorAgent):
         ways = with_ways(self._navigator.explorer.map, here, places)
         near = [one for one in ways if one.is_reached and one.way_m <= max_way_m]
         return max(near, key=lambda one: (one.gain, -one.way_m, -one.key), default=None)
-
-    def _is_worth_a_look(self, entry_id: int) -> bool:
-        """Return whether an entry is not verified, or was only seen in passing: what is around it tells more."""
-        return not self._belief.presence.is_verified(entry_id) or entry_id not in self._inspected
 
     def _entry_option(self, entry_id: int, weight: float) -> Option:
         entry = self._navigator.objects.entry(entry_id)
