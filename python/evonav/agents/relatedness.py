@@ -20,11 +20,7 @@ class Relatedness:
     """Compares labels, or image features where the perception has some, with one goal."""
 
     def __init__(self, matcher: Matcher, goal: ParsedGoal, feature: Feature | None) -> None:
-        """Make a comparison.
-
-        Args:
-            feature: `(D,)` unit feature of the goal's text; `None` compares labels.
-        """
+        """Compare labels with the goal, or, with the `(D,)` unit feature of its text, features."""
         self._matcher = matcher
         self._goal = goal
         self._feature = feature

@@ -60,11 +60,7 @@ class Group(TyperGroup):
 
 
 def new_app(name: str | None = None, *, help: str | None = None, cls: type[Group] = Group) -> typer.Typer:
-    """Return an empty group of commands.
-
-    Args:
-        name: Its name; default: the one it gets when it is added.
-    """
+    """Return an empty group of commands; without a name, it gets one when it is added."""
     return typer.Typer(
         name=name,
         cls=cls,
@@ -77,11 +73,6 @@ def new_app(name: str | None = None, *, help: str | None = None, cls: type[Group
 
 
 def add_commands(app: typer.Typer, *commands: Callable[..., None], panel: str | None = None) -> None:
-    """Add commands to a group.
-
-    Args:
-        *commands: Functions; a command is named as its function is.
-        panel: Heading in the group's help.
-    """
+    """Add commands, named as their functions are, to a group; `panel` is their heading in its help."""
     for command in commands:
         app.command(cls=Command, rich_help_panel=panel)(command)

@@ -108,11 +108,7 @@ class FrontierUpdate(NavigatorAgent):
     def _choose(
         self, ranked: Sequence[ObjectCandidate], remembered: Sequence[ObjectCandidate], observation: Observation
     ) -> AgentAction:
-        """Ask about the first candidates and the places to explore, and do what is answered.
-
-        Args:
-            ranked: The objects that may be chosen, the best first.
-        """
+        """Ask about the first of the objects, the best first, and the places to explore, and do what is answered."""
         navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)
         ranked = ranked[: self.config.num_candidates]

@@ -80,11 +80,7 @@ def take_beside() -> Beside | None:
 
 
 def main(control: int) -> None:
-    """Serve requests; in a child, be an agent's process.
-
-    Args:
-        control: Socket that brings requests and ends with the evaluator.
-    """
+    """Serve the requests of a socket that ends with the evaluator; in a child, be an agent's process."""
     gc.disable()  # imports leave hardly any garbage, and looking for it takes a tenth of their time
     _import()
     gc.freeze()

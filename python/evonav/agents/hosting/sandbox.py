@@ -154,11 +154,7 @@ def _exactly(descriptor: int, size: int) -> bytes:
 
 
 def restrict(policy: Policy) -> None:
-    """Shut this process in, for good; no other thread may have begun.
-
-    Raises:
-        InvalidArgumentError: The system does not offer it, or another thread is running.
-    """
+    """Shut this process in, for good; `InvalidArgumentError` if the system cannot, or another thread is running."""
     if reason := sandbox_problem():
         raise InvalidArgumentError(f"isolation = sandbox: {reason}")
     num_threads = len(list(Path("/proc/self/task").iterdir()))

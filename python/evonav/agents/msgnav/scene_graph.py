@@ -25,11 +25,7 @@ class SceneGraph:
     """Edges between entries that one view shows at most `max_edge_m` apart, an entry's edge to itself included."""
 
     def __init__(self, *, max_edge_m: float = 3.5) -> None:
-        """Create a graph without edges.
-
-        Args:
-            max_edge_m: Largest distance on the ground plane between the middles of two ends.
-        """
+        """Create a graph without edges, which join middles up to `max_edge_m` apart on the ground plane."""
         self.max_edge_m = max_edge_m
         self._edges: dict[Pair, _Edge] = {}
         self._masks: dict[int, int] = {}

@@ -225,11 +225,7 @@ class _StageErroredError(Exception):
 
 
 def stopped_early(state: "Progress", is_brief: bool) -> "Progress":
-    """Return the progress, unless it reports an errored stage.
-
-    Raises:
-        _StageErroredError: The latest stage errored; the message says why, with the traceback unless it is brief.
-    """
+    """Return the progress; `_StageErroredError` if it has errored, with the traceback unless it is brief."""
     latest = state.latest
     if latest is not None and latest.failure is not None:
         failure = latest.failure

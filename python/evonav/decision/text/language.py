@@ -158,11 +158,7 @@ def _singular(noun: str) -> str:
 
 @lru_cache(maxsize=65536)
 def similarity(noun: str, label: str) -> float:
-    """Return how well a label names a canonical noun: 1 the same, 0 no word in common.
-
-    Args:
-        label: A detector's word, in any spelling.
-    """
+    """Return how well a label, in any spelling, names a canonical noun: 1 the same, 0 no word in common."""
     other = canonical(label)
     if noun == other or _singular(noun) == other:
         return 1.0

@@ -52,16 +52,7 @@ class CachingClient(ABC):
             raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
 
     def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
-        """Return the model's answer.
-
-        Args:
-            attempt: Number of earlier tries without a valid answer; another attempt is another request.
-
-        Raises:
-            VlmError: There is no valid answer; `kind` says why.
-            StoreError: The exchanges cannot be read or written.
-            DecisionError: The model cannot be asked.
-        """
+        """Return the model's answer, or raise as `ask_first` does; another attempt is another request."""
         return self.ask_first((prompt,), attempt)[1]
 
     def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:

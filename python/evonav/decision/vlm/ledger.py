@@ -76,11 +76,7 @@ class Ledger(SharedFile):
             self._add(model, set_aside_usd=cost_usd)
 
     def settle(self, model: str, reserved_usd: float, usage: Usage | None, cost_usd: float = 0.0) -> None:
-        """Replace a reserved cost by what was used; `None` if there was no counted answer.
-
-        Raises:
-            StoreError: The file cannot be written.
-        """
+        """Replace a reserved cost by what was used, `None` without a counted answer; `StoreError` if that fails."""
         used = usage or Usage()
         with self._writing():
             self._add(

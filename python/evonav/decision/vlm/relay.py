@@ -99,12 +99,7 @@ class RelayedClient:
         return {}
 
     def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
-        """Return the model's answer.
-
-        Raises:
-            VlmError: There is no valid answer; `kind` says why.
-            DecisionError: The model cannot be asked.
-        """
+        """Return the model's answer, or raise as `ask_first` does."""
         return self.ask_first((prompt,), attempt)[1]
 
     def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:
@@ -213,12 +208,7 @@ def _prompt_of(prompt: _Prompt, pictures: Sequence[Picture]) -> Prompt:
 
 
 def read_message(descriptor: int) -> bytes:
-    """Read a message.
-
-    Raises:
-        OSError: The connection has ended.
-        InvalidArgumentError: The message is too long.
-    """
+    """Read a message; `OSError` if the connection has ended, `InvalidArgumentError` if the message is too long."""
     size = LENGTH.unpack(_exactly(descriptor, LENGTH.size))[0]
     if size > MAX_MESSAGE_BYTES:
         raise InvalidArgumentError(f"a message of {size} bytes: must be at most {MAX_MESSAGE_BYTES}")
@@ -226,12 +216,7 @@ def read_message(descriptor: int) -> bytes:
 
 
 def write_message(descriptor: int, text: bytes) -> None:
-    """Write a message.
-
-    Raises:
-        OSError: The connection has ended.
-        InvalidArgumentError: The message is too long.
-    """
+    """Write a message; `OSError` if the connection has ended, `InvalidArgumentError` if the message is too long."""
     if len(text) > MAX_MESSAGE_BYTES:
         raise InvalidArgumentError(f"a question of {len(text)} bytes: must be at most {MAX_MESSAGE_BYTES}")
     for part in (LENGTH.pack(len(text)), text):

@@ -78,11 +78,7 @@ class ResponseCache(SharedFile):
             return int(self._db.execute("SELECT count(*) FROM failures").fetchone()[0])
 
     def get(self, key: str) -> JsonObject | None:
-        """Return the response stored for a key.
-
-        Raises:
-            StoreError: The file cannot be read, or the response in it is no JSON object.
-        """
+        """Return the response stored for a key; `StoreError` if the file is unreadable or it is no JSON object."""
         with self._reading():
             row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
         if row is None:
@@ -96,11 +92,7 @@ class ResponseCache(SharedFile):
         return response
 
     def outcome(self, key: str) -> JsonObject | StoredFailure | None:
-        """Return the response or failure stored for a key.
-
-        Raises:
-            StoreError: The file cannot be read, or the response in it is no JSON object.
-        """
+        """Return the response or failure stored for a key; `StoreError` as for `get`."""
         response = self.get(key)
         if response is not None:
             return response

@@ -61,12 +61,7 @@ class Stage:
     def __init__(
         self, context: EpisodeContext, state: EpisodeState, record: StageRecord, requested: Pose, stopwatch: Stopwatch
     ) -> None:
-        """Prepare a stage.
-
-        Args:
-            state: The episode's state, which the stage updates.
-            requested: Pose at which the agent should start.
-        """
+        """Prepare a stage, which updates the state; the agent should start at the requested pose."""
         self._state = state
         self._spec = context.spec
         self._agent = context.agent

@@ -19,11 +19,7 @@ LEFT_S = 60.0
 
 @contextmanager
 def agents_scratch() -> Iterator[str]:
-    """Lend a locked folder among the system's temporary ones, which is deleted at the end.
-
-    Raises:
-        StoreError: The file system has no locks.
-    """
+    """Lend a locked temporary folder, which is deleted at the end; `StoreError` if the file system has no locks."""
     with TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name, writing(Path(name)):
         for folder in Path(name).parent.glob(f"{PREFIX}*"):
             with suppress(OSError, StoreError):  # locked, or deleted by another run

@@ -148,11 +148,7 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
 
 
 def check_agent_names(names: Sequence[str], hosting: AgentHosting, setup: ProcessSetup) -> None:
-    """Check that workers can make agents of these names: several share the imports of one process.
-
-    Raises:
-        InvalidArgumentError: See `check_agent_name`.
-    """
+    """Check, as `check_agent_name` does, that workers can make these agents: several share one process's imports."""
     fork_server = new_fork_server(hosting, setup) if len(names) > 1 else None  # which starts nothing yet
     with nullcontext() if fork_server is None else closing(fork_server):
         for name in names:

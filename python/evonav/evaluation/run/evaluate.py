@@ -168,11 +168,7 @@ class Schedule:
         return bool(self._under_way)
 
     def take(self, answer: Answer) -> Iterator[tuple[int, EncodedStage]]:
-        """Commit what a worker reports, and summarise a run whose last job has ended.
-
-        Yields:
-            Index of the run, and a stage that was committed.
-        """
+        """Commit what a worker reports, with the index of its run, and summarise a run whose last job has ended."""
         episode = self._under_way.pop(answer.key) if answer.is_end else self._under_way[answer.key]
         if answer.is_displaced:  # another episode's fault, which costs this one no retry
             episode.stage = 1
