@@ -26,12 +26,7 @@ class TextMatch(DecisionModel):
         self.matcher = Matcher(config)
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """Return the rule's answer.
-
-        Raises:
-            AnswerError: Nothing fits, and there is nothing to choose.
-            DecisionError: The question has no rule.
-        """
+        """Return the rule's answer, or raise as the question's `by_rule` does."""
         answer, reason = question.by_rule(self.matcher)
         return Reply(answer, f"{question.answer_text(answer)}\n{reason}")
 

@@ -87,7 +87,6 @@ class Proactive(NavigatorAgent):
     def act(self, observation: Observation) -> AgentAction:
         """Look, update all beliefs, and stop or go on."""
         navigator, here = self._navigator, (observation.pose.x_m, observation.pose.z_m)
-        # Look.
         self._queries.begin_round()
         self._candidates = ()
         self._belief.begin_round()

@@ -100,13 +100,10 @@ class ResponseCache(SharedFile):
             return self._failure(key)
 
     def put(self, request: JsonObject, pictures: Sequence[Picture], response: JsonObject) -> str:
-        """Store an exchange in place of an older one with the same question, in one transaction.
+        """Store an exchange in place of an older one with the same question, in one transaction; return its key.
 
         Args:
             request: The request, with names in place of its images.
-
-        Returns:
-            Its key.
 
         Raises:
             StoreError: The file cannot be written.

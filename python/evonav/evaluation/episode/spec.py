@@ -85,11 +85,7 @@ class EpisodeSpec:
         return _parsed(self.stages[stage - 1].house_json, self.house)
 
     def floor_plan(self, stage: int) -> FloorPlan:
-        """Return the floor plan of a stage (1-based).
-
-        Raises:
-            HouseError: The house is malformed, or has an object of an unknown category.
-        """
+        """Return the floor plan of a stage (1-based); `HouseError` for a malformed house or unknown category."""
         spec = self.stages[stage - 1]
         drawn = _drawn(spec.house_json, self.house, None if spec.change is None else spec.change.delta_json)
         image = image_uri(spec.public.reference_image, THUMBNAIL_PX)

@@ -284,11 +284,7 @@ class StalenessTracker:
                     moved.found_round = self._round
 
     def end(self, beliefs: Sequence[EntryBelief]) -> tuple[MemoryRecord, int]:
-        """Judge the agent's entries at the end.
-
-        Returns:
-            The judgement, and the number of objects that were forgotten although they did not move.
-        """
+        """Judge the agent's entries at the end, and count the objects that were forgotten though they did not move."""
         beliefs = movable(beliefs)
         matches = matched_objects(beliefs, self.bodies)
         self.close(beliefs)
