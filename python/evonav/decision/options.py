@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from evonav.decision.goal_input import GoalInput
 from evonav.decision.vlm.account import Account, Price
@@ -13,6 +13,7 @@ from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.ledger import Ledger
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
+from evonav.records import Record, sentence_of
 
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
@@ -31,10 +32,8 @@ _IDENTITY = {"path", "model", "structured", "images", "tells_of_change", "goal_i
 O = TypeVar("O", bound="AskedOptions")  # noqa: E741 - a type of options
 
 
-class PromptOptions(BaseModel):
+class PromptOptions(Record):
     """The options by which a model is prompted and answers."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     structured: Structured = "auto"
     images: bool = True
@@ -67,9 +66,7 @@ class AskedOptions(PromptOptions):
         try:
             return cls.model_validate(options)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            name = ".".join(str(part) for part in first["loc"])
-            raise InvalidArgumentError(f"decision options: {name} = {first['input']!r}: {first['msg']}") from error
+            raise InvalidArgumentError(f"decision options: {sentence_of(error)}") from error
 
     def identity(self) -> dict[str, Any]:
         """Return the options that decide what is answered, as a run's header states them."""
@@ -108,9 +105,9 @@ class VlmOptions(AskedOptions):
 
     model: str
     """The model's name on the server."""
-    request: dict[str, Any] = {}
+    request: dict[str, Any] = Field(default_factory=dict)
     """Other fields of requests, by the names of `VlmConfig`; missing ones are those of `SAMPLING`."""
-    server: dict[str, Any] = {}
+    server: dict[str, Any] = Field(default_factory=dict)
     """Connection to the server, by the names of `VlmConfig`."""
     price: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     """Dollars a million tokens, in and out."""

@@ -15,7 +15,7 @@ from pydantic import NonNegativeInt, ValidationError
 from evonav.errors import StoreError
 from evonav.parallel.folders import check_same_run, write_atomically
 from evonav.parallel.pool import FailureKind
-from evonav.records import Record
+from evonav.records import Record, sentence_of
 from evonav.tasks.dataset import HouseRejection, RejectReason, TaskEntry
 from evonav.tasks.records import Sha256
 
@@ -142,7 +142,7 @@ class Journal:
             except (ValueError, ValidationError) as error:
                 subject = "the run" if number == 1 else "a house"
                 advice = "use another folder" if number == 1 else "remove the line to process the house again"
-                problem = str(error).splitlines()[0]
+                problem = sentence_of(error) if isinstance(error, ValidationError) else str(error).splitlines()[0]
                 raise StoreError(f"{self.path}:{number}: not the record of {subject}: {problem}; {advice}") from None
         if not num_bytes:
             raise StoreError(f"{self.path}: empty; remove it if the folder holds no tasks")

@@ -3,12 +3,12 @@
 from typing import Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.records import sentence_of
+from evonav.records import Record, sentence_of
 from evonav.world.appearance import Change, Colors, Lighting, Materials
 from evonav.world.simulator import Action, SimulatorConfig, Style, vertical_fov_deg
 
@@ -50,10 +50,8 @@ SUCCESS_REWARD = 2.5
 """Reward of a success under `progress`: the value of habitat's point goal task."""
 
 
-class NavConfig(BaseModel):
+class NavConfig(Record, strict=False):
     """Settings of an environment; `gymnasium.make` takes them by name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     action_mode: ActionMode = "actions"
     """`actions`: one of `ACTIONS` a step. `waypoints`: a point to approach along the planner's waypoints."""

@@ -11,10 +11,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.parallel.folders import sha256_of_file
+from evonav.records import Record, sentence_of
 
 Split = Literal["train", "val", "test"]
 
@@ -57,20 +58,16 @@ class DatasetCorruptError(DatasetError):
     """A file differs from the published one: truncated, changed, or only a git-lfs pointer."""
 
 
-class SplitFile(BaseModel):
+class SplitFile(Record):
     """A file of houses, one house a line."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     file: str
     num_houses: int
     sha256: str
 
 
-class Manifest(BaseModel):
+class Manifest(Record):
     """The `manifest.json` beside the files: their contents and origin."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     dataset: str
     source: str
@@ -162,7 +159,8 @@ def read_manifest(folder: Path) -> Manifest | None:
     except FileNotFoundError:
         return None
     except (OSError, ValidationError) as error:
-        raise DatasetCorruptError(f"{path}: {error}. Remove it and fetch again. {INSTEAD}") from error
+        problem = sentence_of(error) if isinstance(error, ValidationError) else error
+        raise DatasetCorruptError(f"{path}: {problem}. Remove it and fetch again. {INSTEAD}") from error
     for split, entry in manifest.splits.items():
         published = PUBLISHED.get(manifest.revision, {}).get(split, entry)
         if entry != published or manifest.revision != folder.name:

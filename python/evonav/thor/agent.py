@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from evonav.records import sentence_of
 from evonav.thor.actions.registry import ActionError, Vector3
 from evonav.world.pose import Pose, canonical_deg, canonical_yaw_deg
 
@@ -133,7 +134,7 @@ class Agent:
         try:
             pose = _POSES.validate_python(poses or {}).get(self.body.mode)
         except ValidationError as error:
-            raise ActionError(f"CreateHouse: metadata.agentPoses: {error}") from error
+            raise ActionError(f"CreateHouse: {sentence_of(error, 'metadata.agentPoses')}") from error
         if pose is None:
             return
         if pose.position is not None:

@@ -24,6 +24,7 @@ from evonav.evaluation.records.encoded import EncodedStage, invalid_record
 from evonav.evaluation.records.floor_plans import FloorPlan, FloorPlanReader
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
+from evonav.records import sentence_of
 
 FILE_NAME = "records.sqlite"
 _ADD_FAILURE = (
@@ -303,7 +304,7 @@ class RunStore:
             try:
                 yield reader.read(text)
             except ValidationError as error:
-                raise StoreError(f"{self.path}: {error}") from error
+                raise StoreError(f"{self.path}: a floor plan is not valid: {sentence_of(error)}") from error
 
     def num_rooms(self) -> dict[str, int]:
         """Return the number of rooms of each task's house, by its first stored floor plan."""

@@ -18,7 +18,7 @@ from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, Isol
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
-from evonav.records import Record
+from evonav.records import Record, wrong_value
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 NUM_RETRIES = 2
 """Number of retries of a stage that lost its worker, its simulator or its agent's process."""
-MAX_SHOWN = 80
-"""Characters of the longest value that an error shows."""
 VLM_EPISODES_AT_ONCE = 16
 """Episodes that a worker runs at once where a server is asked, which takes most of the time."""
 
@@ -118,9 +116,8 @@ def _first_problem(model: type[Settings], error: ValidationError) -> SettingErro
     if first["type"] == "string_pattern_mismatch" and "[key]" in first["loc"]:
         rule = "is no name: letters, digits, '.', '-' and single '_', and the first is a letter or digit"
         return SettingError(model, key, f"{rule}{more}")
-    shown = repr(first.get("input"))
-    shown = shown if len(shown) <= MAX_SHOWN else shown[: MAX_SHOWN - 3] + "..."
-    return SettingError(model, key, f"= {shown}: {first['msg']}{more}")
+    problem = wrong_value(key, first.get("input"), first["msg"]).removeprefix(f"{key} ")
+    return SettingError(model, key, f"{problem}{more}")
 
 
 def _names_at(model: type[Settings], place: Sequence[int | str]) -> list[str]:
