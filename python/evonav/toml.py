@@ -42,7 +42,7 @@ def key_and_value(change: str) -> tuple[str, Any]:
     """
     key, equals, text = change.partition("=")
     if not equals or not all(key.strip().split(".")):
-        raise InvalidArgumentError(f"--set {change}: expected KEY=VALUE, such as workers=4 or perception.device=cpu")
+        raise InvalidArgumentError(f"--set {change}: expected KEY=VALUE, such as engine=ray or perception.device=cpu")
     try:
         return key.strip(), json.loads(text)
     except ValueError:

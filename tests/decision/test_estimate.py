@@ -10,6 +10,7 @@ from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.cost_estimate import estimate_run, ratio_error
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
@@ -46,6 +47,15 @@ def test_an_estimate_counts_what_a_model_that_answers_alike_is_asked(tmp_path: P
     assert whole.input_tokens > 1000 * num_stages
     (spent,) = Ledger(tmp_path / "ledger.sqlite").spending()
     assert (spent.num_asked, spent.input_tokens) == (num_stages, 1000 * num_stages)
+
+
+def test_agents_in_a_sandbox_are_counted() -> None:
+    """The model that counts writes a file, which an agent's process in a sandbox may not."""
+    config = RunConfig(protocol=ProtocolConfig(max_rounds=1), hosting=AgentHosting(isolation="sandbox"))
+    with bundled_tasks() as directory:
+        tasks = task_files(directory, 1)
+        (estimate,) = estimate_run(["fu"], tasks, config, {"model": "m"}, num_workers=1)
+    assert estimate.num_requests == tasks[0].num_stages
 
 
 def test_the_spread_is_of_ratios() -> None:

@@ -74,7 +74,10 @@ def estimate_run(
             config.backend,
             decision=Component("evonav.decision.backends:counting", {**options, "ledger": str(ledger)}),
         )
-        config = replace(config, backend=backend)
+        hosting = config.hosting
+        if hosting.isolation == "sandbox":  # in which the counting model could not write its ledger
+            hosting = replace(hosting, isolation="process")
+        config = replace(config, backend=backend, hosting=hosting)
         evaluate(agents, chosen, Path(folder) / "run", config=config, num_workers=num_workers, on_progress=on_progress)
         booked = Ledger(ledger)
         rows = booked.spending()

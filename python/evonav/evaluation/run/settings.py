@@ -103,7 +103,7 @@ class PerceptionSettings(Settings):
     gt (the simulator's masks and labels), noisy:PRESET (with simulated errors), predicted:STACK (models) or
     module:function (your own), with keys as in noisy:poor,miss_rate=0.3."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """Keyword arguments; they override the keys in `make`."""
+    """Keyword arguments of the perception; they override the keys in its name."""
     models: str | None = None
     """Predicted perception: folder of the models' weights. Default: EVONAV_MODELS, else download them."""
     device: str | None = None
