@@ -317,8 +317,18 @@ def end_with_parent(life: int | None) -> None:
             parent.join()
         os.kill(os.getpid(), signal.SIGTERM)
 
+    def ended_in_callback(found: "sys.UnraisableHookArgs") -> None:
+        if not isinstance(found.exc_value, EndedError):
+            sys.__unraisablehook__(found)
+            return
+        # Python drops what a callback of its collector raises: ask again when that is over.
+        again = threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGTERM))
+        again.daemon = True
+        again.start()
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, end)
+    sys.unraisablehook = ended_in_callback
     threading.Thread(target=watch, daemon=True).start()
 
 
