@@ -1,8 +1,7 @@
 """Belief-Weighted Search in the words of its rule: what it believes, and what it does with that."""
 
 import math
-from dataclasses import fields, replace
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,12 +19,10 @@ from evonav.agents.proactive.presence import PresenceBelief, _Entry
 from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
 from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
 from evonav.agents.proactive.searched import SearchedCells
-from evonav.agents.registry import agent_factory, new_agent
 from evonav.decision.candidates import ObjectCandidate
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame
-from evonav.toml import tomllib
 
 FRAME = MapFrame(rows=60, cols=100, cell_m=0.1, corner_m=(0.0, 0.0))
 
@@ -263,17 +260,6 @@ def test_it_goes_back_to_the_best_entry_before_the_rounds_run_out():
     (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=protocol)
     assert record.has_stopped
     assert record.state.value == "success"
-
-
-def test_every_part_can_be_switched_off_by_a_name_in_the_ablation_sweep():
-    switches = {field.name for field in fields(ProactiveConfig) if field.default is True}
-    sweep = tomllib.loads((Path(__file__).parents[2] / "examples/sweeps/proactive-ablation.toml").read_text())
-    made = [new_agent(agent_factory(name)) for name in sweep["agents"] if ":" in name]
-    off = [{name for name in switches if not getattr(agent.config, name)} for agent in made]
-    assert all(len(one) == 1 for one in off)
-    assert set.union(*off) == switches
-    for agent in made:
-        assert all(r.is_scored for r in run(agent, stage_case(1, "Bed|1"), stage_case(2, "Fridge|1")))
 
 
 def test_equal_seeds_give_equal_paths():
