@@ -19,7 +19,8 @@ from PIL import Image
 
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm.account import Account, Price, image_tokens, read_prices
-from evonav.decision.vlm.client import Answer, VlmClient, VlmConfig
+from evonav.decision.vlm.answer import ModelAnswer
+from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.response_cache import ResponseCache, StoredFailure, key_of
@@ -57,7 +58,7 @@ def told(client: VlmClient, question: Prompt = QUESTION) -> str:
 def test_asks_and_counts(stub: Stub, config: VlmConfig) -> None:
     client = VlmClient(config, account=Account(Price(2.5, 10.0)))
     answer = client.ask(QUESTION)
-    assert answer == Answer("A mug, seen 1 times.", "gpt-4o-2024-08-06", Usage(1000, 100), answer.key, False)
+    assert answer == ModelAnswer("A mug, seen 1 times.", "gpt-4o-2024-08-06", Usage(1000, 100), answer.key, False)
     assert client.account.usage == Usage(1000, 100)
     assert client.account.cost_usd == pytest.approx(0.0035)
     assert stub.keys == {f"Bearer {KEY}"}

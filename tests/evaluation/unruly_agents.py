@@ -16,6 +16,7 @@ from toy_agents import Explorer
 
 from evonav.agents.agent import EntryBelief, NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explanation import Explanation
+from evonav.decision.question import DecisionModel
 from evonav.errors import DecisionError, SimulatorLostError
 
 
@@ -309,15 +310,15 @@ class Announcing(Explorer):
         time.sleep(600)
 
 
-class Fatal:
+class Fatal(DecisionModel):
     """A decision model that ends its process when it is asked what stage 1 cost."""
 
     def __init__(self, seed):
         self.num_asked = 0
 
-    @property
-    def client(self):
+    def costs(self):
         self.num_asked += 1
         if self.num_asked == 1 and not os.path.exists(os.environ["TOY_ALIVE"]):  # noqa: PTH110
             open(os.environ["TOY_ALIVE"], "w").close()  # noqa: PTH123
             os._exit(3)
+        return {}

@@ -64,5 +64,8 @@ def test_a_batch_gives_the_frames_of_single_environments() -> None:
 
 
 def test_an_unknown_thing_to_randomise_is_named() -> None:
-    with pytest.raises(InvalidArgumentError, match="argument `randomize` is 'texture'"):
+    with pytest.raises(
+        InvalidArgumentError,
+        match=r"argument randomize\.0 = 'texture': Input should be 'materials'",
+    ):
         VectorEnv(randomize=("texture",))

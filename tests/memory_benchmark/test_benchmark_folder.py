@@ -99,7 +99,7 @@ def test_another_configuration_is_refused(tmp_path: Path):
     with pytest.raises(StoreError, match="every"):
         run(named_memories(["numpy-list"]), out, SPECS[:1], settings=MeasureSettings(own_process=False, every=5))
     (out / "memory.json").write_text("{}")
-    with pytest.raises(StoreError, match=r"memory\.json: identity: Field required; expected a header"):
+    with pytest.raises(StoreError, match=r'memory\.json: missing "identity"; expected a header'):
         run(named_memories(["numpy-list"]), out, SPECS[:1])
 
 

@@ -251,7 +251,7 @@ def test_a_row_that_is_no_record_is_an_error_that_names_the_run(write_run: Write
     with sqlite3.connect(run_dir / "records.sqlite") as database:
         database.execute("UPDATE stages SET record = '{}' WHERE task_id = 'task-2'")
     database.close()
-    with pytest.raises(StoreError, match="a record is not valid: agent"):
+    with pytest.raises(StoreError, match='a record is not valid: missing "agent"'):
         write_report(run_dir)
 
 

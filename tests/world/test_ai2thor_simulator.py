@@ -28,9 +28,8 @@ from evonav.house import bundled_houses
 from evonav.parallel.folders import LOCK_NAME
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.world import ai2thor
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
-from evonav.world.ai2thor.events import InstanceDecoder, depth_of
+from evonav.world.ai2thor.events import InstanceDecoder, depth_of, with_boxes
 from evonav.world.check import check_simulator
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -366,12 +365,12 @@ class TestAsUnityReports:
         embedded.reset(HOUSE)
         box = {"center": {"x": 1, "y": 2, "z": 3}, "size": {"x": 4, "y": 5, "z": 6}}
         records = [{"objectId": body.id, "axisAlignedBoundingBox": box} for body in embedded.objects]
-        bodies = list(ai2thor.with_boxes(embedded.objects, records))
+        bodies = list(with_boxes(embedded.objects, records))
         assert {(b.centre_m, b.size_m) for b in bodies if b.kind == "object"} == {((1, 2, 3), (4, 5, 6))}
         assert [b for b in bodies if b.kind != "object"] == [b for b in embedded.objects if b.kind != "object"]
         gone = next(body.id for body in embedded.objects if body.kind == "object")
         with pytest.raises(SimulationError, match=f"lacks 1 objects.*{gone.replace('|', '.')}"):
-            list(ai2thor.with_boxes(embedded.objects, [r for r in records if r["objectId"] != gone]))
+            list(with_boxes(embedded.objects, [r for r in records if r["objectId"] != gone]))
 
 
 def _event(x_m: float, z_m: float, yaw_deg: float, horizon_deg: float) -> Any:
