@@ -6,7 +6,6 @@ replay ends the stage in that round without asking the agent, and goes on with a
 be run again (the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
 """
 
-import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
@@ -15,6 +14,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.component import import_callable
+from evonav.decision.backends import custom, vlm
 from evonav.decision.custom_model import load_custom_model
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError, StoreError
@@ -81,7 +81,7 @@ class RunReplay:
             backend = replace(backend, perception=replace(backend.perception, host_options={"models": models}))
         self.backend = backend
         self._why_not = ""
-        if "cache" in inspect.signature(import_callable(backend.decision.path)).parameters:
+        if import_callable(backend.decision.path) in (vlm, custom):
             path = response_cache or run_dir / EXCHANGES_NAME
             if path.is_file():
                 decision = replace(backend.decision, host_options={"cache": str(path), "mode": "replay"})
