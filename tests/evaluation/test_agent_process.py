@@ -54,7 +54,7 @@ CONTAINED = {
     "unruly_agents:Misplaced": (ErrorKind.AGENT, "diagnostics.chosen_entry.centre_m.1 = nan: Input should be a finite"),
     "unruly_agents:Unlimited": (ErrorKind.AGENT, "entries.0.size_m.1 = inf: Input should be a finite number"),
     "unruly_agents:Unfocused": (ErrorKind.AGENT, "sensors.first_round.spacing_deg = nan: Input should be a finite"),
-    "unruly_agents:Amnesiac": (ErrorKind.AGENT, "> unruly_agents:"),
+    "unruly_agents:Amnesiac": (ErrorKind.AGENT, "RuntimeError: who am I? [unruly_agents:"),
     "unruly_agents:Mistaken": (ErrorKind.AGENT, "diagnostics.num_entries = 'many': Input should be a valid integer"),
 }
 """In any process: the agent goes on with the next stage."""

@@ -15,7 +15,7 @@ NUM_FRAMES = 3
 
 COLOURS_HINT = "`view.rgb` is None unless the agent asks for colours: `SensorConfig(needs_rgb=True)`"
 
-_OURS = ("evonav.agents.hosting.",)
+_OURS = ("evonav.agents.hosting.", "evonav.agents.explanation")
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
 
 
