@@ -38,7 +38,7 @@ from evonav.world.simulator import Action, Frame, SimulatorConfig
 pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
 
 HOUSE = min((house.to_json() for house in bundled_houses(20)), key=len)
-OURS = Ai2ThorOptions("evonav", timeout_s=30.0)
+OURS = Ai2ThorOptions(executable="evonav", timeout_s=30.0)
 
 
 @pytest.fixture(autouse=True)
@@ -308,7 +308,7 @@ class KilledOnce(Ai2ThorSimulator):
 
 
 def killed_once(executable: str, folder: str) -> KilledOnce:
-    simulator = KilledOnce(options=Ai2ThorOptions(executable, timeout_s=30.0))
+    simulator = KilledOnce(options=Ai2ThorOptions(executable=executable, timeout_s=30.0))
     simulator.folder = Path(folder)
     return simulator
 

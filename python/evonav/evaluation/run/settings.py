@@ -19,6 +19,7 @@ from evonav.evaluation.run.components import USUAL_CAMERA
 from evonav.evaluation.run.run_settings import RunSettings, SettingError, Settings, SpendingSettings
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, parse_perception
+from evonav.world.ai2thor.startup import Ai2ThorOptions
 from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
@@ -39,8 +40,8 @@ _SIMULATOR_HOST_OPTIONS = ("gpu_device", "x_display", "timeout_s")
 """Settings of AI2-THOR that depend on this machine."""
 
 
-class SimulatorSettings(Settings):
-    """The simulator that runs the episodes."""
+class SimulatorSettings(Ai2ThorOptions, Settings):
+    """The simulator that runs the episodes, and the options of AI2-THOR."""
 
     kind: Literal["embedded", "ai2thor"] = "embedded"
     """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client)."""
@@ -54,19 +55,6 @@ class SimulatorSettings(Settings):
     """Horizontal field of view of the camera in degrees. Default: 90."""
     allow_unknown_assets: bool = False
     """Give assets that are missing from the catalogue the usual size of their category."""
-    executable: str | None = None
-    """AI2-THOR: path of a build's executable, or `evonav` for our engine. Default: download a build."""
-    commit_id: str | None = None
-    """AI2-THOR: commit of the build to download. Default: the client's."""
-    platform: Literal["cloud", "x11"] | None = None
-    """AI2-THOR: draw with Vulkan and no display (cloud), or on an X display (x11)."""
-    gpu_device: int | None = Field(default=None, ge=0)
-    """AI2-THOR: index of the GPU that draws."""
-    x_display: str | None = None
-    """AI2-THOR: X display, such as :0. Default: DISPLAY."""
-    timeout_s: float | None = Field(default=None, ge=1.0)
-    """AI2-THOR: seconds to wait for an answer before it is restarted; starting may take three times as long.
-    Default: 100."""
 
     def component(self) -> Component[Simulator]:
         """Return the component of this simulator; options that are not given keep its own defaults.
@@ -76,8 +64,7 @@ class SimulatorSettings(Settings):
         """
         name = "ai2thor" if self.kind == "ai2thor" else "lenient" if self.allow_unknown_assets else "embedded"
         path = f"{_COMPONENTS}:{name}_simulator"
-        shared = {"kind", "allow_unknown_assets", "style", *USUAL_CAMERA}
-        given = self.model_dump(exclude=shared, exclude_none=True)
+        given = self.model_dump(include=set(Ai2ThorOptions.model_fields), exclude_defaults=True)
         if self.kind == "ai2thor":
             # AI2-THOR has a catalogue of its own, so that allow_unknown_assets changes nothing.
             if self.style is not None:

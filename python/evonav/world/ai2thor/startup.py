@@ -8,12 +8,14 @@ import sys
 import sysconfig
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
+from pydantic import Field
+
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
+from evonav.records import Record
 from evonav.world.ai2thor.guard import ProcessEndedError
 from evonav.world.simulator import SimulatorConfig
 
@@ -30,22 +32,22 @@ _PLAYER_LOG = Path(".config/unity3d/Allen Institute for Artificial Intelligence/
 _LOG_LINES = 12
 
 
-@dataclass(frozen=True, slots=True)
-class Ai2ThorOptions:
-    """Build of AI2-THOR and its rendering device; by default the client's own build, downloaded on first use."""
+class Ai2ThorOptions(Record):
+    """Build of AI2-THOR and its rendering device."""
 
     executable: str | None = None
-    """Path of a build's executable, or `evonav` for evonav's engine."""
+    """AI2-THOR: path of a build's executable, or `evonav` for our engine. Default: download a build."""
     commit_id: str | None = None
-    """Commit of the build to download; `None` for the client's default."""
+    """AI2-THOR: commit of the build to download. Default: the client's."""
     platform: Literal["cloud", "x11"] | None = None
-    """`cloud` renders on a GPU through Vulkan, `x11` on an X display; `None` for the client's choice."""
-    gpu_device: int | None = None
-    """Index of the GPU, as CUDA counts."""
+    """AI2-THOR: draw with Vulkan and no display (cloud), or on an X display (x11). Default: the client's choice."""
+    gpu_device: int | None = Field(default=None, ge=0)
+    """AI2-THOR: index of the GPU that draws, as CUDA counts."""
     x_display: str | None = None
-    """X display such as `:0`; `None` for the variable DISPLAY."""
-    timeout_s: float = 100.0
-    """Time limit of one answer; a start may take three times as long. A slower process counts as hanging."""
+    """AI2-THOR: X display, such as :0. Default: DISPLAY."""
+    timeout_s: float = Field(default=100.0, gt=0.0)
+    """AI2-THOR: seconds to wait for an answer before it is restarted; starting may take three times as long.
+    Default: 100."""
 
     @property
     def is_own_engine(self) -> bool:
@@ -58,15 +60,8 @@ class Ai2ThorOptions:
         Raises:
             InvalidArgumentError: The options contradict each other.
         """
-        if not self.timeout_s > 0.0:
-            raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be > 0")
-        if self.platform not in (None, "cloud", "x11"):
-            raise InvalidArgumentError(f"platform = {self.platform!r}: must be `cloud` or `x11`")
-        if self.gpu_device is not None and (self.is_own_engine or self.gpu_device < 0):
-            raise InvalidArgumentError(
-                f"gpu_device = {self.gpu_device}: "
-                + ("evonav's engine draws on the processor" if self.is_own_engine else "must be 0 or more")
-            )
+        if self.gpu_device is not None and self.is_own_engine:
+            raise InvalidArgumentError(f"gpu_device = {self.gpu_device}: evonav's engine draws on the processor")
         if self.executable is not None and self.commit_id is not None:
             raise InvalidArgumentError("executable and commit_id: give one, an executable is a build already")
 
