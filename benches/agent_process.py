@@ -26,8 +26,7 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.run_images import unexpanded
@@ -190,9 +189,9 @@ def _evaluations() -> Iterator[str]:
 def _evaluated(num_workers: int, hosting: AgentHosting) -> tuple[float, float]:
     """CPU seconds a stage, and stages a second."""
     config = RunConfig(hosting=hosting)
-    with bundled_tasks() as directory, TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:
         began_s = time.perf_counter()
-        evaluate(["fu"], task_files(directory, NUM_TASKS), Path(folder), config=config, num_workers=num_workers)
+        evaluate(["fu"], task_files(BUNDLED_TASKS, NUM_TASKS), Path(folder), config=config, num_workers=num_workers)
         wall_s = time.perf_counter() - began_s
         with RunStore(Path(folder)) as store:
             cpu_s = [cpu_s for _, cpu_s in store.timings().values()]

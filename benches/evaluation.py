@@ -13,8 +13,7 @@ from pathlib import Path
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import Progress, RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.tasks.listing import BUNDLED_TASKS, TaskFile, task_files
 
 NOTES = """\
 `evonav evaluate` as a user runs it; stages/s are by the wall clock. *Efficiency*: of two workers, compared with twice
@@ -83,8 +82,8 @@ def run() -> str:
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, range(os.cpu_count() or 1))
     try:
-        with bundled_tasks() as bundled, tempfile.TemporaryDirectory() as folder:
-            tasks = task_files(options.tasks or bundled, options.limit)
+        with tempfile.TemporaryDirectory() as folder:
+            tasks = task_files(options.tasks or BUNDLED_TASKS, options.limit)
             for agent in options.agents:
                 runs = {
                     number: measured(agent, tasks, number, options.keep or Path(folder)) for number in options.workers

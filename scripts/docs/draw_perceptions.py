@@ -18,8 +18,8 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise.config import noise_presets
 from evonav.perception.simulated import noisy_perception
 from evonav.sensors.observation import Detections
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import noun_of
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import Frame
 
@@ -58,8 +58,7 @@ def main() -> None:
 def view(task: int, place: int, yaw_rad: float) -> tuple[StageScene, Frame]:
     """A view in a bundled house."""
     simulator = EmbeddedSimulator()
-    with bundled_tasks() as folder:
-        case = load_spec(sorted(folder.glob("*/task.json"))[task].parent)
+    case = load_spec(sorted(BUNDLED_TASKS.glob("*/task.json"))[task].parent)
     simulator.reset(case.stages[0].house_json)
     places = simulator.reachable_positions()
     x_m, _, z_m = places[place % len(places)].tolist()

@@ -21,8 +21,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.tasks.listing import BUNDLED_TASKS, TaskFile, task_files
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 
@@ -115,13 +114,11 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=50)
     parser.add_argument("--every", type=int, default=1, help="compare images at every Nth pose")
     options = parser.parse_args()
-    with ExitStack() as stack:
-        directory = options.tasks or stack.enter_context(bundled_tasks())
-        tasks = task_files(directory, options.limit)
-        folders = evaluate_both(
-            options.agents.split(","), tasks, options.out, num_workers=options.workers, max_rounds=options.rounds
-        )
-        differences = [*differing_records(*folders), *differing_images(folders[0], tasks, options.every)]
+    tasks = task_files(options.tasks or BUNDLED_TASKS, options.limit)
+    folders = evaluate_both(
+        options.agents.split(","), tasks, options.out, num_workers=options.workers, max_rounds=options.rounds
+    )
+    differences = [*differing_records(*folders), *differing_images(folders[0], tasks, options.every)]
     print("\n".join(differences) or f"{len(tasks)} tasks: records and images are the same")
     return 1 if differences else 0
 

@@ -7,7 +7,7 @@ import pytest
 
 from evonav.cli import main
 from evonav.evaluation.records.store import RunStore
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 ONE = "--agent shortest-path --limit 1 --workers 0"
 
@@ -20,9 +20,8 @@ def folder(tmp_path_factory):
     (place / "file").write_text("x")
     (place / "sweep.toml").write_text('agents = "shortest-path"\ntasks = "bundled:1"\nworkers = 0\n')
     (place / "typo.toml").write_text('agents = "fu"\ntask = "bundled:1"\n')
-    with bundled_tasks() as bundled:
-        one = min(path for path in bundled.iterdir() if (path / "task.json").is_file())
-        shutil.copytree(one, place / "tasks" / one.name)
+    one = min(path for path in BUNDLED_TASKS.iterdir() if (path / "task.json").is_file())
+    shutil.copytree(one, place / "tasks" / one.name)
     with RunStore(place / "begun", create=True) as store:
         store.set_meta("agents", ["fu"])
         store.set_meta("num_stages", {"t": 3})

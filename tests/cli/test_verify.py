@@ -7,13 +7,11 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 
 def test_a_limit_requires_and_replays_only_the_first_tasks(tmp_path: Path) -> None:
-    with bundled_tasks() as folder:
-        evaluate(["ftu"], task_files(folder, 2), tmp_path / "two", num_workers=0)
+    evaluate(["ftu"], task_files(BUNDLED_TASKS, 2), tmp_path / "two", num_workers=0)
     pack(tmp_path / "two", tmp_path / "two.gz")
     words = ["verify", str(tmp_path / "two.gz"), "--workers", "0", "--limit"]
     for limit, code, told in (

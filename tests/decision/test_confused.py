@@ -30,9 +30,8 @@ from evonav.evaluation.run.run_settings import SettingError
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import COLOURS
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal
 
 TEXT = "Find the mug on the desk next to the laptop."
@@ -179,14 +178,13 @@ class Silent(TextMatch):
 
 def run(folder: Path, num_workers: int, noise: dict[str, float]) -> list[StageRecord]:
     backend = Backend(decision=Component("evonav.decision.backends:text_match", {"noise": noise}))
-    with bundled_tasks() as directory:
-        evaluate(
-            ["fu", "3d-mem", "unigoal"],
-            task_files(directory, 1),
-            folder,
-            config=RunConfig(backend=backend),
-            num_workers=num_workers,
-        )
+    evaluate(
+        ["fu", "3d-mem", "unigoal"],
+        task_files(BUNDLED_TASKS, 1),
+        folder,
+        config=RunConfig(backend=backend),
+        num_workers=num_workers,
+    )
     with RunStore(folder) as store:
         return [StageRecord.model_validate_json(text) for text in store.record_texts()]
 

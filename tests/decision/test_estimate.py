@@ -15,28 +15,26 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from vlm_stub import serving
 
 
 def test_an_estimate_counts_what_a_model_that_answers_alike_is_asked(tmp_path: Path) -> None:
     """The server answers by rules of its own, so the run is cut to the one round in which all agree."""
     config = RunConfig(protocol=ProtocolConfig(max_rounds=1))
-    with bundled_tasks() as directory:
-        tasks = task_files(directory, 2)
-        (estimate,) = estimate_run(["fu"], tasks, config, {"model": "m"}, num_tasks=1)
-        (whole,) = estimate_run(["fu"], tasks, config, {"model": "m"})
-        with serving(lambda request: {"text": mock_answer(request)}) as stub:
-            host = {"server": {"base_url": stub.url}, "ledger": str(tmp_path / "ledger.sqlite")}
-            backend = Backend(decision=Component("evonav.decision.backends:vlm", {"model": "m"}, host))
-            evaluate(
-                ["fu"],
-                tasks,
-                tmp_path / "run",
-                config=RunConfig(protocol=config.protocol, backend=backend),
-                num_workers=0,
-            )
+    tasks = task_files(BUNDLED_TASKS, 2)
+    (estimate,) = estimate_run(["fu"], tasks, config, {"model": "m"}, num_tasks=1)
+    (whole,) = estimate_run(["fu"], tasks, config, {"model": "m"})
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
+        host = {"server": {"base_url": stub.url}, "ledger": str(tmp_path / "ledger.sqlite")}
+        backend = Backend(decision=Component("evonav.decision.backends:vlm", {"model": "m"}, host))
+        evaluate(
+            ["fu"],
+            tasks,
+            tmp_path / "run",
+            config=RunConfig(protocol=config.protocol, backend=backend),
+            num_workers=0,
+        )
     num_stages = sum(task.num_stages for task in tasks)
     assert (estimate.num_stages, estimate.num_stages_run) == (num_stages, tasks[0].num_stages)
     assert estimate.num_requests == num_stages
@@ -52,9 +50,8 @@ def test_an_estimate_counts_what_a_model_that_answers_alike_is_asked(tmp_path: P
 def test_agents_in_a_sandbox_are_counted() -> None:
     """The model that counts writes a file, which an agent's process in a sandbox may not."""
     config = RunConfig(protocol=ProtocolConfig(max_rounds=1), hosting=AgentHosting(isolation="sandbox"))
-    with bundled_tasks() as directory:
-        tasks = task_files(directory, 1)
-        (estimate,) = estimate_run(["fu"], tasks, config, {"model": "m"}, num_workers=1)
+    tasks = task_files(BUNDLED_TASKS, 1)
+    (estimate,) = estimate_run(["fu"], tasks, config, {"model": "m"}, num_workers=1)
     assert estimate.num_requests == tasks[0].num_stages
 
 
@@ -82,7 +79,7 @@ def test_one_limit_for_all_processes(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_run_of_several_processes_stops_at_its_limit(tmp_path: Path) -> None:
     """A question sets 0.01 $ aside and costs 0.004 $; two workers may ask for 0.03 $ in all."""
-    with bundled_tasks() as directory, serving(lambda request: {"text": mock_answer(request)}) as stub:
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
         host = {
             "server": {"base_url": stub.url},
             "ledger": str(tmp_path / "ledger.sqlite"),
@@ -93,7 +90,7 @@ def test_a_run_of_several_processes_stops_at_its_limit(tmp_path: Path) -> None:
             decision=Component("evonav.decision.backends:vlm", {"model": "m", "request": {"max_tokens": 250}}, host)
         )
         config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=2))
-        evaluate(["fu"], task_files(directory, 2), tmp_path / "run", config=config, num_workers=2)
+        evaluate(["fu"], task_files(BUNDLED_TASKS, 2), tmp_path / "run", config=config, num_workers=2)
     (spent,) = Ledger(tmp_path / "ledger.sqlite").spending()
     assert spent.set_aside_usd == pytest.approx(0.0)
     assert spent.num_asked == len(stub.requests or []) <= 6

@@ -31,9 +31,8 @@ from evonav.evaluation.run.settings import DecisionSettings
 from evonav.memory.colours import Layout, layouts
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import COLOURS
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo
 
 SENTENCE = "Please navigate to the red mug on the desk."
@@ -141,9 +140,8 @@ class Recorder(AppearanceMatch):
 
 
 def record_texts(folder: Path, decision: Component[Any], num_workers: int) -> list[str]:
-    with bundled_tasks() as directory:
-        config = RunConfig(backend=Backend(decision=decision))
-        evaluate(["fu", "3d-mem"], task_files(directory, 1), folder, config=config, num_workers=num_workers)
+    config = RunConfig(backend=Backend(decision=decision))
+    evaluate(["fu", "3d-mem"], task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=num_workers)
     with RunStore(folder) as store:
         return list(store.record_texts())
 

@@ -21,8 +21,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal
 
 GOAL = Goal(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))
@@ -139,8 +138,7 @@ def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:
         backend=Backend(decision=Component("evonav.decision.backends:text_match", {"noise": noise})),
         protocol=ProtocolConfig(max_rounds=3),
     )
-    with bundled_tasks() as directory:
-        evaluate(["fu", "ftu"], task_files(directory, 1), folder, config=config, num_workers=num_workers)
+    evaluate(["fu", "ftu"], task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=num_workers)
     with RunStore(folder) as store:
         return list(store.record_texts())
 

@@ -21,8 +21,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from vlm_stub import check_strict
 
 NUM_OF_A_KIND = 12
@@ -56,9 +55,8 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Ques
         backend=Backend(decision=Component(f"{__name__}:Collecting")),
         protocol=ProtocolConfig(max_rounds=9, max_actions=60),
     )
-    with bundled_tasks() as directory:
-        agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:UniGoalAsPublished"]
-        evaluate(agents, task_files(directory, 1), folder, config=config, num_workers=0)
+    agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:UniGoalAsPublished"]
+    evaluate(agents, task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=0)
     with RunStore(folder) as store:
         assert [record.error for record in store.records() if record.error] == []
     return ASKED

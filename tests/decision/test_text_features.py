@@ -16,8 +16,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 needs_weights = pytest.mark.skipif(
     any(find_spec(name) is None for name in minilm.MODULES), reason="needs the extra evonav[text]"
@@ -98,8 +97,7 @@ def test_entries_are_ranked_by_meaning_then_as_ever() -> None:
 def test_agents_walk_by_it(tmp_path) -> None:
     agents = [f"agents_by_meaning:{name}" for name in ("fu", "ftu", "stage_reset")]
     config = RunConfig(protocol=ProtocolConfig(max_rounds=4))
-    with bundled_tasks() as tasks:
-        evaluate(agents, task_files(tasks, 1), tmp_path, config=config, num_workers=0)
+    evaluate(agents, task_files(BUNDLED_TASKS, 1), tmp_path, config=config, num_workers=0)
     with RunStore(tmp_path) as store:
         for agent in agents:
             records = list(store.records(agent))

@@ -20,7 +20,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from vlm_stub import KEY, Stub, check_request, images_in, serving
 
 AGENTS = ["fu", "ftu"]
@@ -62,10 +62,9 @@ class Run:
         }
         protocol = ProtocolConfig(max_rounds=self.max_rounds, max_actions=self.max_actions)
         decision = Component("evonav.decision.backends:vlm", {"model": "gpt-4o", **options}, host)
-        with bundled_tasks() as directory:
-            tasks, reader = short_tasks(directory, self.num_stages)
-            config = RunConfig(backend=Backend(tasks=reader, decision=decision), protocol=protocol)
-            evaluate(agents or AGENTS, tasks, self.folder / name, config=config, num_workers=num_workers)
+        tasks, reader = short_tasks(BUNDLED_TASKS, self.num_stages)
+        config = RunConfig(backend=Backend(tasks=reader, decision=decision), protocol=protocol)
+        evaluate(agents or AGENTS, tasks, self.folder / name, config=config, num_workers=num_workers)
         with RunStore(self.folder / name) as store:
             return list(store.record_texts())
 

@@ -28,8 +28,7 @@ from evonav.evaluation.run.components import check_agent_name
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.house import bundled_houses
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -102,9 +101,8 @@ def template(tmp_path_factory: pytest.TempPathFactory, few_rounds: None) -> Path
     for name in ("houses.jsonl.gz", "uniform-hard-val-75.jsonl.gz"):
         (folder / name).write_bytes(gzip.compress("\n".join(houses).encode()))
     tasks = folder / "tasks"
-    with bundled_tasks() as bundled:
-        task = min(task_files(bundled), key=lambda task: task.num_stages)
-        shutil.copytree(task.path, tasks / task.task_id)
+    task = min(task_files(BUNDLED_TASKS), key=lambda task: task.num_stages)
+    shutil.copytree(task.path, tasks / task.task_id)
     evaluate(["fu", "ftu"], task_files(tasks), folder / "out" / "run", num_workers=0)
     return folder
 

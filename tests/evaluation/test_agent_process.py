@@ -34,8 +34,7 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -160,11 +159,10 @@ def test_records_are_the_same_in_either_process(run_dir, tasks, tmp_path):
 def built_in_runs(tmp_path_factory):
     """Two stages of all built-in agents: in processes of their own, and in this one."""
     own, shared = tmp_path_factory.mktemp("own"), tmp_path_factory.mktemp("shared")
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, 2)
-        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4, max_actions=8))
-        evaluate(list(BUILT_IN), tasks, own, config=config, num_workers=1)
-        evaluate(list(BUILT_IN), tasks, shared, config=config, num_workers=0)
+    tasks, reader = short_tasks(BUNDLED_TASKS, 2)
+    config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4, max_actions=8))
+    evaluate(list(BUILT_IN), tasks, own, config=config, num_workers=1)
+    evaluate(list(BUILT_IN), tasks, shared, config=config, num_workers=0)
     return own, shared
 
 
@@ -249,9 +247,8 @@ def test_a_resumed_run_repeats_its_failures(tasks, tmp_path):
 @pytest.mark.parametrize("num_workers", [0, 1])
 def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_workers):
     """A house of one of two bundled tasks is gone when its turn comes."""
-    with bundled_tasks() as directory:
-        for root in sorted(directory.iterdir())[:2]:
-            shutil.copytree(root, tmp_path / "tasks" / root.name)
+    for root in sorted(BUNDLED_TASKS.iterdir())[:2]:
+        shutil.copytree(root, tmp_path / "tasks" / root.name)
     both = task_files(tmp_path / "tasks")
     broken = next(path for path in sorted(both[0].path.rglob("*")) if path.is_file() and path.name != "task.json")
     broken.unlink()

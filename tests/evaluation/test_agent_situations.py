@@ -8,12 +8,11 @@ import doubting_agent
 from evonav.agents.baselines import NearestFrontier
 from evonav.evaluation.contract.situations import check_situations, place_of
 from evonav.evaluation.run.components import Backend
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 
 def situations(agent):
-    with bundled_tasks() as directory:
-        return {found.name: found for found in check_situations(Backend(), directory, "mine", agent, 0)}
+    return {found.name: found for found in check_situations(Backend(), BUNDLED_TASKS, "mine", agent, 0)}
 
 
 def test_an_agent_that_handles_every_situation_passes():

@@ -20,7 +20,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.sensors.observation import MapFrame, Observation
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 
@@ -35,15 +35,14 @@ HOSTINGS = [
 @pytest.mark.parametrize("hosting", HOSTINGS)
 def test_an_agent_may_keep_and_change_all_that_it_is_shown(tmp_path, hosting):
     """It fails if what it keeps changes, and would act otherwise if it were shown what it has written."""
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, 2, 3)
-        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=8))
-        evaluate([AGENT], tasks, tmp_path / "here", config=config, num_workers=0)
-        for at_once in (1, 3):
-            own = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=8), hosting=hosting)
-            run = tmp_path / str(at_once)
-            evaluate([AGENT], tasks, run, config=own, num_workers=1, episodes_at_once=at_once)
-            assert texts(run) == texts(tmp_path / "here")
+    tasks, reader = short_tasks(BUNDLED_TASKS, 2, 3)
+    config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=8))
+    evaluate([AGENT], tasks, tmp_path / "here", config=config, num_workers=0)
+    for at_once in (1, 3):
+        own = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=8), hosting=hosting)
+        run = tmp_path / str(at_once)
+        evaluate([AGENT], tasks, run, config=own, num_workers=1, episodes_at_once=at_once)
+        assert texts(run) == texts(tmp_path / "here")
     assert not any('"state":"errored"' in text for text in texts(tmp_path / "here"))
 
 

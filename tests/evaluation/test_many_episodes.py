@@ -38,7 +38,7 @@ from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
 from evonav.evaluation.run.worker import WorkerContext, WorkerSetup
 from evonav.parallel.worker import Workforce
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from vlm_stub import serving
 
 WAITING = "waiting_parts:Waiting"
@@ -66,8 +66,8 @@ def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monk
     toy_tasks = many_tasks(tmp_path / "tasks", 6)
     for num_workers, at_once in ((1, 1), (1, 3), (2, 2)) if backend == "bundled" else ((1, 1), (1, 6), (2, 3)):
         name = f"{num_workers}-{at_once}"
-        with serving(faulty_reply) as stub, bundled_tasks() as directory:
-            tasks, reader = short_tasks(directory, 1, 3)
+        with serving(faulty_reply) as stub:
+            tasks, reader = short_tasks(BUNDLED_TASKS, 1, 3)
             host = {
                 "server": {"base_url": stub.url, "max_retries": 0},
                 "cache": str(tmp_path / f"{name}.exchanges"),

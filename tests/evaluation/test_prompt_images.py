@@ -13,8 +13,7 @@ from evonav.decision.prompts import Text
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_file
+from evonav.tasks.listing import BUNDLED_TASKS, task_file
 
 TASK = "bundled-0086-0279d6-s0"
 MARGIN_PX = 20
@@ -49,8 +48,7 @@ class Recorder:
 @pytest.fixture(scope="module", params=["facing", "all"])
 def recorded(request):
     backend = Backend()
-    with bundled_tasks() as folder:
-        case = backend.tasks.create(task_file(folder / TASK).path)
+    case = backend.tasks.create(task_file(BUNDLED_TASKS / TASK).path)
 
     def answer(question):
         if question.kind == "verify":

@@ -22,8 +22,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 NEEDS_SANDBOX = pytest.mark.skipif(
     sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
@@ -95,12 +94,11 @@ def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
 @NEEDS_SANDBOX
 def test_agents_do_the_same_in_a_sandbox(tmp_path):
     agents = ["fu", "random-walk", "msgnav"]
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, 2)
-        config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4))
-        evaluate(agents, tasks, tmp_path / "free", config=config, num_workers=1)
-        config = replace(config, hosting=SANDBOX)
-        evaluate(agents, tasks, tmp_path / "shut", config=config, num_workers=1)
+    tasks, reader = short_tasks(BUNDLED_TASKS, 2)
+    config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4))
+    evaluate(agents, tasks, tmp_path / "free", config=config, num_workers=1)
+    config = replace(config, hosting=SANDBOX)
+    evaluate(agents, tasks, tmp_path / "shut", config=config, num_workers=1)
     assert texts(tmp_path / "shut") == texts(tmp_path / "free")
     with RunStore(tmp_path / "shut") as shut, RunStore(tmp_path / "free") as free:
         assert shut.meta("sessions")[0]["isolation"].startswith("sandbox (Landlock ")

@@ -16,7 +16,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from vlm_stub import KEY, check_request, serving
 
 NEEDS_SANDBOX = pytest.mark.skipif(
@@ -36,11 +36,10 @@ def run(folder: Path, agents: list[str], url: str | None, *, isolation: Isolatio
     }
     decision = Component("evonav.decision.backends:vlm", {"model": "gpt-4o"}, host)
     hosting = AgentHosting(isolation, timeout_s=60.0)
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, num_stages)
-        backend = Backend(tasks=reader, decision=decision)
-        config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=6), hosting=hosting)
-        evaluate(agents, tasks, folder, config=config, num_workers=1)
+    tasks, reader = short_tasks(BUNDLED_TASKS, num_stages)
+    backend = Backend(tasks=reader, decision=decision)
+    config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=6), hosting=hosting)
+    evaluate(agents, tasks, folder, config=config, num_workers=1)
     return RunStore(folder)
 
 

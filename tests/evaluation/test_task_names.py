@@ -20,8 +20,7 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import NAMES_KEY, RunConfig, agent_seed, perception_seed
 from evonav.report import write_report
 from evonav.submission.pack import pack
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 SHORT = ProtocolConfig(max_rounds=3)
 AGENT = "regenerating_agent:Regenerating"
@@ -52,11 +51,10 @@ def test_the_name_without_a_secret_is_the_former_one():
 def runs(tmp_path_factory):
     """The same evaluation twice: two agents on two stages, in processes of their own."""
     folders = [tmp_path_factory.mktemp("run") for _ in range(2)]
-    with bundled_tasks() as directory:
-        tasks, reader = short_tasks(directory, 2)
-        config = RunConfig(backend=Backend(tasks=reader), protocol=SHORT)
-        for folder in folders:
-            evaluate([AGENT, "random-walk"], tasks, folder, config=config, num_workers=1)
+    tasks, reader = short_tasks(BUNDLED_TASKS, 2)
+    config = RunConfig(backend=Backend(tasks=reader), protocol=SHORT)
+    for folder in folders:
+        evaluate([AGENT, "random-walk"], tasks, folder, config=config, num_workers=1)
     return folders
 
 

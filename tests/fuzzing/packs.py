@@ -15,8 +15,7 @@ from evonav.evaluation.run import components
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
 from evonav.submission.verify import verify
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.tasks.listing import BUNDLED_TASKS, TaskFile, task_files
 
 
 @dataclass(frozen=True)
@@ -33,10 +32,9 @@ class Packs:
     def made_in(cls, folder: Path) -> "Packs":
         components.load_spec = lru_cache(components.load_spec)  # the task to verify with is always the same
         path = folder / "honest.gz"
-        with bundled_tasks() as bundled:
-            tasks = task_files(bundled, 1)
-            evaluate(["ftu"], tasks, folder / "run", num_workers=0)
-            pack(folder / "run", path)
+        tasks = task_files(BUNDLED_TASKS, 1)
+        evaluate(["ftu"], tasks, folder / "run", num_workers=0)
+        pack(folder / "run", path)
         verdict = verify(path, tasks, scores_only=True)
         assert verdict.is_accepted
         return cls(folder, path.read_bytes(), ForgedPack.of(path), tasks, json.dumps(verdict.summary))

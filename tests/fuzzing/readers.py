@@ -24,8 +24,7 @@ from evonav.house import bundled_houses, stream_houses
 from evonav.house.asset_sizes import read_asset_sizes
 from evonav.sweeps.file import read_sweep
 from evonav.tasks import load_task
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_file, task_roots
+from evonav.tasks.listing import BUNDLED_TASKS, task_file, task_roots
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 
@@ -112,8 +111,7 @@ def house_files(folder: Path) -> Reader:
 def tasks(folder: Path) -> Reader:
     """Return the reader of tasks; a text is the file's number, whether its checksum is right, and its contents."""
     root = folder / "tasks" / "task"
-    with bundled_tasks() as bundled:
-        shutil.copytree(task_roots(bundled)[0], root)
+    shutil.copytree(task_roots(BUNDLED_TASKS)[0], root)
     honest = {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()}
     names = sorted(name for name in honest if not name.endswith(".png"))
     task_id = json.loads(honest["task.json"])["task_id"]

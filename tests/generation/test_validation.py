@@ -22,10 +22,9 @@ def test_a_sound_task_has_no_problem(root: Path) -> None:
 
 
 def test_bundled_tasks_are_sound() -> None:
-    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import BUNDLED_TASKS
 
-    with bundled_tasks() as folder:
-        report = validate_folder(folder)
+    report = validate_folder(BUNDLED_TASKS)
     assert list(report.problems) == []
     assert len(report.reports) >= 24
 

@@ -19,7 +19,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.tasks import load_tasks
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 ROOT = Path(__file__).parents[2]
 SERVER_PYTHON = os.environ.get("EVONAV_LLM_PYTHON")
@@ -61,15 +61,14 @@ def test_an_agent_is_evaluated_with_the_model_and_replayed(base_url: str, tmp_pa
         "replayed": {"cache": cache, "mode": "replay"},
     }
     texts = {}
-    with bundled_tasks() as folder:
-        tasks, reader = short_tasks(folder, num_stages=1)
-        for name, host in hosts.items():
-            decision = Component("evonav.decision.backends:vlm", options, host)
-            config = RunConfig(backend=Backend(tasks=reader, decision=decision), hosting=AgentHosting("none"))
-            evaluate(["fu"], tasks, tmp_path / name, config=config, num_workers=0)
-            with RunStore(tmp_path / name) as store:
-                texts[name] = list(store.record_texts())
-                (record,) = store.records()
+    tasks, reader = short_tasks(BUNDLED_TASKS, num_stages=1)
+    for name, host in hosts.items():
+        decision = Component("evonav.decision.backends:vlm", options, host)
+        config = RunConfig(backend=Backend(tasks=reader, decision=decision), hosting=AgentHosting("none"))
+        evaluate(["fu"], tasks, tmp_path / name, config=config, num_workers=0)
+        with RunStore(tmp_path / name) as store:
+            texts[name] = list(store.record_texts())
+            (record,) = store.records()
     assert record.state in (EndState.SUCCESS, EndState.FAILURE)
     counters = record.trace[-1].counters
     assert counters["decisions"] > counters.get("failed_decisions", 0)
@@ -78,11 +77,10 @@ def test_an_agent_is_evaluated_with_the_model_and_replayed(base_url: str, tmp_pa
 
 def test_each_kind_of_question_is_answered(base_url: str, tmp_path: Path) -> None:
     script = ROOT / "scripts" / "studies" / "measure_llm.py"
-    with bundled_tasks() as folder:
-        options = ["--tasks", folder, "--num-tasks", "1", "--limit", "2", "--stride", "3", "--base-url", base_url]
-        agents = ["--agent", "3d-mem,msgnav,evonav_studies.variants:UniGoalAsPublished", "--out", tmp_path]
-        variables = {**os.environ, "PYTHONPATH": str(ROOT / "examples" / "studies" / "src")}
-        subprocess.run([sys.executable, script, *options, *agents], check=True, cwd=ROOT, env=variables)
+    options = ["--tasks", BUNDLED_TASKS, "--num-tasks", "1", "--limit", "2", "--stride", "3", "--base-url", base_url]
+    agents = ["--agent", "3d-mem,msgnav,evonav_studies.variants:UniGoalAsPublished", "--out", tmp_path]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT / "examples" / "studies" / "src")}
+    subprocess.run([sys.executable, script, *options, *agents], check=True, cwd=ROOT, env=variables)
     rows = read_log(tmp_path / "answers.jsonl")
     assert {row["kind"] for row in rows} >= KINDS
     valid = {row["kind"] for row in rows if not row["fault"]}

@@ -19,8 +19,7 @@ from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 from evonav.replay.replay import RunReplay
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 
@@ -54,8 +53,7 @@ def config_of(word: str, models: Path, **protocol: int) -> RunConfig:
 
 
 def run(folder: Path, config: RunConfig, agents: tuple[str, ...]) -> None:
-    with bundled_tasks() as tasks:
-        evaluate(list(agents), task_files(tasks, 1), folder, config=config, num_workers=0)
+    evaluate(list(agents), task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=0)
 
 
 def assert_looked(folder: Path, agent: str) -> None:
@@ -86,18 +84,17 @@ def test_a_replay_finds_the_models_where_the_run_had_them(
 ) -> None:
     monkeypatch.delenv(weights.MODELS_VARIABLE, raising=False)
     run(tmp_path / "run", config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=1), ("fu",))
-    with bundled_tasks() as tasks:
-        (task,) = task_files(tasks, 1)
-        replay = RunReplay(tmp_path / "run", lambda _: task.path)
-        stages = list(replay.episode("fu", task.task_id))
-        assert replay.backend.perception.host_options == {"models": str(tiny_models)}
-        assert [stage.record.stage for stage in stages] == list(range(1, task.num_stages + 1))
-        assert not any(stage.differences for stage in stages)
-        monkeypatch.setenv(weights.MODELS_VARIABLE, str(tmp_path / "gone"))
-        (first, *_) = RunReplay(tmp_path / "run", lambda _: task.path).episode("fu", task.task_id)
-        assert first.differences
-        assert first.record.error is not None
-        assert "EVONAV_MODELS" in first.record.error.message
+    (task,) = task_files(BUNDLED_TASKS, 1)
+    replay = RunReplay(tmp_path / "run", lambda _: task.path)
+    stages = list(replay.episode("fu", task.task_id))
+    assert replay.backend.perception.host_options == {"models": str(tiny_models)}
+    assert [stage.record.stage for stage in stages] == list(range(1, task.num_stages + 1))
+    assert not any(stage.differences for stage in stages)
+    monkeypatch.setenv(weights.MODELS_VARIABLE, str(tmp_path / "gone"))
+    (first, *_) = RunReplay(tmp_path / "run", lambda _: task.path).episode("fu", task.task_id)
+    assert first.differences
+    assert first.record.error is not None
+    assert "EVONAV_MODELS" in first.record.error.message
 
 
 def test_an_episode_with_unigoals_detectors(all_models: Path, without_published_hash: None, tmp_path: Path) -> None:

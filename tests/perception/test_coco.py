@@ -25,8 +25,7 @@ from evonav.perception.detector import DetectorView
 from evonav.perception.models.yolov4_tiny import load_yolov4_tiny
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SimulatorConfig
 
@@ -85,8 +84,7 @@ def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_threads() -> None:
 def test_an_episode_with_it(tmp_path: Path) -> None:
     backend = Backend(perception=PerceptionSettings(make="predicted:coco,min_confidence=0.05,side_px=96").component())
     config = RunConfig(protocol=ProtocolConfig(max_rounds=2), backend=backend)
-    with bundled_tasks() as tasks:
-        evaluate(["fu"], task_files(tasks, 1), tmp_path, config=config, num_workers=0)
+    evaluate(["fu"], task_files(BUNDLED_TASKS, 1), tmp_path, config=config, num_workers=0)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["perception"] == "predicted:coco,min_confidence=0.05,side_px=96"
     assert summary["perception_models"]["coco"]["weights"] == {"yolov4-tiny.weights": coco.SHA256}

@@ -21,8 +21,7 @@ from evonav.perception import mini
 from evonav.perception.detector import DetectorView
 from evonav.perception.mini import MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 MIN_AREA_PX = 1000
 MIN_RECALL, MIN_PRECISION = 0.7, 0.7
@@ -31,8 +30,7 @@ MIN_RECALL, MIN_PRECISION = 0.7, 0.7
 
 def views(tilted: float = 0.0) -> list[mini_frames.LabelledFrame]:
     """Of bundled houses, which are of the test split: none was trained on."""
-    with bundled_tasks() as tasks:
-        return list(mini_frames.frames(mini_frames.house_files(tasks)[:16], 4, 3, tilted))
+    return list(mini_frames.frames(mini_frames.house_files(BUNDLED_TASKS)[:16], 4, 3, tilted))
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +133,7 @@ def test_a_whole_episode_with_it(tmp_path: Path) -> None:
     config = RunConfig(protocol=ProtocolConfig(max_rounds=4), backend=backend)
     told = []
     for folder, num_workers in ((tmp_path / "a", 0), (tmp_path / "b", 2)):
-        with bundled_tasks() as tasks:
-            evaluate(["fu"], task_files(tasks, 2), folder, config=config, num_workers=num_workers)
+        evaluate(["fu"], task_files(BUNDLED_TASKS, 2), folder, config=config, num_workers=num_workers)
         with RunStore(folder) as store:
             told.append(list(store.records("fu")))
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -23,8 +23,7 @@ from evonav.perception_benchmark.scores import differences, scores
 from evonav.perception_benchmark.tables import perception_tables
 from evonav.perception_benchmark.tour import tour
 from evonav.statistics import ClusterBootstrap, percentile_interval
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 SPECS = [
     PerceptionSpec("gt", Component(GROUND_TRUTH)),
@@ -38,10 +37,9 @@ CONFIG = TourConfig(views_per_room=6, num_houses=2)
 
 @pytest.fixture(scope="module")
 def tasks():
-    with bundled_tasks() as folder:
-        every = task_files(folder)
-        sizes = {task.task_id: (task.path / "houses" / "stage_1.json.gz").stat().st_size for task in every}
-        yield sorted(every, key=lambda task: sizes[task.task_id])[:3]
+    every = task_files(BUNDLED_TASKS)
+    sizes = {task.task_id: (task.path / "houses" / "stage_1.json.gz").stat().st_size for task in every}
+    return sorted(every, key=lambda task: sizes[task.task_id])[:3]
 
 
 @pytest.fixture(scope="module")

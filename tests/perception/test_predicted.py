@@ -42,9 +42,8 @@ from evonav.perception.vocabulary import (
     type_of_word,
 )
 from evonav.sensors.observation import Detections
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import STRUCTURE_TYPES
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, LABEL_TRANSLATION, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -252,8 +251,7 @@ def test_folder_and_device_are_no_part_of_what_makes_runs_the_same() -> None:
 def run(folder, perception, agents=("fu",), limit=1):
     protocol = ProtocolConfig(max_rounds=4, max_actions=10)
     config = RunConfig(protocol=protocol, backend=Backend(perception=Component(f"scripted_models:{perception}")))
-    with bundled_tasks() as tasks:
-        return evaluate(list(agents), task_files(tasks, limit), folder, config=config, num_workers=0)
+    return evaluate(list(agents), task_files(BUNDLED_TASKS, limit), folder, config=config, num_workers=0)
 
 
 def test_a_whole_episode_with_a_scripted_detector(tmp_path) -> None:

@@ -18,8 +18,8 @@ from evonav.perception.noise.config import NoiseConfig, noise_presets
 from evonav.perception.noise.pose_drift import PoseDrift
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import STRUCTURE_TYPES
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame
@@ -33,18 +33,17 @@ def views(num_tasks: int = 4, num_rounds: int = 5) -> Views:
     simulator = EmbeddedSimulator()
     draws = np.random.default_rng(0)
     found = []
-    with bundled_tasks() as folder:
-        for path in sorted(folder.glob("*/task.json"))[:num_tasks]:
-            case = load_spec(path.parent)
-            simulator.reset(case.stages[0].house_json)
-            scene = StageScene(case.task_id, case.stages[0].public, "fu", 7, tuple(simulator.objects))
-            places = simulator.reachable_positions()
-            rounds = []
-            for _ in range(num_rounds):
-                x_m, _, z_m = places[draws.integers(len(places))].tolist()
-                poses = [replace(simulator.pose, x_m=x_m, z_m=z_m, yaw_rad=yaw) for yaw in draws.uniform(0, 6.2, 3)]
-                rounds.append([simulator.render(pose, rgb=False, instances=True) for pose in poses])
-            found.append((scene, rounds))
+    for path in sorted(BUNDLED_TASKS.glob("*/task.json"))[:num_tasks]:
+        case = load_spec(path.parent)
+        simulator.reset(case.stages[0].house_json)
+        scene = StageScene(case.task_id, case.stages[0].public, "fu", 7, tuple(simulator.objects))
+        places = simulator.reachable_positions()
+        rounds = []
+        for _ in range(num_rounds):
+            x_m, _, z_m = places[draws.integers(len(places))].tolist()
+            poses = [replace(simulator.pose, x_m=x_m, z_m=z_m, yaw_rad=yaw) for yaw in draws.uniform(0, 6.2, 3)]
+            rounds.append([simulator.render(pose, rgb=False, instances=True) for pose in poses])
+        found.append((scene, rounds))
     return found
 
 

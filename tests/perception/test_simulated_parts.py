@@ -13,7 +13,7 @@ from evonav.perception.noise.config import NoiseConfig, noise_presets
 from evonav.perception.noise.confusion import read_confusion
 from evonav.perception.simulated import noisy_perception
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, nouns_of, text_feature
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 
 @pytest.mark.parametrize(
@@ -163,9 +163,8 @@ def test_the_first_noun_of_an_instruction_is_the_target() -> None:
         "DiningTable",
     ]
     num = right = 0
-    with bundled_tasks() as folder:
-        for path in sorted(folder.glob("*/task.json")):
-            for stage in load_spec(path.parent).stages:
-                num += 1
-                right += nouns_of(stage.public.unified_instruction, categories)[:1] == [stage.public.category]
+    for path in sorted(BUNDLED_TASKS.glob("*/task.json")):
+        for stage in load_spec(path.parent).stages:
+            num += 1
+            right += nouns_of(stage.public.unified_instruction, categories)[:1] == [stage.public.category]
     assert right == num > 50

@@ -8,16 +8,14 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 
 def records(out: Path, word: str, num_workers: int) -> list[str]:
     """Of two bundled tasks, a few rounds a stage."""
     backend = Backend(perception=PerceptionSettings(make=word).component())
     config = RunConfig(seed=3, backend=backend, protocol=ProtocolConfig(max_rounds=6))
-    with bundled_tasks() as folder:
-        evaluate(["fu"], task_files(folder, 2, None), out, config=config, num_workers=num_workers)
+    evaluate(["fu"], task_files(BUNDLED_TASKS, 2, None), out, config=config, num_workers=num_workers)
     with RunStore(out) as store:
         return [record.model_dump_json() for record in store.records("fu")]
 

@@ -13,8 +13,7 @@ from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.report.run import load_run
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 AGENTS = ("fu", "random-walk", "nearest-frontier", "stay-still")
 
@@ -23,8 +22,7 @@ AGENTS = ("fu", "random-walk", "nearest-frontier", "stay-still")
 def run_dir(tmp_path_factory):
     """A real run: four agents on three houses."""
     out = tmp_path_factory.mktemp("reference") / "run"
-    with bundled_tasks() as folder:
-        evaluate(AGENTS, task_files(folder, 3), out, num_workers=0)
+    evaluate(AGENTS, task_files(BUNDLED_TASKS, 3), out, num_workers=0)
     return out
 
 
@@ -66,9 +64,8 @@ def test_a_second_implementation_has_the_same_causes_and_rows(run_dir):
 
 
 def test_the_walk_to_the_target_is_perfect_on_all_bundled_tasks(tmp_path):
-    with bundled_tasks() as folder:
-        tasks = task_files(folder)
-        (summary,) = evaluate(["shortest-path"], tasks, tmp_path, num_workers=0)
+    tasks = task_files(BUNDLED_TASKS)
+    (summary,) = evaluate(["shortest-path"], tasks, tmp_path, num_workers=0)
     assert (summary.n, summary.sr) == (sum(task.num_stages for task in tasks), 1.0)
     with RunStore(tmp_path) as store:
         rows = read_stage_metrics(store)

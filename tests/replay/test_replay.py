@@ -29,9 +29,8 @@ from evonav.generation import GenerationParameters, generate_task
 from evonav.house import bundled_houses
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import EXPLORED, FREE
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import write_task
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("test_replay:colour_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
@@ -305,10 +304,9 @@ def test_an_agent_that_cannot_tell_its_belief_costs_nothing_but_that(tmp_path):
 
 
 def test_bundled_tasks_replay_with_the_embedded_simulator(tmp_path):
-    with bundled_tasks() as tasks:
-        evaluate(["ftu"], task_files(tasks, 1), tmp_path, num_workers=0)
-        (task_id,) = {task.task_id for task in task_files(tasks, 1)}
-        stages = list(RunReplay(tmp_path, lambda name: tasks / name).episode("ftu", task_id))
+    evaluate(["ftu"], task_files(BUNDLED_TASKS, 1), tmp_path, num_workers=0)
+    (task_id,) = {task.task_id for task in task_files(BUNDLED_TASKS, 1)}
+    stages = list(RunReplay(tmp_path, lambda name: BUNDLED_TASKS / name).episode("ftu", task_id))
     assert all(stage.differences == () for stage in stages)
     sizes = [len(view.jpeg) for stage in stages for step in stage.rounds for view in step.views]
     assert max(sizes) < 40_000

@@ -9,8 +9,7 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 
 @pytest.fixture
@@ -45,6 +44,5 @@ def viewed_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     config = RunConfig(
         backend=Backend(decision=Component("viewer_run:scripted")), protocol=ProtocolConfig(max_rounds=9)
     )
-    with bundled_tasks() as tasks:
-        evaluate(["fu", "random-walk"], task_files(tasks, 2)[1:], path, config=config, num_workers=0)
+    evaluate(["fu", "random-walk"], task_files(BUNDLED_TASKS, 2)[1:], path, config=config, num_workers=0)
     return path

@@ -18,8 +18,7 @@ from evonav.submission.file import About
 from evonav.submission.leaderboard import Leaderboard, RankedTasks, Unranked, packed_files, rank
 from evonav.submission.leaderboard_page import write_leaderboard
 from evonav.submission.pack import pack
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 HERE = Path(__file__).parent
 CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
@@ -27,8 +26,7 @@ CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
 
 @pytest.fixture(scope="module")
 def tasks() -> Iterator[RankedTasks]:
-    with bundled_tasks() as folder:
-        yield RankedTasks("one", tuple(task_files(folder, 1)))
+    return RankedTasks("one", tuple(task_files(BUNDLED_TASKS, 1)))
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +84,7 @@ def test_a_file_that_is_altered_repeated_incomplete_or_none_is_not_ranked(
     (tmp_path / "4.evonav.jsonl.gz").write_text("no archive")
     changed(ours, tmp_path / "5.evonav.jsonl.gz", b'"is_geodesic', b'"is_Geodesic')
     changed(ours, tmp_path / "6.evonav.jsonl.gz", b'"max_views":7', b'"max_views":9')
-    with bundled_tasks() as every:
-        two = RankedTasks("two", tuple(task_files(every, 2)))
+    two = RankedTasks("two", tuple(task_files(BUNDLED_TASKS, 2)))
     found = rank(packed_files([tmp_path]), [tasks], scores_only=True)
     assert [(one.file, one.status) for one in found.unranked] == [
         ("2.evonav.jsonl.gz", "repeated"),

@@ -11,8 +11,7 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 pytestmark = needs_browser
 
@@ -41,8 +40,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         PerceptionSpec("gt", Component(GROUND_TRUTH)),
         PerceptionSpec(f"mine:{SMUGGLED}", Component(f"{__name__}:smuggling")),
     ]
-    with bundled_tasks() as folder:
-        measure(specs, task_files(folder, 2), out, config=TourConfig(6, 1), num_workers=0)
+    measure(specs, task_files(BUNDLED_TASKS, 2), out, config=TourConfig(6, 1), num_workers=0)
     return write_perception_report(out)[0]
 
 

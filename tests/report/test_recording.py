@@ -13,7 +13,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import load_spec
 from evonav.replay.rerun_export import check_recording
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
@@ -83,8 +83,7 @@ def test_entities_and_counts_are_the_records(recording: Path, viewed_run: Path) 
 def test_depth_is_what_the_camera_measured(recording: Path, viewed_run: Path) -> None:
     with RunStore(viewed_run) as store:
         (record, *_) = store.records("fu")
-    with bundled_tasks() as tasks:
-        house_json = load_spec(tasks / record.task_id).stages[0].house_json
+    house_json = load_spec(BUNDLED_TASKS / record.task_id).stages[0].house_json
     simulator = EmbeddedSimulator()
     simulator.reset(house_json)
     pose = record.trace[0].pose

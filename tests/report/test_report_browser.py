@@ -19,7 +19,7 @@ from evonav.replay.types import ReplayedStage
 from evonav.report import write_report
 from evonav.report.maps.stage_map import page_name
 from evonav.report.pages import run_page as html
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 HERE = Path(__file__).parent
 PROBE = (HERE / "report_probe.js").read_text("utf-8")
@@ -118,9 +118,8 @@ def test_no_text_of_a_run_becomes_a_script(tmp_path: Path, has_policy: bool) -> 
 
 @pytest.fixture(scope="module")
 def traced(viewed_run: Path) -> list[ReplayedStage]:
-    with bundled_tasks() as tasks:
-        task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
-        return list(RunReplay(viewed_run, lambda name: tasks / name).episode("fu", task_id))
+    task_id = sorted(path.name for path in BUNDLED_TASKS.iterdir() if path.is_dir())[1]
+    return list(RunReplay(viewed_run, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
 
 
 @pytest.mark.slow

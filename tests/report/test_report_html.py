@@ -24,8 +24,7 @@ from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables
 from evonav.report.tables.run_metadata import reproduction
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 VOID = {"meta", "input", "br", "link", "img"}
 
@@ -317,15 +316,14 @@ def test_a_report_tells_how_to_run_it_again_and_what_went_wrong(write_run: Write
 
 
 def test_a_run_notes_its_command_and_versions(tmp_path: Path) -> None:
-    with bundled_tasks() as tasks:
-        for agents in (["random-walk"], ["random-walk"], ["stay-still"]):
-            evaluate(
-                agents,
-                task_files(tasks, 1),
-                tmp_path,
-                num_workers=0,
-                config=RunConfig(protocol=ProtocolConfig(max_rounds=1)),
-            )
+    for agents in (["random-walk"], ["random-walk"], ["stay-still"]):
+        evaluate(
+            agents,
+            task_files(BUNDLED_TASKS, 1),
+            tmp_path,
+            num_workers=0,
+            config=RunConfig(protocol=ProtocolConfig(max_rounds=1)),
+        )
     with RunStore(tmp_path) as store:
         sessions = store.meta("sessions")
     assert len(sessions) == 2  # the second call had nothing to do

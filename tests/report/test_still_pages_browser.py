@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.controlled.page import write_controlled_report
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 pytestmark = needs_browser
 
@@ -26,10 +26,9 @@ def command(*words: str | Path) -> None:
 
 def pages_of(folder: Path, write_run: WriteRun) -> list[Path]:
     """One of every kind."""
-    with bundled_tasks() as tasks:
-        one = next(path for path in sorted(tasks.iterdir()) if path.is_dir())
-        (folder / "tasks").mkdir(parents=True)
-        shutil.copytree(one, folder / "tasks" / one.name)
+    one = next(path for path in sorted(BUNDLED_TASKS.iterdir()) if path.is_dir())
+    (folder / "tasks").mkdir(parents=True)
+    shutil.copytree(one, folder / "tasks" / one.name)
     command("tasks", "show", folder / "tasks", "--out", folder / "gallery")
     command("tasks", "stats", folder / "tasks", "--out", folder / "statistics")
     command("compare", write_run(), "--out", folder / "compare.html")

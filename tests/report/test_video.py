@@ -15,16 +15,15 @@ from evonav.replay.replay import RunReplay
 from evonav.replay.types import ReplayedStage
 from evonav.replay.video import write_video
 from evonav.replay.video_frames import LEFTS, MAP_PX, SIZE, TOP, episode_frame, stage_frames
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 pytest.importorskip("resvg_py", reason="resvg is not installed")
 
 
 @pytest.fixture(scope="module")
 def stages(viewed_run: Path) -> list[ReplayedStage]:
-    with bundled_tasks() as tasks:
-        task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
-        return list(RunReplay(viewed_run, lambda name: tasks / name, heading_px=396).episode("fu", task_id))
+    task_id = sorted(path.name for path in BUNDLED_TASKS.iterdir() if path.is_dir())[1]
+    return list(RunReplay(viewed_run, lambda name: BUNDLED_TASKS / name, heading_px=396).episode("fu", task_id))
 
 
 def pictures(stages: list[ReplayedStage], number: int) -> list[Image.Image]:

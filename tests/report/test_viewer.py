@@ -29,7 +29,7 @@ from evonav.replay.replay import RunReplay
 from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage, Truth
 from evonav.report.maps.stage_map import page_name
 from evonav.report.pages.run_page import write_report
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +45,7 @@ def task_id(run_dir: Path) -> str:
 
 @pytest.fixture(scope="module")
 def stages(run_dir: Path, task_id: str) -> list[ReplayedStage]:
-    with bundled_tasks() as tasks:
-        return list(RunReplay(run_dir, lambda name: tasks / name).episode("fu", task_id))
+    return list(RunReplay(run_dir, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
 
 
 @pytest.fixture(scope="module")

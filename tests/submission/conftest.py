@@ -7,14 +7,12 @@ from forged_pack import ForgedPack
 
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.submission.pack import pack
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.tasks.listing import BUNDLED_TASKS, TaskFile, task_files
 
 
 @pytest.fixture(scope="module")
 def tasks() -> list[TaskFile]:
-    with bundled_tasks() as folder:
-        return task_files(folder, 2)
+    return task_files(BUNDLED_TASKS, 2)
 
 
 @pytest.fixture(scope="module")

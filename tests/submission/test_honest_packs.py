@@ -17,8 +17,7 @@ from evonav.submission.file import About, read_header
 from evonav.submission.pack import pack
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.tasks.listing import BUNDLED_TASKS, TaskFile, task_files
 from evonav.tasks.parameters import GenerationParameters
 
 MARK = "EVONAV_TEST_DIED"
@@ -26,8 +25,7 @@ MARK = "EVONAV_TEST_DIED"
 
 @pytest.fixture(scope="module")
 def tasks() -> list[TaskFile]:
-    with bundled_tasks() as folder:
-        return task_files(folder, 3)
+    return task_files(BUNDLED_TASKS, 3)
 
 
 def assert_accepted(run: Path, tasks: list[TaskFile], **options: Any) -> None:

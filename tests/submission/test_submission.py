@@ -36,10 +36,9 @@ SELF_REPORTED = (
 
 @pytest.fixture(scope="module")
 def tasks() -> list[TaskFile]:
-    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import BUNDLED_TASKS
 
-    with bundled_tasks() as folder:
-        return task_files(folder, 1)
+    return task_files(BUNDLED_TASKS, 1)
 
 
 @pytest.fixture(scope="module")

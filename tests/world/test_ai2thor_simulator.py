@@ -26,8 +26,7 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.house import bundled_houses
 from evonav.parallel.folders import LOCK_NAME
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 from evonav.world.ai2thor.events import InstanceDecoder, depth_of, with_boxes
 from evonav.world.check import check_simulator
@@ -120,14 +119,13 @@ def _assert_same_frames(one: Frame, other: Frame) -> None:
 
 def test_episodes_are_the_same_by_both_routes(tmp_path: Path) -> None:
     """Whole records of all three heuristics, and the images at every third pose they decided at."""
-    with bundled_tasks() as directory:
-        tasks = task_files(directory, 1)
-        agents = ["fu", "stage-reset", "ftu"]
-        folders = compare_simulators.evaluate_both(agents, tasks, tmp_path, num_workers=2, max_rounds=15)
-        assert list(compare_simulators.differing_records(*folders)) == []
-        assert list(compare_simulators.differing_images(folders[0], tasks, every=3)) == []
-        with RunStore(folders[0]) as store:
-            assert sum(1 for record in store.records() if record.path_length_m) >= 9
+    tasks = task_files(BUNDLED_TASKS, 1)
+    agents = ["fu", "stage-reset", "ftu"]
+    folders = compare_simulators.evaluate_both(agents, tasks, tmp_path, num_workers=2, max_rounds=15)
+    assert list(compare_simulators.differing_records(*folders)) == []
+    assert list(compare_simulators.differing_images(folders[0], tasks, every=3)) == []
+    with RunStore(folders[0]) as store:
+        assert sum(1 for record in store.records() if record.path_length_m) >= 9
 
 
 def test_an_occupied_pose_is_moved_as_in_the_embedded_simulator(
@@ -218,10 +216,9 @@ def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Pat
     options, host_options = {"executable": "evonav"}, {"folder": str(tmp_path)}
     dying = Component("test_ai2thor_simulator:killed_once", options, host_options)
     killed = replace(whole, backend=replace(whole.backend, simulator=dying))
-    with bundled_tasks() as directory:
-        tasks = task_files(directory, 1)
-        for name, config in (("whole", whole), ("killed", killed)):
-            evaluate(["ftu"], tasks, tmp_path / name, config=config, num_workers=0)
+    tasks = task_files(BUNDLED_TASKS, 1)
+    for name, config in (("whole", whole), ("killed", killed)):
+        evaluate(["ftu"], tasks, tmp_path / name, config=config, num_workers=0)
     with RunStore(tmp_path / "whole") as one, RunStore(tmp_path / "killed") as other:
         assert list(one.record_texts()) == list(other.record_texts())
         assert one.failures() == []

@@ -1,10 +1,7 @@
 """Load houses and tasks, and generate tasks: `evonav.load_houses`, `load_tasks`, `generate_tasks`."""
 
-import atexit
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack
-from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
@@ -17,17 +14,13 @@ from evonav.evaluation.run.run_settings import RunSettings
 from evonav.generation.dataset import generate_dataset, inherited_names
 from evonav.generation.worker import GenerationOptions
 from evonav.house.evonav10k import SPLITS, made_split, split_to_make
-from evonav.house.files import HouseText, HouseTexts
+from evonav.house.files import BUNDLED, HouseText, HouseTexts
 from evonav.parallel.folders import write_atomically
 from evonav.parallel.worker import Workforce
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task, write_task
-from evonav.tasks.listing import TaskFile, task_file, task_files
+from evonav.tasks.listing import TaskFile, task_file, task_files, task_folder
 from evonav.tasks.manifest import Task
 from evonav.world.house_options import HouseOptions, StartRule
-
-BUNDLED = "bundled"
-"""Names the houses and tasks that come with evonav."""
 
 T = TypeVar("T")
 S = TypeVar("S")
@@ -243,24 +236,9 @@ def _each_file(tasks: Any, limit: int | None, out: Path) -> Iterator[TaskFile]: 
 
 
 def _files_of(source: str | Path, limit: int | None) -> list[TaskFile]:
-    if source == BUNDLED:
-        return task_files(_bundled_tasks(), limit)
-    path = Path(source)
+    path = task_folder(source)
     if (path / "task.json").is_file():
         return [task_file(path)]
     if not path.exists():
         raise TaskError(f"{path}: no such folder of tasks; `bundled` names those of evonav")
     return task_files(path, limit)
-
-
-@cache
-def _lent() -> ExitStack:
-    """Return what holds the bundled files until this process ends."""
-    stack = ExitStack()
-    atexit.register(stack.close)
-    return stack
-
-
-@cache
-def _bundled_tasks() -> Path:
-    return _lent().enter_context(bundled_tasks())

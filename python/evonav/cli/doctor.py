@@ -183,13 +183,11 @@ def _python() -> Result:
 
 
 def _bundled() -> Result:
-    from evonav.tasks.bundled import bundled_tasks
     from evonav.tasks.files import load_task
-    from evonav.tasks.listing import task_roots
+    from evonav.tasks.listing import BUNDLED_TASKS, task_roots
 
-    with bundled_tasks() as folder:
-        roots = task_roots(folder)
-        task = load_task(roots[0])
+    roots = task_roots(BUNDLED_TASKS)
+    task = load_task(roots[0])
     return "ok", f"{len(roots)}, the first of {counted(task.num_stages, 'stage')}"
 
 

@@ -13,9 +13,8 @@ from evonav.generation.pipeline import TaskRejectedError, generate_task
 from evonav.gym.spaces import MAX_STAGES
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
-from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task
-from evonav.tasks.listing import task_roots
+from evonav.tasks.listing import BUNDLED_TASKS, task_roots
 from evonav.tasks.manifest import Task
 from evonav.tasks.subsets import subset_roots
 
@@ -87,7 +86,7 @@ class FolderTasks:
         Raises:
             TaskError: The folder has no tasks, or not the subset.
         """
-        folder = _bundled() if tasks is None else Path(tasks)
+        folder = BUNDLED_TASKS if tasks is None else Path(tasks)
         self.roots = tuple(task_roots(folder) if subset is None else subset_roots(folder, subset))
         self._load = lru_cache(maxsize=256)(lambda root: _checked(load_task(root), str(root)))
 
@@ -188,8 +187,3 @@ def _checked(task: Task, name: str) -> Task:
     if task.num_stages > MAX_STAGES:
         raise InvalidArgumentError(f"{name}: has {task.num_stages} stages, expected at most {MAX_STAGES}")
     return task
-
-
-def _bundled() -> Path:
-    with bundled_tasks() as folder:
-        return folder

@@ -11,7 +11,7 @@ from evonav.report.maps.stage_map import VIEW_DIR
 from evonav.report.pages.highlights import best_highlight, highlights_first
 from evonav.report.pages.replays import ListedPage, listed_pages
 from evonav.report.run import RecordedRun
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 
 def write_pages(
@@ -86,8 +86,7 @@ def task_path(run: Path, tasks: Path | None) -> Callable[[str], Path]:
     """
     with RunStore(run) as store:
         noted = store.meta("tasks_dir")
-    with bundled_tasks() as bundled:
-        places = [tasks] if tasks is not None else [run / "tasks", *([Path(noted)] if noted else []), bundled]
+    places = [tasks] if tasks is not None else [run / "tasks", *([Path(noted)] if noted else []), BUNDLED_TASKS]
 
     def find(task_id: str) -> Path:
         found = next((place / task_id for place in places if (place / task_id / "task.json").is_file()), None)

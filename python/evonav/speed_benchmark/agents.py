@@ -29,8 +29,7 @@ from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import Sampling, rows_of
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_file
+from evonav.tasks.listing import BUNDLED_TASKS, task_file
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Simulator
 
@@ -185,8 +184,7 @@ def _measure_growth(name: str) -> None:
 
 
 def _case(backend: Backend) -> EpisodeSpec:
-    with bundled_tasks() as folder:
-        return backend.tasks.create(task_file(folder / TASK).path)
+    return backend.tasks.create(task_file(BUNDLED_TASKS / TASK).path)
 
 
 def _play(case: EpisodeSpec, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:

@@ -20,8 +20,6 @@ from evonav.tasks.records import described_schema
 from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import key_and_value, read_toml, set_value
 
-BUNDLED = "bundled"
-"""Name for the folder of the tasks that come with evonav."""
 SEPARATOR = "__"
 """Separator between the parts of a cell's name; no part contains it."""
 

@@ -10,7 +10,6 @@ A cell's name depends on the cell alone, so that a file may gain agents and valu
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import product
@@ -28,9 +27,8 @@ from evonav.evaluation.run.run_settings import DecisionResources
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.sweeps import RUNS_NAME, SWEEP_NAME
-from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import TaskFile, task_files
+from evonav.sweeps.file import SEPARATOR, Pattern, SweepFile
+from evonav.tasks.listing import TaskFile, task_files, task_folder
 
 SCHEMA_VERSION = 1
 _HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "episodes_at_once", "num_retries"}
@@ -109,21 +107,13 @@ def chosen(cells: Sequence[Cell], patterns: Sequence[str]) -> list[Cell]:
     return [cell for cell in cells if not patterns or any(fnmatchcase(cell.name, each) for each in patterns)]
 
 
-@contextmanager
-def task_sets(sweep: SweepFile) -> Iterator[dict[str, list[TaskFile]]]:
-    """Lend the tasks of every set."""
-    with ExitStack() as stack:
-        yield {name: tasks_of(tasks, stack) for name, tasks in sweep.tasks.items()}
-
-
-def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
-    """Return the tasks of a set; `stack` keeps the bundled ones available.
+def task_sets(sweep: SweepFile) -> dict[str, list[TaskFile]]:
+    """Return the tasks of every set.
 
     Raises:
         TaskError: There are none, too few, or malformed ones.
     """
-    folder = stack.enter_context(bundled_tasks()) if tasks.folder == BUNDLED else Path(tasks.folder)
-    return task_files(folder, tasks.limit, tasks.subset)
+    return {name: task_files(task_folder(one.folder), one.limit, one.subset) for name, one in sweep.tasks.items()}
 
 
 def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:

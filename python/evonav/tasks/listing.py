@@ -5,8 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.errors import TaskError
+from evonav.house.files import BUNDLED
 from evonav.tasks.records import sha256_of
 from evonav.tasks.subsets import subset_roots
+
+BUNDLED_TASKS = Path(__file__).parents[1] / "data" / "tasks"
+"""Folder of the tasks that come with evonav."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +23,15 @@ class TaskFile:
     num_stages: int
     digest: str
     """The SHA-256 of `task.json`, which holds the checksums of all other files."""
+
+
+def task_folder(name: Path | str | None) -> Path:
+    """Return a folder of tasks; the bundled one without a name, and for the word `bundled` if no folder has this name.
+
+    It need not exist.
+    """
+    folder = Path(name or BUNDLED)
+    return BUNDLED_TASKS if str(folder) == BUNDLED and not folder.exists() else folder
 
 
 def task_files(directory: Path, limit: int | None = None, subset: str | None = None) -> list[TaskFile]:

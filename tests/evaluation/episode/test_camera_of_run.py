@@ -15,8 +15,7 @@ from evonav.submission.file import About
 from evonav.submission.pack import pack
 from evonav.submission.packed_setup import packed_setup
 from evonav.submission.verify import verify
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 
 def test_a_header_names_the_style_and_what_is_unusual_of_the_camera() -> None:
@@ -36,8 +35,7 @@ def test_the_camera_of_a_run_is_what_was_asked_for(kind: Literal["embedded", "ai
 
 
 def test_a_run_with_another_camera_is_scored_again_with_it(tmp_path: Path) -> None:
-    with bundled_tasks() as folder:
-        tasks = task_files(folder, 1)
+    tasks = task_files(BUNDLED_TASKS, 1)
     backend = Backend(simulator=SimulatorSettings(hfov_deg=120.0, width_px=400).component())
     evaluate(["fu"], tasks, tmp_path / "wide", config=RunConfig(backend=backend), num_workers=0)
     pack(tmp_path / "wide", tmp_path / "wide.zip", about=About())

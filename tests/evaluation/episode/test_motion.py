@@ -17,7 +17,7 @@ from evonav.evaluation.episode.sensors import view_yaws_rad
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import load_spec
 from evonav.sensors.observation import MapFrame
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.world.pose import Pose
 from evonav.world.simulator import OccupancyGrid
 
@@ -88,8 +88,7 @@ def test_the_floor_plan_holds_rooms_walls_and_footprints():
 
 
 def test_footprints_are_the_outlines_of_the_parts_to_the_millimetre():
-    with bundled_tasks() as directory:
-        spec = load_spec(min(path.parent for path in directory.glob("*/task.json")))
+    spec = load_spec(min(path.parent for path in BUNDLED_TASKS.glob("*/task.json")))
     plan = {item.object_id: item for item in spec.floor_plan(1).objects}
     for object_id, _, parts in spec.parsed_house(1).footprints(allow_unknown_assets=True):
         outlines = {tuple((round(x, 3), round(z, 3)) for x, z in outline) for outline, _, _ in parts}

@@ -6,8 +6,7 @@ import numpy as np
 
 from evonav.evaluation.episode.motion import Planner
 from evonav.evaluation.run.components import embedded_simulator, load_spec
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.world.pose import Pose
 from evonav.world.simulator import OccupancyGrid
 
@@ -61,19 +60,18 @@ def test_the_path_leads_into_the_room_of_a_target_behind_a_wall():
 def test_paths_to_the_targets_of_bundled_tasks_end_in_their_rooms():
     simulator = embedded_simulator()
     elsewhere, longer_m = 0, []
-    with bundled_tasks() as directory:
-        for task in task_files(directory):
-            spec = load_spec(task.path)
-            for number, stage in enumerate(spec.stages, 1):
-                house = spec.parsed_house(number)
-                simulator.reset(stage.house_json, spec.start)
-                planner, (x_m, _, z_m) = Planner(simulator), stage.target.position_m
-                room_id = stage.target.room_id
-                nearest = planner.path_m((x_m, z_m))
-                path = planner.into_room_m(nearest, (x_m, z_m), house, room_id)
-                assert house.room_of(*path[-1]) == room_id, (task.task_id, number)
-                if house.room_of(*nearest[-1]) != room_id:
-                    elsewhere += 1
-                    longer_m.append(math.dist(path[-1], (x_m, z_m)) - math.dist(nearest[-1], (x_m, z_m)))
+    for task in task_files(BUNDLED_TASKS):
+        spec = load_spec(task.path)
+        for number, stage in enumerate(spec.stages, 1):
+            house = spec.parsed_house(number)
+            simulator.reset(stage.house_json, spec.start)
+            planner, (x_m, _, z_m) = Planner(simulator), stage.target.position_m
+            room_id = stage.target.room_id
+            nearest = planner.path_m((x_m, z_m))
+            path = planner.into_room_m(nearest, (x_m, z_m), house, room_id)
+            assert house.room_of(*path[-1]) == room_id, (task.task_id, number)
+            if house.room_of(*nearest[-1]) != room_id:
+                elsewhere += 1
+                longer_m.append(math.dist(path[-1], (x_m, z_m)) - math.dist(nearest[-1], (x_m, z_m)))
     assert elsewhere > 3
     assert min(longer_m) > -0.18  # the nearest place may be one of a grid of 0.25 m

@@ -23,8 +23,7 @@ from evonav.memory.clouds import clouds_of
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Observation
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
@@ -161,8 +160,7 @@ def test_all_agents_of_a_run_meet_the_same_errors_and_another_seed_others(tmp_pa
         path = tmp_path / f"{seed}.txt"
         backend = Backend(perception=Component("seeds_seen:Noting", {"path": str(path)}))
         config = RunConfig(seed=seed, backend=backend, protocol=ProtocolConfig(max_rounds=1))
-        with bundled_tasks() as folder:
-            evaluate(["stay-still", "shortest-path"], task_files(folder, 2), tmp_path / f"run{seed}", config=config)
+        evaluate(["stay-still", "shortest-path"], task_files(BUNDLED_TASKS, 2), tmp_path / f"run{seed}", config=config)
         seen.append({tuple(line.split()) for line in path.read_text(encoding="utf-8").splitlines()})
     for told in seen:
         assert {agent for agent, _, _ in told} == {"stay-still", "shortest-path"}

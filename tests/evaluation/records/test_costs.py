@@ -18,8 +18,7 @@ from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
-from evonav.tasks.bundled import bundled_tasks
-from evonav.tasks.listing import task_files
+from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 
 class Model(DecisionModel):
@@ -117,8 +116,7 @@ def test_a_stopwatch_books_by_component_and_leaves_the_rest_to_the_evaluator():
 
 
 def test_a_stage_of_an_agent_in_its_own_process_tells_what_it_cost(tmp_path):
-    with bundled_tasks() as folder:
-        evaluate(["fu"], task_files(folder, 1), tmp_path, num_workers=1)
+    evaluate(["fu"], task_files(BUNDLED_TASKS, 1), tmp_path, num_workers=1)
     with RunStore(tmp_path) as store:
         rows = read_stage_metrics(store)
         assert not any("cpu_s" in text for text in store.record_texts())

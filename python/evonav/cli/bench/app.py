@@ -11,7 +11,7 @@ import typer
 from evonav.cli.bench.memory import memory_app, tell_worse
 from evonav.cli.display import EXIT_INTERRUPTED, progress_bar, show_tables
 from evonav.cli.group import Command, new_app
-from evonav.cli.options.shared import BUNDLED, HOUSES, Against, Limit, did_you_mean, listed, numbers_of
+from evonav.cli.options.shared import HOUSES, Against, Limit, did_you_mean, listed, numbers_of
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.speed_benchmark.records import Row
@@ -118,7 +118,7 @@ def speed(
             raise typer.BadParameter(f"{option} is for `evonav bench speed {of}`")
     options: dict[str, Any] = {}
     if section == "generation":
-        options = {"houses": houses or BUNDLED, "title": Path(houses).name if houses else "bundled, 1-10 rooms"}
+        options = {"houses": houses or "bundled", "title": Path(houses).name if houses else "bundled, 1-10 rooms"}
     elif section == "agents":
         options = {"agents": listed(agent) or None, "has_growth": growth is not False}
     elif section == "gym":

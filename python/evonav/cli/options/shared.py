@@ -1,6 +1,5 @@
 """Declare the options that several commands share, each once."""
 
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +8,7 @@ import typer
 from evonav.cli.options import completion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from evonav.house.files import HouseTexts
     from evonav.tasks.listing import TaskFile
@@ -215,24 +214,10 @@ def numbers_of(option: str, texts: "Sequence[str] | None") -> list[int]:
         raise typer.BadParameter(f"{option} {','.join(texts or ())}: expected numbers separated by commas") from None
 
 
-@contextmanager
-def task_folder(folder: Path | None) -> "Iterator[Path]":
-    """Lend the folder of tasks that a command names; the bundled tasks by default and for the word `bundled`."""
-    from evonav.tasks.bundled import bundled_tasks
-
-    if folder is not None and (str(folder) != BUNDLED or folder.exists()):
-        yield folder
-        return
-    with bundled_tasks() as bundled:
-        yield bundled
-
-
-@contextmanager
-def chosen_tasks(tasks: Path | None, limit: int | None, subset: str | None) -> "Iterator[list[TaskFile]]":
-    """Lend the tasks that `--tasks`, `--limit` and `--subset` choose."""
-    from evonav.tasks.listing import task_files
+def chosen_tasks(tasks: Path | None, limit: int | None, subset: str | None) -> "list[TaskFile]":
+    """Return the tasks that `--tasks`, `--limit` and `--subset` choose."""
+    from evonav.tasks.listing import task_files, task_folder
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
-    with task_folder(tasks) as folder:
-        yield task_files(folder, limit, subset)
+    return task_files(task_folder(tasks), limit, subset)

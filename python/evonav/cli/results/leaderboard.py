@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.display import progress_bar
 from evonav.cli.options import completion
-from evonav.cli.options.shared import BUNDLED, Limit, Subset, Workers, chosen_tasks, num_workers_of
+from evonav.cli.options.shared import Limit, Subset, Workers, chosen_tasks, num_workers_of
 from evonav.cli.results.submission import SCORES_ONLY_HELP
 from evonav.counted import counted
 
@@ -43,12 +43,13 @@ def leaderboard(
     """
     from evonav.submission.leaderboard import RankedTasks, packed_files, rank
     from evonav.submission.leaderboard_page import write_leaderboard
+    from evonav.tasks.listing import BUNDLED_TASKS
 
     files = packed_files(packs)
     task_sets = []
-    for folder in tasks or [Path(BUNDLED)]:
-        with chosen_tasks(folder, limit, subset) as found:
-            task_sets.append(RankedTasks(_name(folder, found, limit, subset), tuple(found)))
+    for folder in tasks or [BUNDLED_TASKS]:
+        found = chosen_tasks(folder, limit, subset)
+        task_sets.append(RankedTasks(_name(found, limit, subset), tuple(found)))
     with progress_bar("verifying") as on_progress:
         board = rank(
             files, task_sets, scores_only=scores_only, num_workers=num_workers_of(workers), on_progress=on_progress
@@ -61,13 +62,14 @@ def leaderboard(
     typer.echo(f"leaderboard: {page} ({agents} in {tables}; {len(board.unranked)} not ranked)")
 
 
-def _name(folder: Path, tasks: "list[TaskFile]", limit: int | None, subset: str | None) -> str:
+def _name(tasks: "list[TaskFile]", limit: int | None, subset: str | None) -> str:
     """Name a set of tasks: by its `dataset.json`, else by its folder, with the part that is taken."""
     from evonav.errors import TaskError
     from evonav.tasks.dataset import read_dataset
 
+    folder = tasks[0].path.parent
     try:
-        name = read_dataset(tasks[0].path.parent).name
+        name = read_dataset(folder).name
     except TaskError:
         name = folder.resolve().name
     return name if limit is None and subset is None else f"{name} ({subset or f'first {len(tasks)}'})"

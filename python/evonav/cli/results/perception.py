@@ -81,7 +81,8 @@ def perception(
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     simulation = SimulatorSettings(allow_unknown_assets=allow_unknown_assets)
-    with interruptible(out), chosen_tasks(tasks, limit, subset) as task_files:
+    task_files = chosen_tasks(tasks, limit, subset)
+    with interruptible(out):
         with progress_bar("tours") as on_progress:
             measured = measure(
                 specs,

@@ -81,7 +81,8 @@ def verify(
 
     from evonav.submission.verify import verdict_json, verify
 
-    with chosen_tasks(tasks, None, subset) as task_files, progress_bar("replaying actions") as on_progress:
+    task_files = chosen_tasks(tasks, None, subset)
+    with progress_bar("replaying actions") as on_progress:
         verdict = verify(
             file,
             task_files,

@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from evonav.cli.options.settings import settings_from
-from evonav.cli.options.shared import Agents, Limit, Seed, Workers, names_of
+from evonav.cli.options.shared import Agents, Limit, Seed, Workers, chosen_tasks, names_of
 from evonav.cli.results.view import make_pages
-from evonav.cli.run.evaluate import early_worker, exit_if_incomplete, print_results, run_tasks, running
+from evonav.cli.run.evaluate import early_worker, exit_if_incomplete, print_results, running
 
 
 def demo(
@@ -30,7 +30,8 @@ def demo(
     context.with_resource(early_worker())
     run = settings_from({"workers": workers})
     config = run.config(seed, Backend(), run.decision)
-    with run_tasks(out, limit=limit) as task_files, running(out, config) as show:
+    task_files = chosen_tasks(None, limit, None)
+    with running(out, config) as show:
         summaries = evaluate(
             names_of(agent), task_files, out, config=config, num_workers=run.num_workers, on_progress=show
         )

@@ -139,20 +139,21 @@ def evaluate(
     if pdb:
         config = replace(config, hosting=AgentHosting("debugger"))
     names = names_of(agent)
-    allows_any = run.simulator.allow_unknown_assets
-    texts = None if houses is None else read_houses(houses, assets, start)
-    with run_tasks(out, texts, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
-        if dry_run:
-            print_estimate(run, names, task_files, config, run.num_workers)
-            return
-        with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
-            (summaries,) = evaluate_all(
-                [Evaluation(tuple(names), tuple(task_files), out, config)],
-                workforce,
-                num_retries=run.num_retries,
-                retry_errored=retry_errored or fail_fast or pdb,
-                on_progress=lambda _, state: show(stopped_early(state, pdb) if fail_fast or pdb else state),
-            )
+    if houses is None:
+        task_files = chosen_tasks(tasks, limit, subset)
+    else:
+        task_files = _generated(out, read_houses(houses, assets, start), limit, subset, seed, run)
+    if dry_run:
+        print_estimate(run, names, task_files, config, run.num_workers)
+        return
+    with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
+        (summaries,) = evaluate_all(
+            [Evaluation(tuple(names), tuple(task_files), out, config)],
+            workforce,
+            num_retries=run.num_retries,
+            retry_errored=retry_errored or fail_fast or pdb,
+            on_progress=lambda _, state: show(stopped_early(state, pdb) if fail_fast or pdb else state),
+        )
     print_results(out, summaries)
     if profile:
         print_profile(out)
@@ -167,29 +168,18 @@ def early_worker() -> "AbstractContextManager[None]":
     return started_early(PROGRAM)
 
 
-@contextmanager
-def run_tasks(
-    out: Path,
-    houses: "HouseTexts | None" = None,
-    tasks: Path | None = None,
-    limit: int | None = None,
-    subset: str | None = None,
-    seed: int = 0,
-    allow_unknown_assets: bool = False,
-    num_workers: int = 0,
-) -> "Iterator[list[TaskFile]]":
-    """Yield the tasks of a run: of a folder, generated from houses into the run's folder, or bundled."""
-    if houses is None:
-        with chosen_tasks(tasks, limit, subset) as found:
-            yield found
-        return
+def _generated(
+    out: Path, houses: "HouseTexts", limit: int | None, subset: str | None, seed: int, run: "CommandSettings"
+) -> "list[TaskFile]":
+    """Generate the tasks of a run from houses into the run's folder."""
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.parallel.worker import Workforce
     from evonav.tasks.listing import task_file
 
     dataset, split = inherited_names(houses)
-    options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
+    allows_any = run.simulator.allow_unknown_assets
+    options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allows_any)
     with interruptible(out / "tasks"), generation_progress() as show:
         generated = generate_dataset(
             houses,
@@ -197,10 +187,10 @@ def run_tasks(
             options=options,
             limit=limit,
             subset=subset,
-            workforce=Workforce(num_workers),
+            workforce=Workforce(run.num_workers),
             on_progress=show,
         )
-    yield [task_file(root) for root in generated.roots]
+    return [task_file(root) for root in generated.roots]
 
 
 @contextmanager

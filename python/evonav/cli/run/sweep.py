@@ -66,13 +66,13 @@ def sweep(
     folder = out or Path(settings.out or f"out/{file.stem}")
     cells = cells_of(settings)
     selected = chosen(cells, only or ())
-    with task_sets(settings) as tasks:
-        if dry_run:
-            _print_plan(settings, selected, tasks, folder)
-            return
-        runs = cell_runs(settings, cells, tasks, folder)
-        again = typed_command().replace(" --retry-errored", "")
-        _run(settings, folder, runs, selected, retry_errored, again)
+    tasks = task_sets(settings)
+    if dry_run:
+        _print_plan(settings, selected, tasks, folder)
+        return
+    runs = cell_runs(settings, cells, tasks, folder)
+    again = typed_command().replace(" --retry-errored", "")
+    _run(settings, folder, runs, selected, retry_errored, again)
     is_incomplete = _print_summary(folder, {cell.name for cell in selected}, again)
     if is_incomplete:
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.group import Command, add_commands, new_app
 from evonav.cli.options import completion
-from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of, task_folder
+from evonav.cli.options.shared import Limit, Stages, TaskFolder, numbers_of
 from evonav.cli.tasks.generate import generate
 from evonav.cli.tasks.stats import stats
 from evonav.cli.tasks.validate import validate
@@ -28,9 +28,9 @@ tasks_app = new_app(help="Generate, check, draw and describe tasks.")
 def list_tasks(folder: TaskFolder = None, limit: Limit = None) -> None:
     """List tasks, their rooms and stages, and when houses change."""
     from evonav.tasks import load_tasks
+    from evonav.tasks.listing import task_folder
 
-    with task_folder(folder) as found:
-        tasks = list(load_tasks(found, limit))
+    tasks = list(load_tasks(task_folder(folder), limit))
     width = max(len(task.task_id) for task in tasks)
     typer.echo(f"{'task':{width}}  rooms  stages  the house changes before stages")
     for task in tasks:
@@ -89,23 +89,23 @@ def show(
     from evonav.drawing.files import SUFFIXES
     from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
+    from evonav.tasks.listing import task_folder
 
     stages = numbers_of("--stage", stage)
-    with task_folder(folder) as found:
-        name = found.resolve().name
-        one = _one_task(found, task, stages)
-        tasks = list(load_tasks(found, limit)) if one is None else []
+    found = task_folder(folder)
+    one = _one_task(found, task, stages)
     if one is None:
         if stages or (out is not None and out.suffix in (*SUFFIXES, ".html")):
             raise typer.BadParameter("--stage and single files are for one task: name it with --task")
-        path = write_gallery(tasks, out or PICTURES / name, name, on_task=typer.echo)
+        name = found.resolve().name
+        path = write_gallery(list(load_tasks(found, limit)), out or PICTURES / name, name, on_task=typer.echo)
     elif out is not None and out.suffix in SUFFIXES:
         if len(stages) != 1:
             raise typer.BadParameter("a picture shows one stage: name it with --stage")
         path = write_stage_picture(one, stages[0], out)
     else:
-        folder = out or PICTURES
-        target = folder if folder.suffix == ".html" else folder / f"{one.task_id}.html"
+        target = out or PICTURES
+        target = target if target.suffix == ".html" else target / f"{one.task_id}.html"
         path = write_task_page(one, target, stages=stages or None)
     typer.echo(f"pictures: {path}")
 
@@ -152,10 +152,10 @@ def subset(
     A subset is the same for everyone with the same houses.
     """
     from evonav.errors import TaskError
+    from evonav.tasks.listing import task_folder
     from evonav.tasks.subsets import subset_roots
 
-    with task_folder(folder) as found:
-        ids = [root.name for root in subset_roots(found, name)]
+    ids = [root.name for root in subset_roots(task_folder(folder), name)]
     if out is None:
         typer.echo("\n".join(ids))
         return

@@ -10,7 +10,6 @@ from evonav.cli.display import house_progress, interruptible, show_tables, statu
 from evonav.cli.group import HELP_NAMES, Command, Group, new_app
 from evonav.cli.options.settings import POOL_KEYS, PoolSet, settings_from
 from evonav.cli.options.shared import (
-    BUNDLED,
     HOUSES,
     AnyAsset,
     AssetFile,
@@ -53,7 +52,7 @@ def list_houses(
     from evonav.generation.house_view import area_of_m2
     from evonav.house import House
 
-    texts = read_houses(path or BUNDLED, None, "file")
+    texts = read_houses(path or "bundled", None, "file")
     texts.check_end(limit)
     typer.echo("rooms   area m2  objects  house")
     for house in (House(text, name=name) for name, text in islice(texts, limit)):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.shared import BUNDLED, PLOTS, Workers, num_workers_of, task_folder
+from evonav.cli.options.shared import PLOTS, Workers, num_workers_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -38,19 +38,18 @@ def stats(
     workers: Workers = None,
 ) -> None:
     """Print and plot statistics of tasks beside the paper's."""
-    from contextlib import ExitStack
-
     from evonav.cli.display import status
     from evonav.generation.statistics.compute import statistics_of_folders
     from evonav.report.plots.render import check_plot
     from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
+    from evonav.tasks.listing import BUNDLED_TASKS, task_folder
 
     plot = out if out is not None and out.suffix.lstrip(".") in PLOTS else None
     if plot is not None:
         check_plot(plot)
-    with ExitStack() as stack, status("Reading tasks") as tell:
+    with status("Reading tasks") as tell:
         found = statistics_of_folders(
-            [stack.enter_context(task_folder(folder)) for folder in folders or [Path(BUNDLED)]],
+            [task_folder(folder) for folder in folders or [BUNDLED_TASKS]],
             mix=reweight,
             num_workers=num_workers_of(workers),
             on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import progress_bar
-from evonav.cli.options.shared import AnyAsset, AsJson, Limit, TaskFolder, Workers, num_workers_of, task_folder
+from evonav.cli.options.shared import AnyAsset, AsJson, Limit, TaskFolder, Workers, num_workers_of
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -31,10 +31,11 @@ def validate(
     Files, records, physics, reference views and paths are checked. The exit code is 1 if a task is invalid.
     """
     from evonav.generation.validation import validate_folder
+    from evonav.tasks.listing import task_folder
 
-    with task_folder(folder) as found, progress_bar("tasks") as on_progress:
+    with progress_bar("tasks") as on_progress:
         report = validate_folder(
-            found,
+            task_folder(folder),
             limit=limit,
             num_workers=num_workers_of(workers),
             allow_unknown_assets=allow_unknown_assets,

@@ -27,7 +27,7 @@ from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend
-from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import BUNDLED_TASKS
 
 LARGE_MEMORY_MB = 2000.0
 ADVICE = "function without arguments that returns the agent, and name that"
@@ -115,8 +115,8 @@ class _Examination:
         if self._name in ORACLE_BASELINE_NAMES:
             yield Check("importable", "fail", "an oracle baseline: it knows the target, and is no agent")
             return
-        with bundled_tasks() as directory, closing(AgentProcesses(self._hosting)) as processes:
-            yield from self._examine(directory, processes)
+        with closing(AgentProcesses(self._hosting)) as processes:
+            yield from self._examine(BUNDLED_TASKS, processes)
 
     def _examine(self, tasks: Path, processes: AgentProcesses) -> Iterator[Check]:
         spec, other = _changing_tasks(self._backend, tasks)
