@@ -1,5 +1,6 @@
 """A developer's way: write an agent, check it, stop at its first error, look around in the debugger."""
 
+import pdb
 import re
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.evaluation.contract.check import check_agent
-from evonav.evaluation.hosting import debugger
+from evonav.evaluation.hosting import agent
 
 RAISING = """
 import evonav
@@ -64,8 +65,8 @@ def test_the_debugger_opens_where_an_agent_raises(tmp_path, monkeypatch):
     words = ("evaluate", "--agent", "./raising_too.py:Raising", "--limit", 1, "--pdb", "--out", "out")
     assert "--pdb needs a terminal" in str(run(*words).exception)
     opened = []
-    monkeypatch.setattr(debugger, "check_terminal", lambda: None)
-    monkeypatch.setattr(debugger.pdb, "post_mortem", opened.append)
+    monkeypatch.setattr(agent, "check_terminal", lambda: None)
+    monkeypatch.setattr(pdb, "post_mortem", opened.append)
     assert run(*words).exit_code == 3
     (traceback,) = opened
     while traceback.tb_next is not None:

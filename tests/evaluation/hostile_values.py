@@ -11,7 +11,6 @@ from toy_agents import Explorer
 from evonav.agents.agent import EntryBelief, Move, NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explanation import Explanation
 from evonav.agents.hosting import wire
-from evonav.agents.hosting.entries import Entries
 from evonav.errors import DecisionError
 from evonav.world.simulator import Action
 
@@ -35,13 +34,13 @@ ENTRIES = {
     "nan": ([entry(centre_m=(0.0, math.nan, 0.0))], "entries.0.centre_m.1 = nan: Input should be a finite number"),
     "infinite": ([entry(size_m=(math.inf, 1.0, 1.0))], "entries.0.size_m.0 = inf: Input should be a finite number"),
     "nan of NumPy": ([entry(centre_m=np.array([0.0, np.nan, 0.0]))], "entries.0.centre_m.1 = nan"),
-    "far": ([entry(centre_m=(1e308, 0.0, -1e308))], "centre_m must be within 1e+06 m"),
-    "large": ([entry(size_m=(1e308, 1e308, 1e308))], "size_m must be 0 to 1e+06 m"),
-    "inside out": ([entry(size_m=(-1.0, 1.0, 1.0))], "size_m must be 0 to 1e+06 m"),
+    "far": ([entry(centre_m=(1e308, 0.0, -1e308))], "centre_m = 1e+308: must be -1000000"),
+    "large": ([entry(size_m=(1e308, 1e308, 1e308))], "size_m = 1e+308: must be 0 to 1000000"),
+    "inside out": ([entry(size_m=(-1.0, 1.0, 1.0))], "size_m = -1.0: must be 0 to 1000000"),
     "many digits": ([entry(centre_m=(10**400, 0, 0))], "entries.0.centre_m.0 = 1000"),
     "long id": ([entry(entry_id=2**63)], "entry_id must have at most 64 bits"),
-    "count": ([entry(num_detections=10**30)], "num_detections must be 0 to 1000000000000000"),
-    "negative": ([entry(num_detections=-1)], "num_detections must be 0 to 1000000000000000"),
+    "count": ([entry(num_detections=10**30)], ": must be 0 to 1000000000000000"),
+    "negative": ([entry(num_detections=-1)], ": must be 0 to 1000000000000000"),
     "novel": ([entry(label="x" * 1_000_000)], "label must have at most 1000 characters"),
     "true": ([entry(entry_id=True)], "entries.0.entry_id = True: Input should be a valid integer"),
     "too many": ([entry(entry_id=i) for i in range(200_000)], "bytes of JSON: must be at most 16000000"),
@@ -69,11 +68,11 @@ SENSORS = {
     "tiny": (SensorConfig(max_travel_m=1e-320), None),
 }
 ACTIONS = {
-    "nan": (NavigateTo((math.nan, 0.0)), "coordinates must be finite"),
-    "infinite face": (NavigateTo((1.0, 1.0), (math.inf, 0.0)), "coordinates must be finite"),
-    "far": (NavigateTo((1e308, -1e308)), "coordinates must be within 1e+06 m"),
-    "far face": (NavigateTo((1.0, 1.0), (1e308, 1e308)), "coordinates must be within 1e+06 m"),
-    "many digits": (NavigateTo((10**400, 0)), "coordinates must be finite"),
+    "nan": (NavigateTo((math.nan, 0.0)), "coordinates = "),
+    "infinite face": (NavigateTo((1.0, 1.0), (math.inf, 0.0)), "coordinates = "),
+    "far": (NavigateTo((1e308, -1e308)), "coordinates = 1e+308: must be -1000000 to 1000000"),
+    "far face": (NavigateTo((1.0, 1.0), (1e308, 1e308)), "coordinates = 1e+308: must be -1000000 to 1000000"),
+    "many digits": (NavigateTo((10**400, 0)), "coordinates = "),
     "three": (NavigateTo((1.0, 2.0, 3.0)), "action.navigate_to.position_m"),
     "novel": (Stop("x" * 5_000_000), "action: 5000027 bytes of JSON: must be at most 1000000"),
     "long": (Stop("x" * 500_000), None),
@@ -86,12 +85,18 @@ ACTIONS = {
 DIAGNOSTICS = {
     "nan": (Explanation(counters={"a": math.nan}), "diagnostics.counters.a = nan"),
     "half": (Explanation(counters={"a": 1.5}), "diagnostics.counters.a = 1.5"),
-    "large": (Explanation(counters={"a": 2**63}), "counters.a must be -1000000000000000 to 1000000000000000"),
-    "number": (Explanation(num_entries=10**50), "num_entries must be 0 to 1000000000000000"),
-    "negative": (Explanation(num_frontiers=-1), "num_frontiers must be 0 to 1000000000000000"),
+    "large": (
+        Explanation(counters={"a": 2**63}),
+        "counters.a = 9223372036854775808: must be -1000",
+    ),
+    "number": (Explanation(num_entries=10**50), ": must be 0 to 1000000000000000"),
+    "negative": (Explanation(num_frontiers=-1), "num_frontiers = -1: must be 0 to 1000000000000000"),
     "many": (Explanation(counters={str(i): i for i in range(2000)}), "counters must be at most 1000"),
     "entry": (Explanation(chosen_entry=entry(centre_m=(math.nan, 0.0, 0.0))), "chosen_entry.centre_m.0 = nan"),
-    "far": (Explanation(chosen_entry=entry(centre_m=(1e308, 0.0, 0.0))), "centre_m must be within 1e+06 m"),
+    "far": (
+        Explanation(chosen_entry=entry(centre_m=(1e308, 0.0, 0.0))),
+        "centre_m = 1e+308: must be -1000000 to 1000000",
+    ),
     "digits": (Explanation(details={"a": 10**5000}), "Invalid JSON"),
     "bytes": (Explanation(details={"a": b"\xff"}), "diagnostics: not JSON-ready"),
     "cycle": (Explanation(details={"a": CYCLE}), "diagnostics: not JSON-ready: Circular reference"),
@@ -234,7 +239,7 @@ class Forging(Explorer):
         super().begin_stage(goal)
         for part in (wire.ENTRIES, wire.DIAGNOSTICS, wire.COSTS, wire.SENSORS):
             part.__dict__.pop("write", None)
-        Entries.write = lambda self, entries: wire.ENTRIES.write(entries)
+        wire.Entries.write = lambda self, entries: wire.ENTRIES.write(entries)
         if goal.stage <= len(RAW):
             name, text, _ = RAW[goal.stage - 1]
             getattr(wire, name).__dict__["write"] = lambda value: text

@@ -17,12 +17,11 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Literal, Protocol
+from typing import Any, BinaryIO, Literal, TypeAlias
 
 from evonav.agents.agent import Agent
 from evonav.agents.explanation import explains, explanation_of
 from evonav.agents.hosting import sandbox, wire
-from evonav.agents.hosting.entries import Entries
 from evonav.agents.hosting.error_text import describe, message_of, traceback_of
 from evonav.agents.hosting.requests import read_request
 from evonav.agents.hosting.shared_slots import SharedSlots
@@ -49,21 +48,18 @@ def refuse_in_agent_process(call: str) -> None:
         raise InvalidArgumentError(f'importing it calls `{call}`: put that call under `if __name__ == "__main__":`')
 
 
-class Server(Protocol):
-    """The part of a process that answers the requests."""
-
-    def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
-        """Execute a request, and return named parts, each a line of JSON."""
+Answering: TypeAlias = Callable[[str, tuple[Any, ...]], dict[str, bytes]]
+"""Executes a request, with an operation and its arguments, and returns named parts, each a line of JSON."""
 
 
-def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], Server] | None = None) -> None:
+def main(socket_fd: int, life_fd: int, block_fd: int, answering: Answering | None = None) -> None:
     """Serve requests on the inherited descriptors.
 
     Args:
         socket_fd: Socket that brings requests and takes answers.
         life_fd: Pipe that is closed when the evaluator ends, however it ends.
         block_fd: The shared memory.
-        new_server: Makes what answers the requests; default: what makes and calls agents.
+        answering: Answers the requests; default: an `AgentServer`.
     """
     global _is_serving
     _is_serving = True
@@ -79,7 +75,7 @@ def main(socket_fd: int, life_fd: int, block_fd: int, new_server: Callable[[], S
     requests = open(socket_fd, "rb", closefd=False)  # noqa: SIM115 - closed below
     closed = suppress(BrokenPipeError, ConnectionResetError)
     with connection, requests, closed, profiling.sampled("agents"):
-        _serve(requests, connection, memory, (new_server or _Server)())
+        _serve(requests, connection, memory, answering or AgentServer().answer)
 
 
 def _end_with_parent(life_fd: int) -> None:
@@ -104,12 +100,12 @@ def _end_group() -> None:
     os._exit(1)
 
 
-def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, server: Server) -> None:
+def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, answering: Answering) -> None:
     pid, one_core = os.getpid(), OneCore()
     while (request := _received(requests)) is not None:
         is_bound = one_core.release()
         number, operation, arguments = read_request(request, memory.arrays)
-        parts = server.answer(operation, arguments)
+        parts = answering(operation, arguments)
         del arguments
         if os.getpid() != pid:
             os._exit(1)  # an agent forked and the child returned: only the parent answers
@@ -132,15 +128,15 @@ def _received(requests: BinaryIO) -> bytes | None:
     return request if len(request) == size else None
 
 
-class _Server:
-    """Makes an agent and calls it; an answer is a set of named parts, each already JSON."""
+class AgentServer:
+    """Makes an agent and calls it; the answer to a request is a set of named parts, each a line of JSON."""
 
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
         self._explains = False
         self._is_first = True
-        self._entries = Entries()
+        self._entries = wire.Entries()
         self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
@@ -152,6 +148,11 @@ class _Server:
         """The agent that was made."""
         assert self._agent is not None, "`make` comes first"
         return self._agent
+
+    def host(self, agent: Agent) -> dict[str, bytes]:
+        """Call this agent from now on, and return its sensors."""
+        self._agent, self._explains = agent, explains(agent)
+        return self._sensors()
 
     def do_load(self, name: str, memory_mb: int | None) -> dict[str, bytes]:
         """Import the factory of agents."""
@@ -166,9 +167,7 @@ class _Server:
         assert self._factory is not None, "`load` comes first"
         self._agent = None
         self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
-        self._agent = new_agent(self._factory, self._decision)
-        self._explains = explains(self._agent)
-        return self._sensors()
+        return self.host(new_agent(self._factory, self._decision))
 
     def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
         """Begin a task."""

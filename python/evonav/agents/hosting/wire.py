@@ -7,7 +7,7 @@ depend on where it ran.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Annotated, Any, Generic, Literal, TypeVar
@@ -69,23 +69,20 @@ MAX_COUNT = 10**15
 T = TypeVar("T")
 
 
+@dataclass(frozen=True)
 class Part(Generic[T]):
     """A kind of value that an answer can have, and its JSON."""
 
-    def __init__(self, name: str, kind: Any, max_bytes: int) -> None:  # noqa: ANN401 - a type hint
-        """Name the part.
-
-        Args:
-            max_bytes: Limit of the JSON that is written or read.
-        """
-        self._name = name
-        self._kind = kind
-        self._max_bytes = max_bytes
+    name: str
+    kind: Any
+    """A type hint."""
+    max_bytes: int
+    """Limit of the JSON that is written or read."""
 
     @cached_property
     def _adapter(self) -> TypeAdapter[T]:
         """Reads the value; an agent's process only writes, and never makes it."""
-        return TypeAdapter(self._kind)
+        return TypeAdapter(self.kind)
 
     def write(self, value: object) -> bytes:
         """Return a value as JSON in one line; numbers and arrays of NumPy are written as Python's.
@@ -96,7 +93,7 @@ class Part(Generic[T]):
         try:
             text = _json_of(value)
         except (TypeError, ValueError, RecursionError) as error:
-            raise InvalidArgumentError(f"{self._name}: not JSON-ready: {error}") from error
+            raise InvalidArgumentError(f"{self.name}: not JSON-ready: {error}") from error
         return self.checked(text)
 
     def read(self, text: bytes) -> T:
@@ -108,7 +105,7 @@ class Part(Generic[T]):
         try:
             return self._adapter.validate_json(self.checked(text), strict=True)
         except ValidationError as error:
-            raise InvalidArgumentError(sentence_of(error, self._name)) from None
+            raise InvalidArgumentError(sentence_of(error, self.name)) from None
 
     def checked(self, text: bytes) -> bytes:
         """Return a JSON text that is not too large.
@@ -116,8 +113,8 @@ class Part(Generic[T]):
         Raises:
             InvalidArgumentError: It is.
         """
-        if len(text) > self._max_bytes:
-            raise InvalidArgumentError(f"{self._name}: {len(text)} bytes of JSON: must be at most {self._max_bytes}")
+        if len(text) > self.max_bytes:
+            raise InvalidArgumentError(f"{self.name}: {len(text)} bytes of JSON: must be at most {self.max_bytes}")
         return text
 
 
@@ -138,28 +135,16 @@ def _plain(value: object) -> object:
 # Actions
 
 
-def _one_stop(move: Move) -> Move | Stop:
-    return Stop() if move.action is Action.STOP else move
-
-
-def _short_reason(stop: Stop) -> Stop:
-    return Stop(stop.reason[:MAX_MESSAGE])
-
-
 def _near(action: NavigateTo) -> NavigateTo:
-    coordinates_m = (*action.position_m, *(action.face_m or ()))
-    if not all(map(math.isfinite, coordinates_m)):
-        raise ValueError("coordinates must be finite")
-    if max(map(abs, coordinates_m)) > MAX_M:
-        raise ValueError(f"coordinates must be within {MAX_M:g} m")
+    _check("coordinates", (*action.position_m, *(action.face_m or ())), -MAX_M, MAX_M)
     return action
 
 
 _KINDS = {"move": Move, "navigate_to": NavigateTo, "stop": Stop}
 _Action = Annotated[
-    Annotated[Move, AfterValidator(_one_stop), Tag("move")]
+    Annotated[Move, AfterValidator(lambda move: Stop() if move.action is Action.STOP else move), Tag("move")]
     | Annotated[NavigateTo, AfterValidator(_near), Tag("navigate_to")]
-    | Annotated[Stop, AfterValidator(_short_reason), Tag("stop")],
+    | Annotated[Stop, AfterValidator(lambda stop: Stop(stop.reason[:MAX_MESSAGE])), Tag("stop")],
     Discriminator(lambda value: value.get("kind") if isinstance(value, dict) else None),
 ]
 _ACTION: Part[AgentAction] = Part("action", _Action, MAX_DIAGNOSTICS_BYTES)
@@ -190,63 +175,55 @@ def read_action(text: bytes) -> AgentAction:
 # Beliefs
 
 
+def _check(name: str, values: Iterable[float], least: float, most: float) -> None:
+    """Check that no value is out of a range, or NaN."""
+    wrong = next((value for value in values if not least <= value <= most), None)
+    if wrong is not None:
+        raise ValueError(f"{name} = {wrong!r}: must be {least:.16g} to {most:.16g}")
+
+
 def _possible_entry(entry: EntryBelief) -> EntryBelief:
-    if max(map(abs, entry.centre_m)) > MAX_M:
-        raise ValueError(f"centre_m must be within {MAX_M:g} m")
-    if not 0.0 <= min(entry.size_m) <= max(entry.size_m) <= MAX_M:
-        raise ValueError(f"size_m must be 0 to {MAX_M:g} m")
+    _check("centre_m", entry.centre_m, -MAX_M, MAX_M)
+    _check("size_m", entry.size_m, 0.0, MAX_M)
     if len(entry.label) > MAX_LABEL:
         raise ValueError(f"label must have at most {MAX_LABEL} characters")
     if not -(2**63) <= entry.entry_id < 2**63:
         raise ValueError("entry_id must have at most 64 bits")
-    _check_count("num_detections", entry.num_detections, 0)
+    _check("num_detections", (entry.num_detections,), 0, MAX_COUNT)
     if entry.p_present is not None:
-        _check_probability("p_present", entry.p_present)
+        _check("p_present", (entry.p_present,), 0, 1)
     return entry
 
 
 def _check_places(places: PlaceBelief) -> None:
     if not 0.0 < places.cell_m <= MAX_M:
         raise ValueError(f"places.cell_m = {places.cell_m!r}: must be above 0 and at most {MAX_M:g} m")
-    if len(places.centres_m) != len(places.probabilities):
-        raise ValueError(
-            f"places.probabilities: {len(places.probabilities)} values, expected one for each of the "
-            f"{len(places.centres_m)} centres_m"
-        )
-    if len(places.centres_m) > MAX_PLACES:
-        raise ValueError(f"places.centres_m: {len(places.centres_m)} squares, must be at most {MAX_PLACES}")
+    num, num_expected = len(places.probabilities), len(places.centres_m)
+    if num != num_expected:
+        raise ValueError(f"places.probabilities: {num} values, expected one for each of the {num_expected} centres_m")
+    if num > MAX_PLACES:
+        raise ValueError(f"places.centres_m: {num} squares, must be at most {MAX_PLACES}")
     for index, (centre_m, probability) in enumerate(zip(places.centres_m, places.probabilities, strict=True)):
-        if max(map(abs, centre_m)) > MAX_M:
-            raise ValueError(f"places.centres_m.{index} = {centre_m!r}: must be within {MAX_M:g} m")
-        _check_probability(f"places.probabilities.{index}", probability)
+        _check(f"places.centres_m.{index}", centre_m, -MAX_M, MAX_M)
+        _check(f"places.probabilities.{index}", (probability,), 0, 1)
     total = math.fsum(places.probabilities)
     if total > 1.0 + SUM_SLACK:
         raise ValueError(f"places.probabilities: their sum is {total!r}, must be at most 1")
 
 
-def _check_probability(name: str, probability: float) -> None:
-    if not 0.0 <= probability <= 1.0:
-        raise ValueError(f"{name} = {probability!r}: must be 0 to 1")
-
-
 def _possible_diagnostics(diagnostics: RoundDiagnostics) -> RoundDiagnostics:
     _check_depth(diagnostics.details, MAX_DEPTH - 1)
     for name in ("num_entries", "num_frontiers"):
-        _check_count(name, getattr(diagnostics, name), 0)
+        _check(name, (getattr(diagnostics, name),), 0, MAX_COUNT)
     if len(diagnostics.counters) > MAX_COUNTERS:
         raise ValueError(f"counters must be at most {MAX_COUNTERS}")
     for name, count in diagnostics.counters.items():
-        _check_count(f"counters.{name[:MAX_VALUE]}", count, -MAX_COUNT)
+        _check(f"counters.{name[:MAX_VALUE]}", (count,), -MAX_COUNT, MAX_COUNT)
     if diagnostics.chosen_entry is not None:
         _possible_entry(diagnostics.chosen_entry)
     if diagnostics.places is not None:
         _check_places(diagnostics.places)
     return replace(diagnostics, choice=diagnostics.choice[:MAX_MESSAGE])
-
-
-def _check_count(name: str, count: int, least: int) -> None:
-    if not least <= count <= MAX_COUNT:
-        raise ValueError(f"{name} must be {least} to {MAX_COUNT}")
 
 
 def _check_depth(value: object, depth: int) -> None:
@@ -288,6 +265,62 @@ ENTRY: Part[EntryBelief] = Part("entries", _Entry, MAX_ENTRIES_BYTES)
 """An entry of an object memory."""
 ENTRIES: Part[list[EntryBelief]] = Part("entries", Annotated[list[_Entry], FailFast()], MAX_ENTRIES_BYTES)
 """An object memory."""
+
+
+# An object memory, again and again
+
+_BETWEEN = b",\t"
+"""The JSON of an entry has no tab."""
+
+
+class Entries:
+    """The object memory of one agent, written and read as `ENTRIES`."""
+
+    def __init__(self) -> None:
+        """Know no entries yet."""
+        self._written: dict[int, tuple[object, bytes]] = {}
+        """The entries that were written last, and their JSON, by the number of the object."""
+        self._read: dict[bytes, EntryBelief] = {}
+        """The entries that were read last, by their JSON."""
+
+    def write(self, entries: Sequence[object]) -> bytes:
+        """Return entries as JSON in one line; what was written before is not written again.
+
+        Raises:
+            InvalidArgumentError: An entry holds what JSON cannot, or they are too large together.
+        """
+        before, self._written = self._written, {}
+        texts = []
+        for entry in entries:
+            pair = before.get(id(entry)) or (entry, ENTRY.write(entry))
+            texts.append(pair[1])
+            if id(entry) in before or _is_constant(entry):
+                self._written[id(entry)] = pair
+        return ENTRIES.checked(b"[%b]" % _BETWEEN.join(texts))
+
+    def read(self, text: bytes) -> list[EntryBelief]:
+        """Return the entries of a JSON text; one that was read before is the same object.
+
+        Raises:
+            InvalidArgumentError: The text is malformed; the message has the first field that is wrong, and its value.
+        """
+        is_list = ENTRIES.checked(text).startswith(b"[") and text.endswith(b"]")
+        texts = text[1:-1].split(_BETWEEN) if is_list else [text]
+        try:
+            entries = [self._read.get(one) or ENTRY.read(one) for one in texts]
+        except InvalidArgumentError:
+            return ENTRIES.read(text)  # which says where in the list it is wrong
+        self._read = dict(zip(texts, entries, strict=True))
+        return entries
+
+
+def _is_constant(entry: object) -> bool:
+    """Return whether an entry cannot change, nor anything in it: then it has a hash."""
+    try:
+        hash(entry)
+    except TypeError:
+        return False
+    return type(entry) is EntryBelief
 
 
 # Costs and failures

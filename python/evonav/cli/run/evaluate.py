@@ -123,7 +123,7 @@ def evaluate(
     if profile:
         run = profiled(run)
     if pdb:
-        from evonav.evaluation.hosting.debugger import check_terminal
+        from evonav.evaluation.hosting.agent import check_terminal
         from evonav.evaluation.hosting.isolation import AgentHosting
 
         check_terminal()

@@ -205,7 +205,11 @@ class Stage:
                 )
             self._show(observation)
             del observation  # an agent in a process of its own has a copy, and may think for long
-            action = self._answer()
+            with AttributedErrors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+                action = self._agent.act()
+                if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
+                    message = "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
+                    raise InvalidArgumentError(message)
             with AttributedErrors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = carry_out(action)
             is_stop = isinstance(action, Stop) and not is_guided
@@ -276,15 +280,6 @@ class Stage:
                     Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
                 )
             self._agent.look(observation, wants_entries=self._wants_entries)
-
-    def _answer(self) -> AgentAction:
-        """Return the agent's action for what it was shown."""
-        with AttributedErrors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
-            action = self._agent.act()
-            if isinstance(action, NavigateTo) and self._sensor_config.motion == "actions":
-                message = "NavigateTo: an agent whose `sensors.motion` is `actions` answers Move or Stop"
-                raise InvalidArgumentError(message)
-            return action
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
         self._trace.append(self._round_record(number, pose, action, done))

@@ -26,14 +26,14 @@ from weakref import WeakValueDictionary
 
 from pydantic import TypeAdapter
 
-from evonav.agents.agent import Agent, SensorConfig
+from evonav.agents.agent import Agent
 from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
+from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent, post_mortem
 from evonav.evaluation.hosting.isolation import NO_SETUP, AgentHosting, ProcessSetup
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
@@ -197,24 +197,22 @@ class WorkerContext:
                 simulator.close()
 
     def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
-        """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
-        if self._processes is not None and job.agent not in ORACLE_BASELINE_NAMES:
-            return RemoteAgent(self._processes, job.agent, self.setup.backend.decision, job.seed, job.task_id)
+        """Make a fresh agent."""
+        decision, is_baseline = self.setup.backend.decision, job.agent in ORACLE_BASELINE_NAMES
+        if self._processes is not None and not is_baseline:
+            return RemoteAgent(self._processes, job.agent, decision, job.seed, job.task_id)
+
+        def make() -> Agent:
+            return make_agent(job.agent, decision.create(job.seed))
+
         try:
-            if self.setup.hosting.isolation == "debugger" and job.agent not in ORACLE_BASELINE_NAMES:
-                return self._debugged_agent(job)
-            return make_agent(job.agent, self.setup.backend.decision.create(job.seed))
+            if is_baseline or self.setup.hosting.isolation != "debugger":
+                return make()
+            return LocalAgent(post_mortem()(make)(), post_mortem())
         except (KeyboardInterrupt, EndedError):
             raise
         except BaseException as error:
-            return _FailedAgent(error)
-
-    def _debugged_agent(self, job: EpisodeJob) -> HostedAgent:
-        """Make a fresh agent whose exceptions open the debugger."""
-        from evonav.evaluation.hosting.debugger import DebuggedAgent, post_mortem
-
-        with post_mortem():
-            return DebuggedAgent(make_agent(job.agent, self.setup.backend.decision.create(job.seed)))
+            return LocalAgent(error)
 
     def close(self) -> None:
         """Close the simulators and end the agents' processes; safe to call twice."""
@@ -223,18 +221,6 @@ class WorkerContext:
         self._idle.clear()
         if self._processes is not None:
             self._processes.close()
-
-
-class _FailedAgent(LocalAgent):
-    """An agent that could not be made: every stage of it is errored with the same error."""
-
-    def __init__(self, error: BaseException) -> None:
-        self._error = error
-
-    @property
-    def sensors(self) -> SensorConfig:
-        """The first thing that a stage reads of an agent."""
-        raise self._error
 
 
 class _Heartbeat:

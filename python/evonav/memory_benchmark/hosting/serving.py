@@ -20,7 +20,7 @@ from evonav.memory_benchmark.protocol import Memory
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
     """Serve requests on the inherited descriptors; see `evonav.agents.hosting.serving.main`."""
-    serving.main(socket_fd, life_fd, block_fd, _MemoryServer)
+    serving.main(socket_fd, life_fd, block_fd, _MemoryServer().answer)
 
 
 class _MemoryServer:
