@@ -124,7 +124,9 @@ class Explanation:
     def diagnostics(self, *, is_first: bool) -> RoundDiagnostics:
         """Return what records state of the round, which may be the first of a stage."""
         objects = None if callable(self.objects) else self.objects
-        frontiers = () if self.map is None or callable(self.map) else self.map.frontiers
+        num_frontiers = self.num_frontiers
+        if num_frontiers is None:
+            num_frontiers = 0 if self.map is None or callable(self.map) else len(self.map.frontiers)
         chosen = self.chosen_entry
         if chosen is None and objects is not None and self.chosen_id is not None:
             found = objects.entry(self.chosen_id)
@@ -134,7 +136,7 @@ class Explanation:
             choice=self.choice or ("" if self.chosen_id is None else f"object {self.chosen_id}"),
             chosen_entry=chosen,
             num_entries=num_entries if self.num_entries is None else self.num_entries,
-            num_frontiers=len(frontiers) if self.num_frontiers is None else self.num_frontiers,
+            num_frontiers=num_frontiers,
             counters=dict(self.counters),
             details={"reason": self.reason, **self.details} if self.reason else dict(self.details),
             places=self.place_belief() if is_first else None,
