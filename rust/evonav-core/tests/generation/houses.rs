@@ -27,7 +27,7 @@ const FILES: [(&str, usize); 4] = [
 const NUM_BUNDLED: usize = 60;
 
 fn task_of(house: &House, mode: Mode) -> Option<GeneratedTask> {
-    // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test generation houses`.
+    // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test main generation::houses`.
     let seed = std::env::var("EVONAV_SEED").map_or(3, |seed| seed.parse().unwrap());
     let (catalogue, parameters) = (Catalogue::bundled(), always(mode, 3));
     let nothing = Overrides::default();
