@@ -18,7 +18,7 @@ from evonav.generation import generate_task
 from evonav.generation.dataset import generate_dataset, inherited_names
 from evonav.generation.worker import GenerationOptions
 from evonav.house import House, evonav10k, stream_houses
-from evonav.house.evonav10k import SPLITS, HousesDifferError, MadeSplit, made_split, split_path
+from evonav.house.evonav10k import SPLITS, MadeSplit, made_split, split_path
 from evonav.house.files import HouseTexts
 from evonav.house.generated import house_maker
 from evonav.house.making import MakingProgress
@@ -133,7 +133,7 @@ def test_a_changed_file_is_refused(small: Path) -> None:
     lines = gzip.decompress(path.read_bytes()).decode().splitlines(keepends=True)
     for damaged in (gzip.compress("".join(lines[:2]).encode()), path.read_bytes()[:-50], b"no gzip"):
         path.write_bytes(damaged)
-        with pytest.raises(HousesDifferError, match=r"test.jsonl.gz.*[Rr]emove (it|the file)?"):
+        with pytest.raises(HouseError, match=r"test.jsonl.gz.*[Rr]emove (it|the file)?"):
             stream_houses("evonav-10k:test")
     path.write_bytes(gzip.compress("".join(lines).encode(), 1))  # packed in another way: the same houses
     assert len(list(stream_houses("evonav-10k:test"))) == 3
@@ -141,7 +141,7 @@ def test_a_changed_file_is_refused(small: Path) -> None:
 
 def test_another_generator_is_noticed(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evonav10k, "SPLITS", {"test": MadeSplit(1, 2, "0" * 64)})
-    with pytest.raises(HousesDifferError, match=r"this machine makes other houses.*endless:1"):
+    with pytest.raises(HouseError, match=r"this machine makes other houses.*endless:1"):
         HouseTexts("evonav-10k:test")
 
 

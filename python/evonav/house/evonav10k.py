@@ -26,10 +26,6 @@ NAME = "evonav-10k"
 _READ_BYTES = 1 << 20
 
 
-class HousesDifferError(HouseError):
-    """A file holds other houses than those of its name."""
-
-
 class MadeSplit(NamedTuple):
     """A split: what decides its houses, and their checksum."""
 
@@ -89,7 +85,7 @@ def made_split(
         on_progress: Called at the beginning and after every house that is made.
 
     Raises:
-        HousesDifferError: The file does not hold the houses of its name.
+        HouseError: The file does not hold the houses of its name.
         StoreError: It cannot be written, or another process is making it.
     """
     path, made = split_path(split, cache), SPLITS[split]
@@ -106,7 +102,7 @@ def made_split(
                 )
     digest = _sha256_of_text(path)
     if digest != made.sha256:
-        raise HousesDifferError(
+        raise HouseError(
             f"{path}: its houses have the sha256 {digest}, expected {made.sha256} for {NAME}:{split}. If the file was "
             "changed, remove it, and it is made again. If it was made just now, this machine makes other houses than "
             f"those of the name: please report that. `endless:{made.seed}` makes houses without such a promise."
@@ -122,5 +118,5 @@ def _sha256_of_text(path: Path) -> str:
             while chunk := text.read(_READ_BYTES):
                 digest.update(chunk)
     except (OSError, EOFError, zlib.error) as error:
-        raise HousesDifferError(f"{path}: cannot be unpacked: {error}. Remove it, and {NAME} is made again.") from error
+        raise HouseError(f"{path}: cannot be unpacked: {error}. Remove it, and {NAME} is made again.") from error
     return digest.hexdigest()

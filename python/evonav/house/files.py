@@ -78,9 +78,7 @@ class HouseTexts:
             completion: Completes each house as it is read.
 
         Raises:
-            DatasetError: The split was not fetched, or is incomplete.
-            HousesDifferError: A split that evonav makes does not hold its houses.
-            HouseError: The file does not exist.
+            HouseError: The file does not exist; or a split was not fetched, is incomplete, or holds other houses.
             InvalidArgumentError: The path names a known dataset, but no split of it.
         """
         source = _source_of(path)

@@ -251,8 +251,7 @@ def fetch_houses(
     If the houses are there already, the checksums of their files are verified.
     """
     from evonav.house import evonav10k
-    from evonav.house.procthor10k import NAME, REVISION, SPLITS
-    from evonav.house.procthor10k_fetch import fetch_procthor10k
+    from evonav.house.procthor10k import NAME, REVISION, SPLITS, fetch_procthor10k
 
     if dataset not in (NAME, evonav10k.NAME):
         raise typer.BadParameter(f"{dataset}: expected {NAME} or {evonav10k.NAME}")
