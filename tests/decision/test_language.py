@@ -5,8 +5,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, parse_goal, similarity
-from evonav.generation.instructions.appearance import adjectives_of
-from evonav.generation.instructions.describe import unified_instruction
+from evonav.generation.instructions.describe import adjectives_of, unified_instruction
 from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
 from evonav.tasks.language import MATERIALS, STRUCTURES
 

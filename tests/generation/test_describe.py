@@ -3,8 +3,12 @@
 import pytest
 
 from evonav._core import assets
-from evonav.generation.instructions.appearance import size_word
-from evonav.generation.instructions.describe import appearance_instruction, basic_instruction, unified_instruction
+from evonav.generation.instructions.describe import (
+    appearance_instruction,
+    basic_instruction,
+    size_word,
+    unified_instruction,
+)
 from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
 from evonav.tasks.colours import colour_word
 

@@ -17,7 +17,7 @@ from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import TaskError
-from evonav.generation.instructions import prompts
+from evonav.generation.instructions import writer
 from evonav.generation.instructions.writer import estimate_texts, write_texts
 from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, check_dataset, entry_of, read_dataset, write_dataset
@@ -36,11 +36,11 @@ def writes(request: dict[str, Any]) -> dict[str, str]:
     (image,) = images_in(request)
     basic = re.search(r"^Basic instruction: (.*)$", words, re.MULTILINE)
     assert basic
-    if words.startswith(prompts.APPEARANCE_PROMPT):
+    if words.startswith(writer.APPEARANCE_PROMPT):
         noun = re.search(r"^Target category: (.*)$", words, re.MULTILINE)
         assert noun
         return {"text": f'"Find the {noun[1]} with a hue of {image.getpixel((0, 0))[0]} out there."'}
-    assert words.startswith(prompts.UNIFIED_PROMPT)
+    assert words.startswith(writer.UNIFIED_PROMPT)
     appearance = re.search(r"^Appearance instruction: (.*)$", words, re.MULTILINE)
     assert appearance
     return {"text": f"**Unified instruction:** {appearance[1]}\n{basic[1]}"}
@@ -284,7 +284,7 @@ def test_a_damaged_task_is_told_and_the_others_stay_whole(stub: Stub, folder: Pa
     ],
 )
 def test_what_may_stand(text: str, fault: str | None) -> None:
-    assert prompts.fault_of(text) == fault
+    assert writer.fault_of(text) == fault
 
 
 def test_the_describers_texts_may_stand() -> None:
@@ -292,12 +292,12 @@ def test_the_describers_texts_may_stand() -> None:
         for task in load_tasks(directory):
             for public in task.public_stages:
                 for text in (public.basic_instruction, public.appearance_instruction, public.unified_instruction):
-                    assert prompts.fault_of(text) is None, text
+                    assert writer.fault_of(text) is None, text
 
 
 def test_marks_around_an_answer_go() -> None:
     for answer in ('"Find it."', "**Instruction:** Find it.", "Navigation instruction: “Find it.”", " Find\n it. "):
-        assert prompts.cleaned(answer) == "Find it."
+        assert writer.cleaned(answer) == "Find it."
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from evonav.cli import main
 from evonav.errors import InvalidArgumentError, SimulationError, StoreError
 from evonav.generation.dataset import generate_dataset
 from evonav.generation.house_check import check_house, odd_bodies
-from evonav.generation.validation.folder import validate_folder
+from evonav.generation.validation import validate_folder
 from evonav.generation.worker import GenerationOptions
 from evonav.house import House, stream_houses
 from evonav.house.generated import house_maker, read_house_parameters

@@ -10,14 +10,13 @@ import json
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterable, Set
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from evonav._core import __version__
-from evonav.errors import InvalidArgumentError, TaskError
-from evonav.generation.house_order import checked_subset, house_order
+from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import (
     HOUSE_TIMEOUT_S,
@@ -28,12 +27,17 @@ from evonav.generation.worker import (
     is_complete,
     outcome_of,
 )
-from evonav.house.files import HouseTexts
+from evonav.house import House
+from evonav.house.files import HouseText, HouseTexts
 from evonav.parallel.folders import writing
 from evonav.parallel.pool import Answer, Job, Pool, open_pool
 from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import DATASET_NAME, DatasetRecord, SourceFile, read_dataset, write_dataset
-from evonav.tasks.subsets import Subset, SubsetError
+from evonav.tasks.records import sha256_of
+from evonav.tasks.subsets import Subset, SubsetError, parse_subset, subset_key
+
+MIN_ROOMS = 2
+"""Smallest number of rooms in a house that can give a task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +115,7 @@ def generate_dataset(
     texts = houses if isinstance(houses, HouseTexts) else HouseTexts(houses)
     dataset, split = inherited_names(texts)
     options, workforce = options or GenerationOptions(dataset=dataset, split=split), workforce or Workforce()
-    wanted = None if subset is None else checked_subset(subset, options.split, limit)
+    wanted = None if subset is None else _checked_subset(subset, options.split, limit)
     texts.check_end(limit)
     sources = tuple(SourceFile(name=name, sha256=sha256) for name, sha256 in texts.checksums())
     identity = {
@@ -148,6 +152,37 @@ def generate_dataset(
         return run.summary(out)
 
 
+def _checked_subset(name: str, split: str, limit: int | None) -> Subset:
+    """Parse the name of a subset and check it against the other options.
+
+    Raises:
+        InvalidArgumentError: A limit is given as well.
+        SubsetError: The name is malformed or of another split.
+    """
+    subset = parse_subset(name)
+    if limit is not None:
+        raise InvalidArgumentError(f"arguments `subset` and `limit` are {name!r} and {limit}, expected one of them")
+    if subset.split != split:
+        raise SubsetError(f"subset {name!r}: the houses are of split {split!r}, not of {subset.split!r}")
+    return subset
+
+
+def _house_order(houses: Iterable[HouseText]) -> list[int]:
+    """Return the indices of multi-room houses in their file, in the order of subsets; each distinct house once.
+
+    All houses are read. Malformed houses give no task and are left out.
+    """
+    first: dict[str, int] = {}
+    for index, text in enumerate(houses):
+        try:
+            house = House(text.text, name=text.name)
+        except HouseError:
+            continue
+        if len(house.rooms) >= MIN_ROOMS:
+            first.setdefault(sha256_of(house.to_json().encode()), index)
+    return [first[sha256] for sha256 in sorted(first, key=subset_key)]
+
+
 def inherited_names(houses: HouseTexts) -> tuple[str, str]:
     """Return the dataset and split that tasks inherit from their houses."""
     return houses.split or ("evonav", "none")
@@ -182,7 +217,7 @@ class _Run:
             StoreError: A task or the journal cannot be written.
             SubsetError: Too few houses give a task.
         """
-        order = house_order(self._texts)
+        order = _house_order(self._texts)
         num_started = 0
         while self._num_tasks_of(order[:num_started]) < subset.num_tasks:
             if num_started == len(order):

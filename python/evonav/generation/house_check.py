@@ -1,9 +1,9 @@
-"""Check whether houses can be used: what is wrong in them, what is odd, and whether they give a task."""
+"""Check whether houses can be used: their numbers, what is wrong and odd in them, and whether they give a task."""
 
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ from evonav import _core
 from evonav.counted import counted
 from evonav.errors import EvonavError, HouseError, SimulationError
 from evonav.generation.pipeline import generate_task
-from evonav.generation.validation.problems import ProblemKind
+from evonav.generation.validation.problems import KINDS, ProblemKind
 from evonav.generation.validation.world import REST_M, TOUCH_M
 from evonav.house import House, HouseObject
 from evonav.house.asset_sizes import KEY, catalogue_ids
@@ -52,6 +52,33 @@ class HouseCheck:
     def is_fine(self) -> bool:
         """True if nothing is wrong; there may be notes."""
         return all(finding.severity == "note" for finding in self.findings)
+
+    @property
+    def summary(self) -> str:
+        """The numbers of the house in one line."""
+        if self.house is None:
+            return "cannot be read"
+        house, area_m2 = self.house, sum(area_of_m2(room.polygon_m) for room in self.house.rooms)
+        parts = (counted(len(house.rooms), "room"), f"{area_m2:.1f} m2", counted(len(house.objects), "object"))
+        categories = {item.category for item in house.objects}
+        return f"{', '.join(parts)} of {counted(len(categories), 'category')}, {counted(len(house.doors), 'door')}"
+
+    @property
+    def rooms(self) -> list[tuple[str, str, str, str]]:
+        """Id, type, floor area in m2 and number of objects of each room."""
+        if self.house is None:
+            return []
+        inside = Counter(item.room_id for item in self.house.objects)
+        return [
+            (room.id, room.room_type, f"{area_of_m2(room.polygon_m):.1f}", str(inside[room.id]))
+            for room in self.house.rooms
+        ]
+
+
+def area_of_m2(outline_m: Sequence[tuple[float, float]]) -> float:
+    """Return the area that an outline encloses."""
+    following = zip(outline_m, [*outline_m[1:], *outline_m[:1]], strict=True)
+    return abs(sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in following)) / 2.0
 
 
 def check_house(name: str, text: str, *, allow_unknown_assets: bool = False) -> HouseCheck:
@@ -141,10 +168,21 @@ def odd_bodies(house: House, *, allow_unknown_assets: bool = False) -> Counter[P
     return Counter(one["kind"] for one in json.loads(found))
 
 
-def task_outcome(house: House, *, allow_unknown_assets: bool = False) -> str:
+def odd_note(found: HouseCheck, *, allow_unknown_assets: bool = False) -> str:
+    """Return a sentence on the overlaps and objects without support in a house; empty if there are none."""
+    if found.house is None or not found.num_places:
+        return ""
+    odd = sorted(odd_bodies(found.house, allow_unknown_assets=allow_unknown_assets).items())
+    parts = [f"{KINDS[kind]} ({number})" for kind, number in odd]
+    return f"{'; '.join(parts)}: published houses have such flaws, too" if parts else ""
+
+
+def task_outcome(found: HouseCheck, *, allow_unknown_assets: bool = False) -> str:
     """Say whether a house gives a task, and why not."""
+    if found.house is None or not found.num_places:
+        return "no" if found.house is None else "no: the house is wrong"
     try:
-        task = generate_task(house, seed=0, allow_unknown_assets=allow_unknown_assets)
+        task = generate_task(found.house, seed=0, allow_unknown_assets=allow_unknown_assets)
     except EvonavError as error:
-        return f"no: {str(error).removeprefix(f'house {house.name}: ')}"
+        return f"no: {str(error).removeprefix(f'house {found.name}: ')}"
     return f"yes: {counted(task.num_stages, 'stage')} with seed 0"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.generation.house_view import area_of_m2
+from evonav.generation.house_check import area_of_m2
 from evonav.house import House, HouseObject, Room
 from evonav.house.files import HouseText
 from evonav.statistics import holm

@@ -49,7 +49,7 @@ def list_houses(
     limit: Limit = None,
 ) -> None:
     """List houses with their rooms, floor areas and objects."""
-    from evonav.generation.house_view import area_of_m2
+    from evonav.generation.house_check import area_of_m2
     from evonav.house import House
 
     texts = read_houses(path or "bundled", None, "file")
@@ -75,38 +75,39 @@ def show_house(
     ] = None,
 ) -> None:
     """Show a house: its rooms, what is odd in it, and whether it gives a task."""
-    from evonav.generation.house_check import check_house
-    from evonav.generation.house_view import house_view
+    from evonav.drawing.pictures import house_picture
+    from evonav.generation.house_check import check_house, odd_note, task_outcome
     from evonav.parallel.folders import write_atomically
     from evonav.report.tasks.pages import house_page
 
     name, text = next(iter(read_houses(house, assets, start)))
-    view = house_view(
-        check_house(name, text, allow_unknown_assets=allow_unknown_assets), allow_unknown_assets=allow_unknown_assets
-    )
-    typer.echo(f"{name}: {view.summary}")
-    for row in view.rooms:
+    found = check_house(name, text, allow_unknown_assets=allow_unknown_assets)
+    typer.echo(f"{name}: {found.summary}")
+    for row in found.rooms:
         typer.echo(f"  {row[0]:10} {row[1]:14} {row[2]:>7} m2  {row[3]:>4} objects")
-    if view.found.num_places:
-        typer.echo(f"the agent reaches {view.found.num_places} places of the 0.25 m grid")
-    findings = [f"{finding.severity}: {finding}" for finding in view.found.findings]
-    findings += [f"note: {view.odd}"] if view.odd else []
+    if found.num_places:
+        typer.echo(f"the agent reaches {found.num_places} places of the 0.25 m grid")
+    findings = [f"{finding.severity}: {finding}" for finding in found.findings]
+    if odd := odd_note(found, allow_unknown_assets=allow_unknown_assets):
+        findings.append(f"note: {odd}")
     for line in findings:
         typer.echo(line)
-    typer.echo(f"gives a task: {view.task}")
+    task = task_outcome(found, allow_unknown_assets=allow_unknown_assets)
+    typer.echo(f"gives a task: {task}")
+    picture = None if found.house is None else house_picture(found.house)
     if out is not None and out.suffix.lower() == ".html":
         page = house_page(
             name,
-            summary=view.summary,
-            task=view.task,
-            rooms=view.rooms,
+            summary=found.summary,
+            task=task,
+            rooms=found.rooms,
             findings=findings,
-            plan_svg=None if view.picture is None else view.picture.svg,
+            plan_svg=None if picture is None else picture.svg,
         )
         typer.echo(f"page: {write_atomically(out, page)}")
-    elif out is not None and view.picture is not None:
-        typer.echo(f"plan: {view.picture.save(out)}")
-    if not view.found.is_fine:
+    elif out is not None and picture is not None:
+        typer.echo(f"plan: {picture.save(out)}")
+    if not found.is_fine:
         raise typer.Exit(EXIT_WRONG)
 
 
@@ -121,7 +122,6 @@ def check_houses(
 ) -> None:
     """Check houses, a line each, and name what is wrong; exit code 1 if a house is."""
     from evonav.generation.house_check import check_house
-    from evonav.generation.house_view import summary_of
 
     num_houses = num_wrong = 0
     opened = [read_houses(one, assets, start) for one in houses]
@@ -132,7 +132,7 @@ def check_houses(
         num_houses, num_wrong = num_houses + 1, num_wrong + (not found.is_fine)
         if not only_wrong or not found.is_fine:
             verdict = "fine " if found.is_fine else "wrong"
-            typer.echo(f"{verdict}  {name}" + ("" if found.house is None else f"  {summary_of(found.house)}"))
+            typer.echo(f"{verdict}  {name}" + ("" if found.house is None else f"  {found.summary}"))
         for finding in found.findings:
             if not only_wrong or finding.severity == "wrong":
                 typer.echo(f"       {finding.severity}: {finding}")

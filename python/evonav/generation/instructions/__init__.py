@@ -1,1 +1,1 @@
-"""Write the instructions of tasks: by rule (`describe`, `appearance`) or with a model (`writer`, `prompts`)."""
+"""Write the instructions of tasks: by rule (`describe`) or with a model (`writer`)."""

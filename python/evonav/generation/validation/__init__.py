@@ -1,8 +1,7 @@
 """Validate tasks: check their files, records, physics, reference views and paths again from the start."""
 
-from evonav.generation.validation.folder import FolderReport, validate_folder
 from evonav.generation.validation.problems import KINDS, Problem, ProblemKind, Report
-from evonav.generation.validation.task import validate_files, validate_task
+from evonav.generation.validation.validate import FolderReport, validate_files, validate_folder, validate_task
 
 __all__ = [
     "KINDS",
