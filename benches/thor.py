@@ -20,7 +20,7 @@ from evonav.house import bundled_houses
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import rows_of
 from evonav.thor.engine import Engine
-from evonav.thor.events.emitter import Emitter
+from evonav.thor.events import Emitter
 
 NOTES = """\
 Steps of the unmodified `ai2thor` 5.0.0 `Controller`, 300x300, bundled houses; CPU time of client and engine. The

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from evonav.thor.actions import registry
 from evonav.thor.engine import Engine
-from evonav.thor.events.emitter import Emitter
+from evonav.thor.events import Emitter
 
 JsonObject = dict[str, Any]
 

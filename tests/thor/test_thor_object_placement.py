@@ -12,7 +12,7 @@ import pytest
 from evonav.house import bundled_houses
 from evonav.thor import objects
 from evonav.thor.engine import Engine
-from evonav.thor.events.metadata import pack_event
+from evonav.thor.events import pack_event
 
 Json = dict[str, Any]
 

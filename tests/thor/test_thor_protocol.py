@@ -10,8 +10,8 @@ import pytest
 import evonav.thor
 from evonav.errors import SimulationError
 from evonav.thor.engine import Engine
-from evonav.thor.events.emitter import Emitter
-from evonav.thor.events.images import assign
+from evonav.thor.events import Emitter
+from evonav.thor.images import assign
 from evonav.thor.transport.fifo import FieldType
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -118,7 +118,7 @@ def test_colours_are_a_function_of_the_name(controller: Any) -> None:
 
 
 def test_equal_hashes_get_different_colours(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("evonav.thor.events.images._hashed", lambda name: (len(name), 0, 0))
+    monkeypatch.setattr("evonav.thor.images._hashed", lambda name: (len(name), 0, 0))
     colors = assign(["b", "a", "cc"])
     assert len(set(colors.values()) | {(0, 0, 0)}) == 4
     assert colors["a"] == (1, 0, 0), "the first in the alphabet keeps its own"

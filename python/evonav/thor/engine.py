@@ -1,19 +1,25 @@
 """Execute the client's actions one after another."""
 
 import logging
+import math
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
+
+import numpy as np
 
 from evonav.errors import EvonavError
 from evonav.thor.actions import registry
 from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode
 from evonav.thor.agent import Agent
+from evonav.thor.geometry import Vec3, vector
 from evonav.thor.scene import Scene
-from evonav.world.camera import Images
+from evonav.world.camera import CameraView, Images
+from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
+Rgb = tuple[int, int, int]
 _LOG = logging.getLogger("evonav.thor")
 # Maximal number of characters of an error message.
 _MAX_MESSAGE = 4000
@@ -46,16 +52,62 @@ class Settings(Arguments, extra="allow"):
     """Answer an action that changed nothing with its result alone."""
 
 
-class Camera(Protocol):
-    """A third-party camera. It is immutable: a change replaces it."""
+@dataclass(frozen=True, slots=True)
+class ThirdPartyCamera:
+    """One camera. It is immutable: a change makes another camera."""
+
+    camera_id: int
+    position_m: Vec3
+    rotation_deg: Vec3
+    """Unity's Euler angles in degrees: pitch down, yaw right, roll counter-clockwise; roll is applied first."""
+    field_of_view_deg: float
+    """Vertical field of view in degrees."""
+    near_m: float
+    far_m: float
+    is_orthographic: bool
+    orthographic_size_m: float
+    """Half the height of an orthographic image, in metres."""
+    skybox: Rgb | None
+    """Colour of the background; `None` for the renderer's own."""
 
     def metadata(self) -> dict[str, Any]:
         """Return AI2-THOR's `ThirdPartyCameraMetadata`."""
-        ...
+        return {
+            "thirdPartyCameraId": self.camera_id,
+            "position": vector(self.position_m),
+            "rotation": vector(_euler_deg(self.rotation_deg)),
+            "fieldOfView": self.field_of_view_deg,
+        }
 
     def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
-        """Render the camera's view in the size of the screen; depth ends at its own far plane."""
-        ...
+        """Render the camera's view in the size of the screen; depth ends at its far plane."""
+        view = self._view(scene.config.width_px, scene.config.height_px)
+        needs_instances = instances or (rgb and self.skybox is not None)
+        depth_m, colours, ids = scene.simulator.render_camera(view, rgb=rgb, instances=needs_instances)
+        if colours is not None and self.skybox is not None and ids is not None:
+            colours = np.where((ids == 0)[..., np.newaxis], np.array(self.skybox, dtype=np.uint8), colours)
+        return Images(np.minimum(depth_m, np.float32(self.far_m)), colours, ids if instances else None)
+
+    def _view(self, width_px: int, height_px: int) -> CameraView:
+        down, right, roll = (math.radians(angle) for angle in self.rotation_deg)
+        return CameraView(
+            Pose(*self.position_m, yaw_rad=right, horizon_rad=down),
+            width_px,
+            height_px,
+            math.radians(self.field_of_view_deg),
+            self.near_m,
+            self.far_m,
+            roll,
+            self.orthographic_size_m if self.is_orthographic else None,
+        )
+
+
+def _euler_deg(angles_deg: Vec3) -> Vec3:
+    """Return angles as Unity reads them back: each in [0, 360), with a pitch of at most 90 degrees."""
+    down, right, roll = (angle % 360 for angle in angles_deg)
+    if 90 < down < 270:
+        down, right, roll = (180 - down) % 360, (right + 180) % 360, (roll + 180) % 360
+    return (down, right, roll)
 
 
 @dataclass(slots=True)
@@ -78,9 +130,9 @@ class Engine:
     settings: Settings = field(default_factory=Settings)
     scene: Scene = field(default_factory=Scene)
     agent: Agent = field(default_factory=Agent)
-    cameras: list[Camera] = field(default_factory=list)
+    cameras: list[ThirdPartyCamera] = field(default_factory=list)
     """Third-party cameras, by their ids."""
-    map_view: Camera | None = None
+    map_view: ThirdPartyCamera | None = None
     """The camera that `ToggleMapView` puts in place of the agent's."""
     map_view_size_m: float = -1.0
     """Half the height of the last map view, in metres."""

@@ -157,7 +157,7 @@ def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
 def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
     # Imported after the pipes are open: a client whose engine fails before that waits for ever.
     from evonav.thor.engine import Engine
-    from evonav.thor.events.emitter import Emitter
+    from evonav.thor.events import Emitter
 
     engine = Engine(width_px=options.width, height_px=options.height)
     has_camera = not options.nographics and os.environ.get("AI2THOR_SERVER_SIDE_SCREENSHOT") != "False"

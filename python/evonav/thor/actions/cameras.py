@@ -4,25 +4,18 @@ Parameters, defaults and messages are those of AI2-THOR's `AgentManager.cs` and 
 a house's ceilings are drawn from below only, so a camera above them sees the rooms. `antiAliasing` has no effect.
 """
 
-import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeVar
 
-import numpy as np
 from PIL import ImageColor
 from pydantic import BaseModel, ConfigDict
 
-from evonav.thor.actions.motion import invalid_operation
-from evonav.thor.actions.registry import ActionError, Arguments, Vector3, action
-from evonav.thor.actions.teleport import out_of_range
-from evonav.thor.engine import Engine
+from evonav.thor.actions.motion import invalid_operation, out_of_range
+from evonav.thor.actions.registry import ActionError, Arguments, action
+from evonav.thor.engine import Engine, Rgb, ThirdPartyCamera
 from evonav.thor.geometry import Vec3, box_around, vector
-from evonav.thor.scene import Scene
-from evonav.world.camera import CameraView, Images
-from evonav.world.pose import Pose
 
-Rgb = tuple[int, int, int]
 _T = TypeVar("_T")
 
 NEAR_M, FAR_M = 0.1, 20.0
@@ -55,59 +48,11 @@ class PartialVector3(BaseModel):
     z: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ThirdPartyCamera:
-    """One camera. It is immutable: a change makes another camera."""
-
-    camera_id: int
-    position_m: Vec3
-    rotation_deg: Vec3
-    """Unity's Euler angles in degrees: pitch down, yaw right, roll counter-clockwise; roll is applied first."""
-    field_of_view_deg: float
-    """Vertical field of view in degrees."""
-    near_m: float
-    far_m: float
-    is_orthographic: bool
-    orthographic_size_m: float
-    """Half the height of an orthographic image, in metres."""
-    skybox: Rgb | None
-    """Colour of the background; `None` for the renderer's own."""
-
-    def metadata(self) -> dict[str, Any]:
-        """Return AI2-THOR's `ThirdPartyCameraMetadata`."""
-        return {
-            "thirdPartyCameraId": self.camera_id,
-            "position": vector(self.position_m),
-            "rotation": vector(_euler_deg(self.rotation_deg)),
-            "fieldOfView": self.field_of_view_deg,
-        }
-
-    def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
-        """Render the camera's view in the size of the screen; depth ends at its far plane."""
-        view = self._view(scene.config.width_px, scene.config.height_px)
-        needs_instances = instances or (rgb and self.skybox is not None)
-        depth_m, colours, ids = scene.simulator.render_camera(view, rgb=rgb, instances=needs_instances)
-        if colours is not None and self.skybox is not None and ids is not None:
-            colours = np.where((ids == 0)[..., np.newaxis], np.array(self.skybox, dtype=np.uint8), colours)
-        return Images(np.minimum(depth_m, np.float32(self.far_m)), colours, ids if instances else None)
-
-    def _view(self, width_px: int, height_px: int) -> CameraView:
-        down, right, roll = (math.radians(angle) for angle in self.rotation_deg)
-        return CameraView(
-            Pose(*self.position_m, yaw_rad=right, horizon_rad=down),
-            width_px,
-            height_px,
-            math.radians(self.field_of_view_deg),
-            self.near_m,
-            self.far_m,
-            roll,
-            self.orthographic_size_m if self.is_orthographic else None,
-        )
-
-
 class _Properties(Arguments):
     """The properties that a new camera and a change of one have in common."""
 
+    position: PartialVector3 | None = None
+    rotation: PartialVector3 | None = None
     fieldOfView: float | None = None
     skyboxColor: str | None = None
     orthographic: bool | None = None
@@ -119,10 +64,8 @@ class _Properties(Arguments):
 class _NewCamera(_Properties):
     """The arguments of `AddThirdPartyCamera`."""
 
-    position: Vector3
-    rotation: Vector3
-    fieldOfView: float = 90.0
-    orthographic: bool = False
+    position: PartialVector3
+    rotation: PartialVector3
     antiAliasing: str = "none"
 
 
@@ -130,8 +73,6 @@ class _CameraChange(_Properties):
     """The arguments of `UpdateThirdPartyCamera`."""
 
     thirdPartyCameraId: int = 0
-    position: PartialVector3 | None = None
-    rotation: PartialVector3 | None = None
 
 
 @action("AddThirdPartyCamera")
@@ -153,10 +94,7 @@ def update_third_party_camera(engine: Engine, given: _CameraChange) -> None:
             f"thirdPartyCameraId: {index} (int: default=0) must in 0 <= thirdPartyCameraId"
             f" < len(thirdPartyCameras)={num_cameras}."
         )
-    camera = engine.cameras[index]
-    if not isinstance(camera, ThirdPartyCamera):
-        raise ActionError(f"camera {index} is not a third-party camera")
-    engine.cameras[index] = _changed(camera, given)
+    engine.cameras[index] = _changed(engine.cameras[index], given)
 
 
 @action("ToggleMapView")
@@ -189,7 +127,7 @@ def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
     }
 
 
-def _changed(camera: ThirdPartyCamera, given: _NewCamera | _CameraChange) -> ThirdPartyCamera:
+def _changed(camera: ThirdPartyCamera, given: _Properties) -> ThirdPartyCamera:
     """Return the camera with new properties, checked as AI2-THOR checks them and as the renderer needs them."""
     fov_deg = _or(given.fieldOfView, camera.field_of_view_deg)
     if not 0 < fov_deg < 180:
@@ -244,16 +182,8 @@ def _skybox(colour: str | None, before: Rgb | None) -> Rgb | None:
     return (red, green, blue)
 
 
-def _filled(given: Vector3 | PartialVector3 | None, before: Vec3) -> Vec3:
+def _filled(given: PartialVector3 | None, before: Vec3) -> Vec3:
     if given is None:
         return before
     x, y, z = map(_or, (given.x, given.y, given.z), before)
     return (x, y, z)
-
-
-def _euler_deg(angles_deg: Vec3) -> Vec3:
-    """Return angles as Unity reads them back: each in [0, 360), with a pitch of at most 90 degrees."""
-    down, right, roll = (angle % 360 for angle in angles_deg)
-    if 90 < down < 270:
-        down, right, roll = (180 - down) % 360, (right + 180) % 360, (roll + 180) % 360
-    return (down, right, roll)

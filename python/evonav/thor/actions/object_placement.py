@@ -12,8 +12,8 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from evonav.thor import edits, objects
+from evonav.thor.actions.motion import out_of_range, vector_text
 from evonav.thor.actions.registry import ActionError, Vector3, action, brief
-from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import box_around
 from evonav.thor.scene import Scene
@@ -208,7 +208,8 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     reach_m = 0.5 * np.abs(axes) @ size_m
     low, high = (tuple(m.tolist()) for m in box_around(b for b in scene.simulator.objects if b.kind != "object"))
     if not all(lo <= value <= hi for lo, value, hi in zip(low, (point.x, point.y, point.z), high, strict=True)):
-        raise out_of_range(f"Position coordinate ({_text(point)}) is not within scene bounds ({low}, {high})")
+        place = vector_text((point.x, point.y, point.z), 1)
+        raise out_of_range(f"Position coordinate ({place}) is not within scene bounds ({low}, {high})")
     surfaces = fresh_surfaces(scene)
     surfaces = surfaces.without(_bodies_of(scene, entry))
     under_m = surfaces.height_under_m(np.array([[point.x, point.z]]), point.y)
@@ -229,10 +230,6 @@ def _bodies_of(scene: Scene, entry: dict[str, Any]) -> set[int]:
     """Return the indices of the bodies of an object and of all objects on it."""
     instances = objects.table_of(scene).instances
     return {instances[part["id"]] - 1 for part, _ in objects.placed_objects({"objects": [entry]})}
-
-
-def _text(vector: Vector3) -> str:
-    return f"({vector.x:.1f}, {vector.y:.1f}, {vector.z:.1f})"
 
 
 def _remove(scene: Scene, object_ids: Sequence[str]) -> None:

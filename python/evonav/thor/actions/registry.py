@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 # The functions of these modules register themselves.
 _MODULES = (
-    *("session", "appearance", "motion", "teleport", "paths", "spawn"),
-    *("object_queries", "interactable_poses", "object_placement", "object_states", "cameras"),
+    *("session", "appearance", "motion", "paths", "spawn"),
+    *("object_queries", "object_placement", "object_states", "cameras"),
 )
 
 # Keys that any action may contain (`DynamicServerAction.AllowedExtraneousParameters`) or that the client may add.

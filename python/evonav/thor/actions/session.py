@@ -7,9 +7,9 @@ from evonav.thor import objects
 from evonav.thor.actions.registry import ActionError, action
 from evonav.thor.agent import Agent, body_of
 from evonav.thor.engine import Engine, Settings
-from evonav.thor.events.images import FAR_M
-from evonav.thor.events.metadata import scene_bounds
+from evonav.thor.events import scene_bounds
 from evonav.thor.geometry import vector
+from evonav.thor.images import FAR_M
 from evonav.thor.scene import Document, Scene
 
 SCENES = ("Procedural",)

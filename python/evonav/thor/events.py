@@ -1,23 +1,25 @@
-"""Pack an event's metadata in msgpack, with the fields of AI2-THOR's `MetadataWrapper` (`AgentManager.cs`).
+"""Encode the answer to an action: metadata, in msgpack with the fields of AI2-THOR's `MetadataWrapper`, and images.
 
 Most metadata depends on the scene alone. It is packed once for each version of the scene, and only if it is listed.
 """
 
 import struct
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
 import msgpack
 import numpy as np
 from pydantic import BaseModel
 
-from evonav.thor import objects
-from evonav.thor.events.images import palette_of
+from evonav.errors import EvonavError
+from evonav.thor import images, objects
+from evonav.thor.engine import Engine, Result, log_once
 from evonav.thor.geometry import box_around, vector
+from evonav.thor.images import ImageKinds, palette_of
 from evonav.thor.scene import Scene
-
-if TYPE_CHECKING:
-    from evonav.thor.engine import Engine, Result
+from evonav.thor.transport.fifo import Field, FieldType
+from evonav.world.camera import Images
 
 # The packed keys of a record that depend on the agent; a double follows the first.
 _DYNAMIC = ("distance", "visible", "isInteractable")
@@ -26,6 +28,84 @@ _SIGHT = (b"\xa7visible\xc2\xaeisInteractable\xc2", b"\xa7visible\xc3\xaeisInter
 _DOUBLE = struct.Struct(">d")
 _MAP16 = struct.Struct(">BH")
 _ARRAY32 = struct.Struct(">BI")
+
+
+class Emitter:
+    """Encodes the events of one engine; what has not changed since the last event is reused."""
+
+    def __init__(self, engine: Engine, *, has_camera: bool = True, has_patches: bool = True) -> None:
+        """Emit events for an engine.
+
+        Args:
+            engine: The engine whose state the events show.
+            has_camera: `False` for a client that asked for no graphics.
+            has_patches: Whether the transport supports messages that contain only the changes.
+        """
+        self._engine = engine
+        self._has_camera = has_camera
+        self._has_patches = has_patches
+        self._sequence_id = -1
+        self._state: object = None
+        self._images: list[Field] = []
+
+    def event(self, message: Mapping[str, Any]) -> list[Field]:
+        """Return the event that answers a message which the engine has executed."""
+        sequence_id = message.get("sequenceId")
+        self._sequence_id = (
+            sequence_id if type(sequence_id) is int and abs(sequence_id) < 2**62 else self._sequence_id + 1
+        )
+        try:
+            return self._event(message)
+        except Exception as error:
+            # The scene's house cannot be described. The client is informed and may load another house.
+            problem = f"the engine cannot show the scene: {type(error).__name__}: {error}"
+            if not isinstance(error, EvonavError):
+                log_once(error, problem)
+            self._engine.scene = Scene(self._engine.scene.name)
+            self._engine.cameras.clear()
+            self._engine.map_view = None
+            self._engine.last = Result(self._engine.last.action, False, problem)
+            return self._event(message)
+
+    def _event(self, message: Mapping[str, Any]) -> list[Field]:
+        engine = self._engine
+        kinds = self._kinds(message)
+        state = (engine.state, kinds)
+        if self._has_patches and engine.settings.fastActionEmit and state == self._state:
+            return [(FieldType.METADATA_PATCH, patch(engine.last))]
+        if state != self._state:
+            self._images = self._rendered(kinds) if kinds else []
+            self._state = state
+        has_colors = kinds is not None and kinds.needs_instances
+        metadata = pack_event(engine, sequence_id=self._sequence_id, has_colors=has_colors)
+        return [(FieldType.METADATA, metadata), *self._images]
+
+    def _kinds(self, message: Mapping[str, Any]) -> ImageKinds | None:
+        """Return the images to send with this event; `None` for none."""
+        if not self._has_camera or not message.get("renderImage", True):
+            return None
+        settings = self._engine.settings
+        return ImageKinds(
+            rgb=True,
+            depth=settings.renderDepthImage,
+            # An action may request these two images for its own event only.
+            instances=settings.renderInstanceSegmentation or message.get("renderInstanceSegmentation") is True,
+            classes=settings.renderSemanticSegmentation or message.get("renderSemanticSegmentation") is True,
+        )
+
+    def _rendered(self, kinds: ImageKinds) -> list[Field]:
+        engine = self._engine
+        palette = engine.scene.derived(palette_of)
+        views: list[Callable[..., Images]] = [engine.view]
+        views += [partial(camera.render, engine.scene) for camera in engine.cameras]
+        fields: list[Field] = []
+        for index, render in enumerate(views):
+            if engine.scene.house is None:
+                seen = images.blank(engine.width_px, engine.height_px)
+            else:
+                seen = render(rgb=kinds.rgb, instances=kinds.needs_instances)
+            fields += images.encode(seen, kinds, palette, is_third_party=index > 0)
+        return fields
 
 
 def _plain(value: object) -> object:
@@ -44,7 +124,7 @@ def _packed(value: object) -> bytes:
     return packed
 
 
-def pack_event(engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes:
+def pack_event(engine: Engine, *, sequence_id: int, has_colors: bool) -> bytes:
     """Return all metadata of an event, packed."""
     action_return = _packed_return(engine.last)
     fields = agent_fields(engine) | {"sceneBounds": engine.scene.derived(scene_bounds)}
@@ -60,7 +140,7 @@ def pack_event(engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes
     )
 
 
-def _objects(engine: "Engine") -> list[bytes]:
+def _objects(engine: Engine) -> list[bytes]:
     wanted = engine.object_filter
     if wanted == frozenset():
         return [_ARRAY32.pack(0xDD, 0)]
@@ -84,13 +164,13 @@ def _packed_colors(scene: Scene) -> bytes:
     return _packed(scene.derived(palette_of).entries)
 
 
-def patch(result: "Result") -> bytes:
+def patch(result: Result) -> bytes:
     """Pack the result of an action that changed nothing: AI2-THOR's `MetadataPatch`."""
     action_return = _packed_return(result)
     return _opened({**_outcome(result), "agentId": 0}, 1) + b"\xacactionReturn" + action_return
 
 
-def agent_fields(engine: "Engine") -> dict[str, Any]:
+def agent_fields(engine: Engine) -> dict[str, Any]:
     """Return `MetadataWrapper` without the objects, the colours and the bounds of the scene."""
     agent = engine.agent
     position = vector((agent.x_m, agent.y_m, agent.z_m))
@@ -144,7 +224,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
     }
 
 
-def _outcome(result: "Result") -> dict[str, Any]:
+def _outcome(result: Result) -> dict[str, Any]:
     return {
         "lastAction": result.action,
         "lastActionSuccess": result.is_success,
@@ -153,7 +233,7 @@ def _outcome(result: "Result") -> dict[str, Any]:
     }
 
 
-def _packed_return(result: "Result") -> bytes:
+def _packed_return(result: Result) -> bytes:
     """Pack what the action returned; fail the action if that cannot be sent."""
     try:
         return _packed(result.action_return)
