@@ -17,8 +17,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from evonav.component import import_callable
-from evonav.parallel.work import serve
-from evonav.parallel.worker import Message, Worker, WorkerLostError
+from evonav.parallel.worker import Message, Worker, WorkerLostError, serve
 
 END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""

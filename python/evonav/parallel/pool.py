@@ -12,15 +12,25 @@ cause: their answers say that it was shared, and a job that `is_alone` shares it
 
 import math
 import time
-from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator
-from dataclasses import dataclass
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from itertools import islice
-from typing import Literal
+from typing import Literal, TypeAlias
 
-from evonav.parallel.work import end_work, load_work, steps
-from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Message, Worker, WorkerLostError, Workforce
+from evonav.component import import_callable
+from evonav.parallel.worker import (
+    START_TIMEOUT_S,
+    EngineError,
+    Host,
+    Message,
+    Worker,
+    WorkerLostError,
+    Workforce,
+    end_work,
+    steps,
+)
 
 FailureKind = Literal["crash", "timeout", "error"]
 
@@ -60,31 +70,7 @@ class Answer:
     """True if it did not fail: its worker was ended because another job there was silent for too long."""
 
 
-class Pool(ABC):
-    """Runs jobs in any order; used in a `with` statement, at whose end all workers end at once."""
-
-    capacity: int
-    """Number of jobs that may be open at once."""
-
-    @abstractmethod
-    def submit(self, job: Job) -> None:
-        """Accept a job, and start it if a worker is free."""
-
-    @abstractmethod
-    def next_answer(self) -> Answer:
-        """Wait for the next message of any job. Call only while a submitted job is open."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """End all workers at once."""
-
-    def __enter__(self) -> "Pool":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
+@contextmanager
 def open_pool(
     work: str,
     settings: str,
@@ -93,8 +79,8 @@ def open_pool(
     timeout_s: float,
     max_losses: int = MAX_LOSSES,
     prelude: str = "",
-) -> Pool:
-    """Open a pool of workers, to be used in a `with` statement.
+) -> Iterator["Pool"]:
+    """Lend a pool of workers, which end at once when the block ends.
 
     Args:
         work: `module:factory`.
@@ -104,21 +90,25 @@ def open_pool(
     Raises:
         EngineError: Ray is not installed or cannot be reached.
     """
+    pool: Pool
     if workforce.engine == "ray":
         from evonav.parallel.ray import RayHost
 
         host = RayHost(work, settings, workforce)
         num_workers = min(workforce.num_workers, host.max_workers)
-        return WorkerPool(host, num_workers, timeout_s, max_losses, workforce.jobs_at_once)
-    if workforce.num_workers == 0:
-        return InlinePool(work, settings)
-    from evonav.parallel.local import ProcessHost, Program
+        pool = WorkerPool(host, num_workers, timeout_s, max_losses, workforce.jobs_at_once)
+    elif workforce.num_workers == 0:
+        pool = InlinePool(work, settings)
+    else:
+        from evonav.parallel.local import ProcessHost, Program
 
-    local_host = ProcessHost(Program(work, prelude), settings, has_threads=workforce.jobs_at_once > 1)
-    return WorkerPool(local_host, workforce.num_workers, timeout_s, max_losses, workforce.jobs_at_once)
+        local_host = ProcessHost(Program(work, prelude), settings, has_threads=workforce.jobs_at_once > 1)
+        pool = WorkerPool(local_host, workforce.num_workers, timeout_s, max_losses, workforce.jobs_at_once)
+    with closing(pool):
+        yield pool
 
 
-def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
+def answers(pool: "Pool", jobs: Iterable[Job]) -> Iterator[Answer]:
     """Run jobs that send no progress, in any order, and yield their answers.
 
     Args:
@@ -136,13 +126,14 @@ def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
         yield answer
 
 
-class InlinePool(Pool):
+class InlinePool:
     """Runs jobs in this process, one after the other: for debuggers and for short work."""
 
     capacity = 1
+    """Number of jobs that may be open at once."""
 
     def __init__(self, work: str, settings: str) -> None:
-        self._work = load_work(work, settings, lambda: None)
+        self._work = import_callable(work)(settings, lambda: None)
         self._key = 0
         self._job: Generator[tuple[str, str]] | None = None
 
@@ -163,34 +154,19 @@ class InlinePool(Pool):
         end_work(self._work)
 
 
-@dataclass(slots=True)
-class _Running:
-    """A job that a worker runs."""
-
-    job: Job
-    heard_s: float
-    """Time of its last message."""
-
-
+@dataclass(slots=True, eq=False)
 class _Slot:
-    """A worker and the jobs that it runs."""
+    """A worker and the jobs that it runs, by their keys."""
 
-    def __init__(self, worker: Worker) -> None:
-        self.worker = worker
-        self.is_ready = False
-        self.running: dict[int, _Running] = {}
-        self.began_s = time.monotonic()
-
-    @property
-    def is_idle(self) -> bool:
-        return self.is_ready and not self.running
-
-    @property
-    def is_lent_whole(self) -> bool:
-        return any(one.job.is_alone for one in self.running.values())
+    worker: Worker
+    is_ready: bool = False
+    jobs: dict[int, Job] = field(default_factory=dict)
+    heard_s: dict[int, float] = field(default_factory=dict)
+    """Time of each job's last message."""
+    began_s: float = field(default_factory=time.monotonic)
 
 
-class WorkerPool(Pool):
+class WorkerPool:
     """Runs jobs on workers, one or several at a time on each."""
 
     def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int, jobs_at_once: int = 1) -> None:
@@ -213,10 +189,10 @@ class WorkerPool(Pool):
         self._assign()
 
     def next_answer(self) -> Answer:
-        """Wait for the next message of any job."""
+        """Wait for the next message of any job. Call only while a submitted job is open."""
         while not self._answers:
             self._assign()
-            busy = [slot for slot in self._slots if not slot.is_idle]
+            busy = [slot for slot in self._slots if slot.jobs or not slot.is_ready]
             left_s = min(self._deadline_s(slot) for slot in busy) - time.monotonic()
             ready = self._host.wait([slot.worker for slot in busy], max(0.0, left_s))
             for slot in busy:
@@ -238,12 +214,12 @@ class WorkerPool(Pool):
         """Return when a worker is given up."""
         if not slot.is_ready:
             return slot.began_s + START_TIMEOUT_S
-        return min(one.heard_s + self._limit_s(one.job) for one in slot.running.values())
+        return min(slot.heard_s[key] + self._limit_s(job) for key, job in slot.jobs.items())
 
     def _assign(self) -> None:
         while self._queue and (slot := self._free_slot(self._queue[0])) is not None:
             job = self._queue.popleft()
-            slot.running[job.key] = _Running(job, time.monotonic())
+            slot.jobs[job.key], slot.heard_s[job.key] = job, time.monotonic()
             slot.worker.send(job.key, job.text)
         num_starting = sum(not slot.is_ready for slot in self._slots)
         num_missing = min(len(self._queue) - num_starting, self._num_workers - len(self._slots))
@@ -253,18 +229,17 @@ class WorkerPool(Pool):
 
     def _free_slot(self, job: Job) -> _Slot | None:
         """Return the worker for the next job: the one with the fewest, which leaves the others their share."""
-        num_open = len(self._queue) + sum(len(slot.running) for slot in self._slots)
-        share = math.ceil(num_open / max(1, self._num_slots))
+        are_all_started = self._num_failed_starts >= MAX_FAILED_STARTS
+        num_slots = sum(slot.is_ready for slot in self._slots) if are_all_started else self._num_workers
+        num_open = len(self._queue) + sum(len(slot.jobs) for slot in self._slots)
+        share = math.ceil(num_open / max(1, num_slots))
         most = 1 if job.is_alone else max(1, min(self._jobs_at_once, share))
-        free = [slot for slot in self._slots if slot.is_ready and len(slot.running) < most and not slot.is_lent_whole]
-        return min(free, key=lambda slot: len(slot.running), default=None)
-
-    @property
-    def _num_slots(self) -> int:
-        """Number of workers that share the jobs: those that run, and those that may still be started."""
-        if self._num_failed_starts >= MAX_FAILED_STARTS:
-            return sum(slot.is_ready for slot in self._slots)
-        return self._num_workers
+        free = [
+            slot
+            for slot in self._slots
+            if slot.is_ready and len(slot.jobs) < most and not any(one.is_alone for one in slot.jobs.values())
+        ]
+        return min(free, key=lambda slot: len(slot.jobs), default=None)
 
     def _receive(self, slot: _Slot) -> None:
         try:
@@ -278,17 +253,16 @@ class WorkerPool(Pool):
             slot.is_ready = True
             self._num_failed_starts = 0
             return
-        running = slot.running.get(message.key)
-        if running is None:
+        if message.key not in slot.jobs:
             return
-        running.heard_s = time.monotonic()
+        slot.heard_s[message.key] = time.monotonic()
         if message.kind != "alive":
             answer = _answer(message)
             self._answers.append(answer)
             if answer.is_end:
                 self._num_failed_starts = 0
                 self._losses.pop(answer.key, None)
-                del slot.running[message.key]
+                del slot.jobs[message.key]
 
     def _lose(self, slot: _Slot, message: str) -> None:
         self._close(slot)
@@ -296,13 +270,13 @@ class WorkerPool(Pool):
             self._num_failed_starts += 1
             if self._num_failed_starts >= MAX_FAILED_STARTS and not self._has_ready:
                 raise EngineError(f"workers do not start: {message}")
-        for key, running in reversed(slot.running.items()):
+        for key, job in reversed(slot.jobs.items()):
             self._losses[key] += 1
             if self._losses[key] <= self._max_losses:
-                self._queue.appendleft(running.job)
+                self._queue.appendleft(job)
             else:
                 del self._losses[key]
-                is_shared = len(slot.running) > 1
+                is_shared = len(slot.jobs) > 1
                 self._answers.append(Answer(key, failure="crash", detail=message, is_shared=is_shared))
 
     def _give_up(self, slot: _Slot) -> None:
@@ -310,11 +284,10 @@ class WorkerPool(Pool):
         self._close(slot)
         if not slot.is_ready:
             raise EngineError(f"a worker was not ready within {START_TIMEOUT_S:g} s")
-        now_s, is_shared = time.monotonic(), len(slot.running) > 1
-        for key, running in reversed(slot.running.items()):
-            limit_s = self._limit_s(running.job)
-            is_silent = now_s - running.heard_s >= limit_s
-            if is_silent:
+        now_s, is_shared = time.monotonic(), len(slot.jobs) > 1
+        for key, job in reversed(slot.jobs.items()):
+            limit_s = self._limit_s(job)
+            if now_s - slot.heard_s[key] >= limit_s:
                 detail = f"not done within {limit_s:g} s"
                 self._answers.append(Answer(key, failure="timeout", detail=detail, is_shared=is_shared))
             else:
@@ -329,6 +302,10 @@ class WorkerPool(Pool):
         for slot in list(self._slots):
             self._close(slot)
         self._host.close()
+
+
+Pool: TypeAlias = InlinePool | WorkerPool
+"""Runs jobs in any order."""
 
 
 def _answer(message: Message) -> Answer:

@@ -9,8 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from evonav.parallel.local import END_TIMEOUT_S, THREAD_VARIABLES
-from evonav.parallel.work import serve
-from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Message, Worker, WorkerLostError, Workforce
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Message, Worker, WorkerLostError, Workforce, serve
 
 
 class RayHost:
@@ -27,7 +26,7 @@ class RayHost:
         Raises:
             EngineError: Ray is not installed, or the cluster cannot be reached or has too little for one worker.
         """
-        num_cpus, num_gpus, address = workforce.num_cpus, workforce.num_gpus, workforce.ray_address
+        num_gpus, address = workforce.num_gpus, workforce.ray_address
         try:
             import ray
         except ImportError as error:
@@ -36,19 +35,19 @@ class RayHost:
         self._arguments = (work, settings, workforce.jobs_at_once > 1)
         self._is_owner = not ray.is_initialized()
         if self._is_owner:
-            num_all = math.ceil(workforce.num_workers * num_cpus)
-            cluster = {"num_cpus": num_all, "include_dashboard": False} if address is None else {"address": address}
+            here = {"num_cpus": workforce.num_workers, "include_dashboard": False}
+            cluster = here if address is None else {"address": address}
             try:
                 ray.init(**cluster, log_to_driver=False, logging_level="ERROR")
             except (ConnectionError, RuntimeError, ValueError) as error:
                 raise EngineError(f"Ray cannot be reached at {address or 'this machine'}: {error}") from error
-        self.max_workers = self._room_for({"CPU": num_cpus, "GPU": num_gpus})
+        self.max_workers = self._room_for({"CPU": 1, "GPU": num_gpus})
         if self.max_workers < 1:
             self.close()
-            needs = f"{num_cpus:g} CPU" + (f", {num_gpus:g} GPU" if num_gpus else "")
+            needs = "1 CPU" + (f", {num_gpus:g} GPU" if num_gpus else "")
             raise EngineError(f"the Ray cluster has too little for one worker ({needs})")
         # A message is always waited for, while jobs are begun.
-        self._actor = ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_restarts=0, max_concurrency=3)(_Actor)
+        self._actor = ray.remote(num_cpus=1, num_gpus=num_gpus, max_restarts=0, max_concurrency=3)(_Actor)
 
     def _room_for(self, needed: dict[str, float]) -> int:
         """Return how many workers with these needs fit into the cluster."""

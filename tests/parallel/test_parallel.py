@@ -1,6 +1,7 @@
 """Pools of workers: every job has one answer, whatever becomes of the workers."""
 
 import sys
+from contextlib import closing
 
 import pytest
 
@@ -101,7 +102,7 @@ class ScriptedHost:
 def test_one_worker_goes_on_alone_where_no_others_start():
     texts = [str(i) for i in range(6)]
     host = ScriptedHost(ScriptedWorker(Message("ready"), *(Message("done", int(text), text) for text in texts)))
-    with WorkerPool(host, 3, 60.0, 2) as pool:
+    with closing(WorkerPool(host, 3, 60.0, 2)) as pool:
         answers = answers_of(pool, texts)
     assert sorted(answer.text for answer in answers.values()) == texts
     # Each job that is done gives the others a few more chances, not endless ones.
@@ -110,7 +111,7 @@ def test_one_worker_goes_on_alone_where_no_others_start():
 
 def test_it_is_an_error_once_that_worker_is_lost_too():
     host = ScriptedHost(ScriptedWorker(Message("ready"), Message("done", 0, "0")))
-    with WorkerPool(host, 3, 60.0, 2) as pool, pytest.raises(EngineError, match="workers do not start: gone"):
+    with closing(WorkerPool(host, 3, 60.0, 2)) as pool, pytest.raises(EngineError, match="workers do not start: gone"):
         answers_of(pool, ["0", "1", "2", "3"])
 
 
@@ -121,14 +122,15 @@ def test_arguments_are_checked():
         Workforce(0, "ray")
     with pytest.raises(InvalidArgumentError, match="Ray address"):
         Workforce(1, ray_address="localhost:1")
-    with pytest.raises(InvalidArgumentError, match="num_cpus > 0"):
-        Workforce(1, "ray", num_cpus=0.0)
+    with pytest.raises(InvalidArgumentError, match=r"num_gpus = -1\.0"):
+        Workforce(1, "ray", num_gpus=-1.0)
 
 
 def test_without_ray_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(EngineError, match=r"pip install 'evonav\[ray\]'"):
-        open_pool("test_parallel:make_echo", "", Workforce(1, "ray"), timeout_s=1.0)
+    pool = open_pool("test_parallel:make_echo", "", Workforce(1, "ray"), timeout_s=1.0)
+    with pytest.raises(EngineError, match=r"pip install 'evonav\[ray\]'"), pool:
+        raise AssertionError("it was opened")
 
 
 def make_broken(settings, alive):
