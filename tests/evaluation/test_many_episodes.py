@@ -286,8 +286,7 @@ def test_forks_are_their_own(tmp_path):
             first.ask("entries")
         assert second.is_usable
         processes.take_back(first)
-        server = processes._fork_server._process
-        server.kill()
+        os.kill(processes._fork_server._pid, signal.SIGKILL)
         waited_for(lambda: not is_running(second._process.pid))
         with pytest.raises(AgentFailedError, match=r"the agent's process died \(killed by signal 9\)"):
             second.ask("entries")

@@ -39,14 +39,8 @@ class Child(NamedTuple):
     """The socket for its state, standard output and error, then those from `SOCKET` on."""
 
 
-class Beside(NamedTuple):
-    """The server that is a fork of this process."""
-
-    pid: int
-    control: socket.socket
-
-
-_beside: Beside | None = None
+_beside: tuple[int, socket.socket] | None = None
+"""Number and connection of the server that is a fork of this process."""
 
 
 def fork_beside() -> bool:
@@ -68,12 +62,12 @@ def fork_beside() -> bool:
         main(control)
         return True
     far.close()
-    _beside = Beside(pid, near)
+    _beside = pid, near
     return False
 
 
-def take_beside() -> Beside | None:
-    """Return the server that is a fork of this process, once."""
+def take_beside() -> tuple[int, socket.socket] | None:
+    """Return number and connection of the server that is a fork of this process, once."""
     global _beside
     found, _beside = _beside, None
     return found
@@ -86,7 +80,8 @@ def main(control: int) -> None:
     gc.freeze()
     _call_oneself(SERVER_NAME)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    child = _requested(control)
+    with socket.socket(fileno=control) as requests:  # a child keeps no trace of it
+        child = _serve(requests)
     if child is None:
         return
     _become(child)
@@ -99,13 +94,8 @@ def main(control: int) -> None:
     serving.main(SOCKET, LIFE, BLOCK)
 
 
-def _requested(control: int) -> Child | None:
-    """Fork as requested, until the evaluator ends; return the request in a child, `None` in this process."""
-    with socket.socket(fileno=control) as requests:  # a child keeps no trace of it
-        return _serve(requests)
-
-
 def _serve(requests: socket.socket) -> Child | None:
+    """Fork as requested, until the evaluator ends; return the request in a child, `None` in this process."""
     poll = select.poll()
     poll.register(requests, select.POLLIN)
     pids: dict[int, int] = {}

@@ -8,10 +8,10 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 from evonav.agents.hosting import forking
 from evonav.agents.hosting.forking import STATE
@@ -24,18 +24,6 @@ START_TIMEOUT_S = 300.0
 _START = (
     "import sys; sys.path[:] = sys.argv[2:]; from evonav.agents.hosting.forking import main; main(int(sys.argv[1]))"
 )
-
-
-class AgentsOwn(Protocol):
-    """A process as `AgentProcess` holds it: a child of this one, or a fork of the server."""
-
-    pid: int
-
-    def poll(self) -> int | None:
-        """Return the exit code, negative for a signal; `None` while the process runs."""
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Wait for the exit code."""
 
 
 class ForkedProcess:
@@ -74,7 +62,7 @@ class ForkedProcess:
     def wait(self, timeout: float | None = None) -> int:
         """Wait for the exit code; `subprocess.TimeoutExpired` if the process still runs."""
         if self._code is None:
-            if not select.select([self._state], [], [], timeout)[0]:
+            if not _is_ready(self._state, timeout):
                 raise subprocess.TimeoutExpired("agent", timeout or 0.0)
             try:
                 _, self._code = self._next_state()
@@ -85,37 +73,6 @@ class ForkedProcess:
     def close(self) -> None:
         """Let its parent reap it, and end what is left of its group; then its number may become another process's."""
         self._state.close()
-
-
-class _OwnFork:
-    """A fork of this process, which has the methods of `subprocess.Popen` that are needed."""
-
-    def __init__(self, pid: int) -> None:
-        self.pid = pid
-        self._code: int | None = None
-
-    def poll(self) -> int | None:
-        if self._code is None:
-            pid, status = os.waitpid(self.pid, os.WNOHANG)
-            self._code = os.waitstatus_to_exitcode(status) if pid else None
-        return self._code
-
-    def wait(self, timeout: float | None = None) -> int:
-        if self._code is None:
-            end = os.pidfd_open(self.pid)
-            try:
-                has_ended = select.select([end], [], [], timeout)[0]
-            finally:
-                os.close(end)
-            if not has_ended:
-                raise subprocess.TimeoutExpired("fork server", timeout or 0.0)
-        code = self.poll()
-        assert code is not None  # it has ended
-        return code
-
-    def kill(self) -> None:
-        if self.poll() is None:
-            os.kill(self.pid, signal.SIGKILL)
 
 
 class ForkServer:
@@ -130,8 +87,12 @@ class ForkServer:
         self._environment = environment
         self._path = path
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | _OwnFork | None = None
         self._control: socket.socket | None = None
+        """Connection to the server; `None` while there is none, and then the fields below have no meaning."""
+        self._pid = 0
+        self._watch = -1
+        """Descriptor by which its end can be waited for."""
+        self._reap: Callable[[], object] = lambda: None
 
     def fork(
         self,
@@ -172,7 +133,7 @@ class ForkServer:
 
     def _send(self, request: bytes, descriptors: Sequence[int]) -> None:
         with self._lock:
-            if self._process is not None and self._process.poll() is not None:
+            if self._control is not None and _is_ready(self._watch, 0.0):
                 self._end()
             if self._control is None:
                 self._start()
@@ -181,11 +142,17 @@ class ForkServer:
 
     def _start(self) -> None:
         if (beside := forking.take_beside()) is not None:
-            self._process, self._control = _OwnFork(beside.pid), beside.control
-            return
+            self._pid, self._control = beside
+            self._reap = partial(os.waitpid, self._pid, 0)
+        else:
+            process, self._control = self._started()
+            self._pid, self._reap = process.pid, process.wait
+        self._watch = os.pidfd_open(self._pid)
+
+    def _started(self) -> tuple["subprocess.Popen[bytes]", socket.socket]:
         near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with far, one_thread_each():
-            self._process = subprocess.Popen(  # noqa: S603 - ourselves
+            process = subprocess.Popen(  # noqa: S603 - ourselves
                 [sys.executable, "-c", _START, str(far.fileno()), *self._path],
                 pass_fds=[far.fileno()],
                 env=self._environment,
@@ -193,7 +160,7 @@ class ForkServer:
                 stdout=sys.__stderr__,
                 start_new_session=True,
             )
-        self._control = near
+        return process, near
 
     def close(self) -> None:
         """End the server and all forks; safe to call twice."""
@@ -201,11 +168,18 @@ class ForkServer:
             self._end()
 
     def _end(self) -> None:
-        if self._control is not None:
-            self._control.close()
-        if self._process is not None:
-            with suppress(subprocess.TimeoutExpired):
-                self._process.wait(timeout=2.0)
-            self._process.kill()
-            self._process.wait()
-        self._control = self._process = None
+        if self._control is None:
+            return
+        self._control.close()
+        if not _is_ready(self._watch, 2.0):
+            os.kill(self._pid, signal.SIGKILL)
+        os.close(self._watch)
+        self._reap()
+        self._control = None
+
+
+def _is_ready(descriptor: int | socket.socket, timeout_s: float | None) -> bool:
+    """Wait until a descriptor can be read; return false if it cannot after some time, or never without a limit."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return bool(poll.poll(None if timeout_s is None else 1000.0 * timeout_s))

@@ -31,7 +31,7 @@ from evonav.agents.hosting.sandbox import Policy
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
-from evonav.evaluation.hosting.fork_server import AgentsOwn, ForkedProcess, ForkServer
+from evonav.evaluation.hosting.fork_server import ForkedProcess, ForkServer
 from evonav.evaluation.hosting.isolation import (
     NO_SETUP,
     AgentHosting,
@@ -165,7 +165,7 @@ class AgentProcess:
 
     def _started(
         self, fork_server: ForkServer | None, inherited: Sequence[int], stderr: int, path: Sequence[str]
-    ) -> AgentsOwn:
+    ) -> "subprocess.Popen[bytes] | ForkedProcess":
         """Start the process.
 
         Args:
