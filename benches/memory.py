@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
 from evonav.memory.presence import DepthEvidence
-from evonav.memory_benchmark.peers.open3d_faiss import Cloud, associate, detect, merged
+from evonav.memory_benchmark.open3d_faiss import Cloud, associate, detect, merged
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
 from evonav.speed_benchmark.records import Row

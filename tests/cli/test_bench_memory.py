@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.cli.bench.memory import chosen_streams
 from evonav.memory_benchmark.references import ObjectMapMemory
-from evonav.memory_benchmark.streams.export import read_exported
+from evonav.memory_benchmark.streams.export.read import ExportedStream
 
 BAD = Path(__file__).parents[1] / "memory_benchmark" / "bad_memories.py"
 SMALL = ["--streams", "S6", "--quick", "--size", "64x48"]
@@ -62,7 +62,7 @@ def test_answers_to_exported_streams_score_as_the_memory_in_process_does(layout,
     assert run.exit_code == 0, run.output
     (folder,) = streams.iterdir()
     assert not (folder / "oracle.jsonl.xz").exists()
-    exported, memory, visit = read_exported(folder), ObjectMapMemory("never"), 0
+    exported, memory, visit = ExportedStream(folder), ObjectMapMemory("never"), 0
     memory.reset(exported.info)
     lines = []
     for frame, _ in exported.frames():

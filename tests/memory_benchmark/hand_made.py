@@ -7,7 +7,7 @@ import numpy as np
 
 from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
-from evonav.sensors.observation import Detections, View, VisibleOccupancy
+from evonav.sensors.observation import NO_OCCUPANCY, Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
 
@@ -26,10 +26,9 @@ def entry(entry_id: int, x_m: float, label: str = "Mug", p: float | None = None)
 
 
 def view(x_m: float = 0.0) -> View:
-    none = np.zeros((0, 2), np.int32)
     detections = Detections(np.full((4, 4), -1, np.int32), (), np.zeros(0, np.float32))
     depth_m = np.full((4, 4), 2.0, np.float32)
-    return View(Pose(x_m, 1.5, 0.0, 0.0), INTRINSICS, depth_m, detections, VisibleOccupancy(none, none))
+    return View(Pose(x_m, 1.5, 0.0, 0.0), INTRINSICS, depth_m, detections, NO_OCCUPANCY)
 
 
 @dataclass

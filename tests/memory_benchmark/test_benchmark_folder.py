@@ -8,10 +8,9 @@ import pytest
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.benchmark import MEMORIES, PEERS, NamedMemory, benchmark, named_memories, record_path
-from evonav.memory_benchmark.report import write_memory_report
+from evonav.memory_benchmark.report import memory_tables, scores, text_of, write_memory_report
 from evonav.memory_benchmark.run import MeasureSettings
-from evonav.memory_benchmark.streams import StreamSpec
-from evonav.memory_benchmark.tables import memory_tables, scores, text_of
+from evonav.memory_benchmark.streams.spec import StreamSpec
 from evonav.statistics import Estimate
 
 SPECS = [StreamSpec("S1", f"bundled:{number}", 0, 64, 48, frames_a_visit=30) for number in (4, 9)]
@@ -29,7 +28,7 @@ class Own:
 
 def run(memories, out, specs=SPECS, **options):
     told: list[tuple[int, int, str]] = []
-    measured = benchmark(
+    result, failures = benchmark(
         memories,
         specs,
         out,
@@ -38,7 +37,7 @@ def run(memories, out, specs=SPECS, **options):
         on_progress=lambda *news: told.append(news),
         **options,
     )
-    return measured, told
+    return result, failures, told
 
 
 def own(tmp_path, extra="pass"):
@@ -49,31 +48,31 @@ def own(tmp_path, extra="pass"):
 
 def test_the_same_command_goes_on_where_it_ended(tmp_path: Path):
     out = tmp_path / "out"
-    first, told = run(named_memories(["never"]), out, SPECS[:1])
+    first, _, told = run(named_memories(["never"]), out, SPECS[:1])
     assert told[-1] == (1, 1, SPECS[0].name)
-    assert [stream.stream for stream in first.result.memories[0].streams] == [SPECS[0].name]
+    assert [stream.stream for stream in first.memories[0].streams] == [SPECS[0].name]
     path = record_path(out, "never", SPECS[0].name)
     written = path.stat().st_mtime_ns
-    both, told = run(named_memories(["never", "numpy-list"]), out)
+    both, failures, told = run(named_memories(["never", "numpy-list"]), out)
     assert told[0] == (1, 4, "")
     assert path.stat().st_mtime_ns == written
-    assert [(memory.memory, len(memory.streams)) for memory in both.result.memories] == [
+    assert [(memory.memory, len(memory.streams)) for memory in both.memories] == [
         ("never", 2),
         ("numpy-list", 2),
     ]
-    assert both.failures == ()
+    assert failures == []
     path.unlink()  # of one memory: the other one's stays
-    again, told = run(named_memories(["never", "numpy-list"]), out)
+    again, _, told = run(named_memories(["never", "numpy-list"]), out)
     assert told[0] == (3, 4, "")
-    assert again.result.memories[0].streams[0].digest == both.result.memories[0].streams[0].digest
+    assert again.memories[0].streams[0].digest == both.memories[0].streams[0].digest
 
 
 def test_a_memory_that_was_edited_is_measured_again(tmp_path: Path):
     out = tmp_path / "out"
     run([own(tmp_path)], out, SPECS[:1])
-    _, told = run([own(tmp_path)], out, SPECS[:1])
+    *_, told = run([own(tmp_path)], out, SPECS[:1])
     assert told == [(1, 1, "")]
-    _, told = run([own(tmp_path, extra="self.num += 2")], out, SPECS[:1])
+    *_, told = run([own(tmp_path, extra="self.num += 2")], out, SPECS[:1])
     assert told[0] == (0, 1, "")
 
 
@@ -81,16 +80,15 @@ def test_a_memory_that_fails_is_a_result_and_a_stream_that_cannot_be_made_is_not
     out = tmp_path / "out"
     broken = own(tmp_path, extra="raise ValueError('no more')")
     nowhere = StreamSpec("S1", str(tmp_path / "nowhere.json"), 0, 64, 48)
-    measured, _ = run([broken], out, [SPECS[0], nowhere])
-    ((memory, stream, why),) = measured.failures
+    measured, ((memory, stream, why),), _ = run([broken], out, [SPECS[0], nowhere])
     assert (memory, stream) == ("own", nowhere.name)
     assert "nowhere.json" in why
-    (result,) = measured.result.memories
+    (result,) = measured.memories
     assert result.failures[0].failure.kind == "raised"
-    table = next(table for table in memory_tables(measured.result) if table.title == "Failures")
+    table = next(table for table in memory_tables(measured) if table.title == "Failures")
     assert table.rows[0][:3] == ("own", SPECS[0].name, "raised")
     assert "no more" in table.rows[0][4]
-    assert memory_tables(measured.result)[0].rows[0][:2] == ("own", "0 (1 failed)")
+    assert memory_tables(measured)[0].rows[0][:2] == ("own", "0 (1 failed)")
 
 
 def test_another_configuration_is_refused(tmp_path: Path):
@@ -125,17 +123,17 @@ def test_mistakes_in_names_are_told(tmp_path: Path):
 
 def test_the_report_has_the_figures_of_the_records(tmp_path: Path):
     out = tmp_path / "out"
-    measured, _ = run(named_memories(["never", "last-wins"]), out)
-    found = scores(measured.result)
+    measured, *_ = run(named_memories(["never", "last-wins"]), out)
+    found = scores(measured)
     assert found["never"]["p95_over_baseline"].value == 1.0
-    for memory in measured.result.memories:
+    for memory in measured.memories:
         counts = [stream.update for stream in memory.streams]
         expected = 100 * sum(one.false_forgets for one in counts) / sum(one.standing for one in counts)
         assert found[memory.memory]["false_forgets"].value == pytest.approx(expected)
-    page = write_memory_report(measured.result, out, num_missing=3)
+    page = write_memory_report(measured, out, num_missing=3)
     text = page.read_text()
     assert "3 records of those asked for are missing" in text
-    table = memory_tables(measured.result)[0]
+    table = memory_tables(measured)[0]
     assert [row[0] for row in table.rows] == ["never", "last-wins"]
     p95 = text_of(found["last-wins"]["observe_cpu_p95_ms"], digits=2)
     assert p95 in text

@@ -10,10 +10,12 @@ from pathlib import Path
 import pytest
 
 from evonav.memory_benchmark.offline import score
-from evonav.memory_benchmark.peers.open3d_faiss import Open3DFaissMemory
+from evonav.memory_benchmark.open3d_faiss import Open3DFaissMemory
 from evonav.memory_benchmark.run import MeasureSettings, measure
-from evonav.memory_benchmark.streams import StreamSpec, make_stream
-from evonav.memory_benchmark.streams.export import export_stream, read_exported
+from evonav.memory_benchmark.streams import make_stream
+from evonav.memory_benchmark.streams.export.read import ExportedStream
+from evonav.memory_benchmark.streams.export.write import export_stream
+from evonav.memory_benchmark.streams.spec import StreamSpec
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOLDER = EXAMPLES / "foreign_memory"
@@ -36,7 +38,7 @@ def exported(stream, tmp_path):
 
 def require_same(folder, memory, stream):
     """Compare all counts of the judge; depth in files is rounded, so a few may differ."""
-    theirs = score(read_exported(folder), folder / "entries.jsonl")
+    theirs = score(ExportedStream(folder), folder / "entries.jsonl")
     ours = measure(memory, stream, MeasureSettings(own_process=False))
     assert ours.failure is None, ours.failure
     assert ours.update is not None

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import pytest
 from hand_made import HandMade, Scripted, Shot, body, entry
 
-from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
-from evonav.memory_benchmark.metrics.updates import ChangeCounts
+from evonav.memory_benchmark.metrics.counts import ChangeCounts
+from evonav.memory_benchmark.metrics.spells import Clocks, Spell
 from evonav.memory_benchmark.protocol import MemoryEntry
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, measure

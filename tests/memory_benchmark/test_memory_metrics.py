@@ -9,22 +9,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evonav.evaluation.episode.staleness import matched_object
-from evonav.memory_benchmark.metrics.belief import BeliefSums, calibration_error
 from evonav.memory_benchmark.metrics.costs import (
     Sample,
     byte_note,
     growth_per_minute,
     percentiles,
-    real_time_factor,
     slope_per_100_entries,
     slope_per_1000_frames,
     theil_sen,
     thinned,
 )
+from evonav.memory_benchmark.metrics.counts import (
+    BeliefScore,
+    BeliefSnapshot,
+    ChangeCounts,
+    QueryCounts,
+    calibration_error,
+    change_counts,
+    true_rank,
+)
 from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
-from evonav.memory_benchmark.metrics.retrieval import Queries, true_rank
-from evonav.memory_benchmark.metrics.staleness import kaplan_meier
-from evonav.memory_benchmark.metrics.updates import BeliefSnapshot, ChangeCounts, change_counts
+from evonav.memory_benchmark.metrics.spells import half_life, kaplan_meier
 from evonav.memory_benchmark.protocol import FoundPlace
 from evonav.world.simulator import SceneObject
 
@@ -55,28 +60,27 @@ def test_match_is_that_of_the_evaluation(bodies: list, entries: list) -> None:
 def test_kaplan_meier_with_censoring() -> None:
     # The example of every textbook: 6 patients, ends at 1, 3, 3, 6 and two that were lost at 2 and 6.
     durations = np.array([1.0, 2.0, 3.0, 3.0, 6.0, 6.0])
-    curve = kaplan_meier(durations, np.array([True, False, True, True, True, False]))
-    assert curve.durations.tolist() == [1.0, 3.0, 6.0]
-    assert curve.shares.tolist() == pytest.approx([5 / 6, 5 / 6 * 2 / 4, 5 / 6 * 2 / 4 * 1 / 2])
-    assert float(curve.half_life) == 3.0
+    ends, shares = kaplan_meier(durations, np.array([True, False, True, True, True, False]))
+    assert ends.tolist() == [1.0, 3.0, 6.0]
+    assert shares.tolist() == pytest.approx([5 / 6, 5 / 6 * 2 / 4, 5 / 6 * 2 / 4 * 1 / 2])
+    assert float(half_life(ends, shares)) == 3.0
 
 
-def test_half_life_is_infinite_where_half_of_it_stays() -> None:
-    curve = kaplan_meier(np.array([1.0, 5.0, 5.0]), np.array([True, False, False]))
-    assert math.isinf(float(curve.half_life))
-    assert math.isinf(float(kaplan_meier(np.array([5.0]), np.array([False])).half_life))
+@pytest.mark.parametrize(("durations", "is_over"), [([1.0, 5.0, 5.0], [True, False, False]), ([5.0], [False])])
+def test_half_life_is_infinite_where_half_of_it_stays(durations: list[float], is_over: list[bool]) -> None:
+    assert math.isinf(float(half_life(*kaplan_meier(np.array(durations), np.array(is_over)))))
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.booleans()), min_size=1, max_size=20))
 def test_kaplan_meier_against_a_loop(spells: list[tuple[int, bool]]) -> None:
     durations = np.array([float(duration) for duration, _ in spells])
-    curve = kaplan_meier(durations, np.array([over for _, over in spells]))
+    _, shares = kaplan_meier(durations, np.array([over for _, over in spells]))
     share, expected = 1.0, []
     for time in sorted({duration for duration, over in spells if over}):
         at_risk = sum(duration >= time for duration, _ in spells)
         share *= 1.0 - sum(duration == time and over for duration, over in spells) / at_risk
         expected.append(share)
-    assert curve.shares.tolist() == pytest.approx(expected)
+    assert shares.tolist() == pytest.approx(expected)
 
 
 def test_percentiles_in_milliseconds() -> None:
@@ -108,13 +112,10 @@ def test_theil_sen_is_the_median_of_pairs() -> None:
 
 
 def test_thinned_takes_medians() -> None:
-    samples = thinned(np.arange(1000), np.full(1000, 7), np.where(np.arange(1000) % 5 == 0, 100.0, 1.0), 100)
+    frames = np.arange(1000)
+    samples = thinned(np.column_stack([frames, np.full(1000, 7), np.where(frames % 5 == 0, 100.0, 1.0)]), 100)
     assert len(samples) == 100
     assert samples[0] == Sample(4.5, 7.0, 1.0)
-
-
-def test_real_time_factor() -> None:
-    assert real_time_factor(0.05, 2.0) == pytest.approx(10.0)
 
 
 def test_leak_of_a_megabyte_a_minute() -> None:
@@ -132,13 +133,13 @@ def test_note_of_bytes_needs_a_large_growth() -> None:
 
 
 def test_belief_scores() -> None:
-    sums = BeliefSums()
-    sums.take(np.array([0.8, 0.8, 0.3, np.nan]), np.array([True, False, False, True]))
+    sums = BeliefScore()
+    sums.take(np.array([0.8, 0.8, 0.3]), np.array([True, False, False]))
     assert sums.n == 3
     assert sums.squared_error == pytest.approx(0.04 + 0.64 + 0.09)
     assert sums.log_loss == pytest.approx(-math.log(0.8) - math.log(0.2) - math.log(0.7))
     # Two of 0.8 with one right: off by 0.6; one of 0.3 with none right: off by 0.3.
-    assert float(calibration_error(sums.bins)) == pytest.approx((0.6 + 0.3) / 3)
+    assert float(calibration_error(np.array(sums.bins))) == pytest.approx((0.6 + 0.3) / 3)
     sums.take(np.array([0.0, 1.0]), np.array([True, False]))
     assert math.isfinite(sums.log_loss)
     assert math.isnan(float(calibration_error(np.zeros((10, 3)))))
@@ -149,13 +150,10 @@ def test_rank_of_the_true_place() -> None:
     far, near = FoundPlace((5.0, 1.0, 0.0), 0.9), FoundPlace((2.0, 1.0, 0.0), 0.1)  # 0.9 m from the box
     assert true_rank([mug], [far, near]) == 2
     assert true_rank([mug], [far]) is None
-    queries = Queries()
-    queries.take([mug], [far, near], "before")
-    queries.take([mug], [near], "before")
-    queries.take([mug], [], "after")
-    before = queries.of_state["before"]
-    assert (before.n, before.hits_at_1, before.hits_at_5, before.reciprocal_ranks) == (2, 1, 2, 1.5)
-    assert queries.of_state["after"].n == 1
+    counts = QueryCounts()
+    for places in ([far, near], [near], []):
+        counts.take([mug], places)
+    assert counts == QueryCounts(n=3, hits_at_1=1, hits_at_5=2, reciprocal_ranks=1.5)
 
 
 def test_change_counts_over_three_visits() -> None:

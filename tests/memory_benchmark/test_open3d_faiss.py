@@ -7,11 +7,12 @@ from itertools import islice
 import pytest
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.peers import open3d_faiss
-from evonav.memory_benchmark.peers.open3d_faiss import Open3DFaissMemory
+from evonav.memory_benchmark import open3d_faiss
+from evonav.memory_benchmark.open3d_faiss import Open3DFaissMemory
 from evonav.memory_benchmark.references import ObjectMapMemory
 from evonav.memory_benchmark.run import MeasureSettings, measure
-from evonav.memory_benchmark.streams import StreamSpec, make_stream
+from evonav.memory_benchmark.streams import make_stream
+from evonav.memory_benchmark.streams.spec import StreamSpec
 
 HAS_PEER = find_spec("open3d") is not None and find_spec("faiss") is not None
 NUM_FRAMES = 24

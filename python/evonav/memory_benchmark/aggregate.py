@@ -2,16 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
-from evonav.memory_benchmark.metrics.belief import NUM_BINS, calibration_error
-from evonav.memory_benchmark.metrics.costs import Percentiles
-from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
-from evonav.memory_benchmark.metrics.staleness import Clock, SpellKind, durations_of, risk_table, survival
-from evonav.memory_benchmark.metrics.updates import ChangeCounts, UpdateCounts
-from evonav.memory_benchmark.records import BeliefScore, MemoryResult, StreamResult
+from evonav.memory_benchmark.metrics.counts import NUM_BINS, calibration_error
+from evonav.memory_benchmark.metrics.spells import Clock, SpellKind, durations_of, half_life, risk_table, survival
+from evonav.memory_benchmark.records import MemoryResult, StreamResult
 from evonav.statistics import ClusterBootstrap, Estimate
 
 BASELINE = "never"
@@ -21,17 +18,15 @@ NUM_RESAMPLES = 2_000
 """Resamples of houses: five of them have only 126 different ones."""
 
 Streams = Sequence[StreamResult]
-Better = Literal["lower", "higher"]
+Estimator = Callable[[Streams, ClusterBootstrap], Estimate]
 
 
 @dataclass(frozen=True, slots=True)
 class MemoryMetric:
-    """One number of a memory: its name, and how it is taken from streams."""
+    """One number of a memory."""
 
-    name: str
-    unit: str
-    better: Better
-    estimate: Callable[[Streams, ClusterBootstrap], Estimate]
+    estimate: Estimator
+    is_higher_better: bool = False
     is_time: bool = False
     """Whether it depends on the machine."""
 
@@ -46,7 +41,7 @@ def estimates(result: MemoryResult, kind: str | None = None) -> dict[str, Estima
     if not streams:
         return {}
     bootstrap = bootstrap_of(streams)
-    found = {figure.name: figure.estimate(streams, bootstrap) for figure in METRICS}
+    found = {name: metric.estimate(streams, bootstrap) for name, metric in METRICS.items()}
     return {name: estimate for name, estimate in found.items() if estimate.value is not None}
 
 
@@ -74,8 +69,8 @@ def ratios(result: MemoryResult, baseline: MemoryResult, kind: str | None = None
         return {}
     bootstrap = bootstrap_of(ours)
     found = {}
-    for name, get in RATIOS.items():
-        pairs = [(get(one), get(other)) for one, other in zip(ours, theirs, strict=True)]
+    for name, path in RATIOS.items():
+        pairs = [(_value(one, path), _value(other, path)) for one, other in zip(ours, theirs, strict=True)]
         values = np.array([(a, b) if a is not None and b is not None else (0.0, 0.0) for a, b in pairs])
         sums = bootstrap.sums(values)
         estimate = bootstrap.ratio(sums[:, 0], sums[:, 1], int(np.count_nonzero(values[:, 1])))
@@ -84,49 +79,61 @@ def ratios(result: MemoryResult, baseline: MemoryResult, kind: str | None = None
     return found
 
 
+def _value(stream: StreamResult, path: str) -> float | None:
+    """Return a number of a record, such as `speed.observe_cpu.p95_ms`; `None` where a part of the path is missing."""
+    value: Any = stream
+    for name in path.split("."):
+        value = value.get(name) if isinstance(value, dict) else getattr(value, name)
+        if value is None:
+            return None
+    return float(value)
+
+
 # Ways to take an estimate
 
 
-def _mean(get: Callable[[StreamResult], float | None]) -> Callable[[Streams, ClusterBootstrap], Estimate]:
+def _mean(path: str) -> Estimator:
     """Take the mean over streams that have the value."""
 
     def estimate(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
-        values = [get(stream) for stream in streams]
-        rows = np.array([(0.0, 0.0) if value is None else (value, 1.0) for value in values])
-        sums = bootstrap.sums(rows)
-        return bootstrap.ratio(sums[:, 0], sums[:, 1], int(rows[:, 1].sum()))
+        values = [_value(stream, path) for stream in streams]
+        sums = bootstrap.sums(np.array([(0.0, 0.0) if value is None else (value, 1.0) for value in values]))
+        return bootstrap.ratio(sums[:, 0], sums[:, 1], int(sums[:, 1].sum()))
 
     return estimate
 
 
-def _largest(get: Callable[[StreamResult], float | None]) -> Callable[[Streams, ClusterBootstrap], Estimate]:
+def _largest(path: str) -> Estimator:
     def estimate(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
-        values = [value for stream in streams if (value := get(stream)) is not None]
+        values = [value for stream in streams if (value := _value(stream, path)) is not None]
         return Estimate(max(values, default=None), None, len(values), bootstrap.num_clusters)
 
     return estimate
 
 
-def _share(
-    get: Callable[[StreamResult], tuple[float, float] | None], scale: float = 1.0
-) -> Callable[[Streams, ClusterBootstrap], Estimate]:
-    """Take a ratio of sums over streams."""
+def _share(above: str, below: str, scale: float = 1.0) -> Estimator:
+    """Take a ratio of sums over streams; each of both is a sum of numbers of a record: `update.moves + update.seen`."""
 
     def estimate(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
-        rows = np.array([get(stream) or (0.0, 0.0) for stream in streams], np.float64)
+        rows = np.array([[_sum(stream, paths) for paths in (above, below)] for stream in streams])
         sums = bootstrap.sums(rows)
         return bootstrap.ratio(scale * sums[:, 0], sums[:, 1], round(float(rows[:, 1].sum())))
 
     return estimate
 
 
-def _of_counts(
-    get: Callable[[UpdateCounts], tuple[float, float]], scale: float = 1.0
-) -> Callable[[Streams, ClusterBootstrap], Estimate]:
-    return _share(lambda stream: None if stream.update is None else get(stream.update), scale)
+def _sum(stream: StreamResult, paths: str) -> float:
+    return sum(_value(stream, path) or 0.0 for path in paths.split(" + "))
 
 
-def _half_life(kind: SpellKind, clock: Clock) -> Callable[[Streams, ClusterBootstrap], Estimate]:
+def _f1(*claims: str) -> Estimator:
+    """Take 2 TP / (2 TP + FP + FN) over claims of some sorts."""
+    twice = " + ".join(f"update.{claim}.hits + update.{claim}.hits" for claim in claims)
+    wrong = " + ".join(f"update.{claim}.false_alarms + update.{claim}.misses" for claim in claims)
+    return _share(twice, f"{twice} + {wrong}")
+
+
+def _half_life(kind: SpellKind, clock: Clock) -> Estimator:
     def estimate(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
         parts = [durations_of(stream.spells, kind, clock) for stream in streams]
         durations, is_over = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -135,25 +142,27 @@ def _half_life(kind: SpellKind, clock: Clock) -> Callable[[Streams, ClusterBoots
         houses = np.repeat(bootstrap.cluster_of, [len(part[0]) for part in parts])
         ends, at_risk, over = risk_table(durations, is_over)
         sums = bootstrap.sums(np.hstack([at_risk, over]), houses)
-        total, resampled = sums.sum(axis=0), bootstrap.resampled_sums(sums)
-        value = float(survival(ends, total[: len(ends)], total[len(ends) :]).half_life)
-        half_lives = survival(ends, resampled[:, : len(ends)], resampled[:, len(ends) :]).half_life
-        return bootstrap.estimate(value, half_lives, len(durations))
+        half_lives = [
+            half_life(ends, survival(totals[..., : len(ends)], totals[..., len(ends) :]))
+            for totals in (sums.sum(axis=0), bootstrap.resampled_sums(sums))
+        ]
+        return bootstrap.estimate(float(half_lives[0]), half_lives[1], len(durations))
 
     return estimate
 
 
-def _not_over(kind: SpellKind) -> Callable[[Streams, ClusterBootstrap], Estimate]:
-    def counts(stream: StreamResult) -> tuple[float, float]:
-        _, is_over = durations_of(stream.spells, kind, "frames")
-        return float((~is_over).sum()), float(len(is_over))
+def _not_over(kind: SpellKind) -> Estimator:
+    def estimate(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
+        ended = [durations_of(stream.spells, kind, "frames")[1] for stream in streams]
+        sums = bootstrap.sums([(float((~is_over).sum()), float(len(is_over))) for is_over in ended])
+        return bootstrap.ratio(100.0 * sums[:, 0], sums[:, 1], round(float(sums[:, 1].sum())))
 
-    return _share(counts, 100.0)
+    return estimate
 
 
 def _ece(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
-    empty = [(0.0, 0.0, 0.0)] * NUM_BINS
-    rows = np.array([empty if stream.belief is None else stream.belief.bins for stream in streams], np.float64)
+    empty = np.zeros((NUM_BINS, 3))
+    rows = np.array([empty if stream.belief is None else stream.belief.bins for stream in streams])
     sums = bootstrap.sums(rows.reshape(len(streams), -1))
     total = sums.sum(axis=0).reshape(NUM_BINS, 3)
     if not total[:, 0].sum():
@@ -162,143 +171,64 @@ def _ece(streams: Streams, bootstrap: ClusterBootstrap) -> Estimate:
     return bootstrap.estimate(float(calibration_error(total)), calibration_error(resampled), int(total[:, 0].sum()))
 
 
-def _of_belief(get: Callable[[BeliefScore], float]) -> Callable[[Streams, ClusterBootstrap], Estimate]:
-    return _share(lambda stream: None if stream.belief is None else (get(stream.belief), stream.belief.n))
+_TIMED = [f"{call}_{clock}" for call in ("observe", "locate") for clock in ("cpu", "wall")]
+_DONE = "update.removals_done"
 
-
-def _of_queries(
-    state: QueryState, get: Callable[[QueryCounts], float]
-) -> Callable[[Streams, ClusterBootstrap], Estimate]:
-    def counts(stream: StreamResult) -> tuple[float, float] | None:
-        found = None if stream.queries is None else stream.queries.get(state)
-        return None if found is None else (get(found), found.n)
-
-    return _share(counts, 100.0)
-
-
-def _time(call: str, percentile: str) -> Callable[[StreamResult], float | None]:
-    def get(stream: StreamResult) -> float | None:
-        times: Percentiles | None = None if stream.speed is None else getattr(stream.speed, call)
-        return None if times is None else float(getattr(times, percentile))
-
-    return get
-
-
-def _speed(name: str) -> Callable[[StreamResult], float | None]:
-    return lambda stream: None if stream.speed is None else getattr(stream.speed, name)
-
-
-def _size(name: str) -> Callable[[StreamResult], float | None]:
-    return lambda stream: None if stream.size is None else getattr(stream.size, name)
-
-
-def _f1(*counts: ChangeCounts) -> tuple[float, float]:
-    hits = 2.0 * sum(one.hits for one in counts)
-    return hits, hits + sum(one.false_alarms + one.misses for one in counts)
-
-
-def _removal_f1(counts: UpdateCounts) -> tuple[float, float]:
-    missed = counts.removals - counts.removals_done
-    return 2.0 * counts.removals_done, 2.0 * counts.removals_done + missed + counts.false_forgets
-
-
-_TIMES = [
-    MemoryMetric(
-        f"{call}_{clock}_{name}_ms", "ms", "lower", _mean(_time(f"{call}_{clock}", f"{name}_ms")), is_time=True
-    )
-    for call in ("observe", "locate")
-    for clock in ("cpu", "wall")
-    for name in ("p50", "p95", "p99")
-]
-_LARGEST = [
-    MemoryMetric(f"{call}_{clock}_max_ms", "ms", "lower", _largest(_time(f"{call}_{clock}", "max_ms")), is_time=True)
-    for call in ("observe", "locate")
-    for clock in ("cpu", "wall")
-]
-_SLOPES = [
-    MemoryMetric(name, "ms", "lower", _mean(_speed(name)), is_time=True)
-    for name in ("slope_per_100_entries_ms", "slope_per_1000_frames_ms")
-]
-_SIZES = [
-    MemoryMetric("bytes_per_entry", "B", "lower", _mean(_size("bytes_per_entry"))),
-    MemoryMetric("rss_growth_mb_per_minute", "MB/min", "lower", _mean(_size("rss_growth_mb_per_minute")), is_time=True),
-    MemoryMetric("peak_rss_mb", "MB", "lower", _largest(_size("peak_rss_mb")), is_time=True),
-]
-_UPDATES = [
-    MemoryMetric(
-        "removal_precision",
-        "",
-        "higher",
-        _of_counts(lambda counts: (counts.removals_done, counts.removals_done + counts.false_forgets)),
-    ),
-    MemoryMetric("removal_recall", "", "higher", _of_counts(lambda counts: (counts.removals_done, counts.removals))),
-    MemoryMetric("removal_f1", "", "higher", _of_counts(_removal_f1)),
-    MemoryMetric("addition_recall", "", "higher", _of_counts(lambda counts: (counts.additions_done, counts.additions))),
-    MemoryMetric("move_recall", "", "higher", _of_counts(lambda counts: (counts.moves_done, counts.moves))),
-    MemoryMetric(
-        "false_forgets", "%", "lower", _of_counts(lambda counts: (counts.false_forgets, counts.standing), 100.0)
-    ),
-    MemoryMetric(
-        "false_forgets_at_end",
-        "%",
-        "lower",
-        _of_counts(lambda counts: (counts.false_forgets_at_end, counts.standing), 100.0),
-    ),
-    MemoryMetric("duplicates", "%", "lower", _of_counts(lambda counts: (counts.duplicates, counts.remembered), 100.0)),
-    MemoryMetric("precision", "", "higher", _of_counts(lambda counts: (counts.right_entries, counts.entries))),
-    MemoryMetric("recall", "", "higher", _of_counts(lambda counts: (counts.seen_remembered, counts.seen))),
-    MemoryMetric("change_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone, counts.come))),
-    MemoryMetric("disappeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.gone))),
-    MemoryMetric("appeared_f1", "", "higher", _of_counts(lambda counts: _f1(counts.come))),
-]
-_STALENESS = [
-    MemoryMetric("half_life_frames", "frames", "lower", _half_life("evident", "frames")),
-    MemoryMetric("half_life_evidence_frames", "frames", "lower", _half_life("evident", "evidence_frames")),
-    MemoryMetric("half_life_s", "s", "lower", _half_life("evident", "seconds")),
-    MemoryMetric("half_life_m", "m", "lower", _half_life("evident", "metres")),
-    MemoryMetric("half_life_unseen_frames", "frames", "lower", _half_life("unseen", "frames")),
-    MemoryMetric("half_life_to_find_frames", "frames", "lower", _half_life("appeared", "frames")),
-    MemoryMetric("never_cleared", "%", "lower", _not_over("evident")),
-    MemoryMetric("never_found", "%", "lower", _not_over("appeared")),
-]
-_BELIEFS = [
-    MemoryMetric("brier", "", "lower", _of_belief(lambda belief: belief.squared_error)),
-    MemoryMetric("nll", "nats", "lower", _of_belief(lambda belief: belief.log_loss)),
-    MemoryMetric("ece", "", "lower", _ece),
-]
-_STATES: tuple[QueryState, ...] = ("before", "after", "after_evidence")
-_QUERIES = [
-    figure
-    for state in _STATES
-    for figure in (
-        MemoryMetric(f"hit_at_1_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_1)),
-        MemoryMetric(f"hit_at_5_{state}", "%", "higher", _of_queries(state, lambda counts: counts.hits_at_5)),
-        MemoryMetric(f"mrr_{state}", "%", "higher", _of_queries(state, lambda counts: counts.reciprocal_ranks)),
-    )
-]
-_REAL_TIME = MemoryMetric("real_time_factor", "", "higher", _mean(_speed("real_time_factor")), is_time=True)
-
-METRICS: tuple[MemoryMetric, ...] = (
-    *_TIMES,
-    *_LARGEST,
-    *_SLOPES,
-    _REAL_TIME,
-    *_SIZES,
-    *_UPDATES,
-    *_STALENESS,
-    *_BELIEFS,
-    *_QUERIES,
-)
-"""All figures; docs/memory-benchmark.md defines them."""
-
-RATIOS: dict[str, Callable[[StreamResult], float | None]] = {
+METRICS: dict[str, MemoryMetric] = {
     **{
-        f"{call}_{clock}_{name}_ms": _time(f"{call}_{clock}", f"{name}_ms")
-        for call in ("observe", "locate")
-        for clock in ("cpu", "wall")
-        for name in ("p50", "p95")
+        f"{timed}_{name}_ms": MemoryMetric(_mean(f"speed.{timed}.{name}_ms"), is_time=True)
+        for timed in _TIMED
+        for name in ("p50", "p95", "p99")
     },
-    "bytes_per_entry": _size("bytes_per_entry"),
-    "peak_rss_mb": _size("peak_rss_mb"),
+    **{f"{timed}_max_ms": MemoryMetric(_largest(f"speed.{timed}.max_ms"), is_time=True) for timed in _TIMED},
+    "slope_per_100_entries_ms": MemoryMetric(_mean("speed.slope_per_100_entries_ms"), is_time=True),
+    "slope_per_1000_frames_ms": MemoryMetric(_mean("speed.slope_per_1000_frames_ms"), is_time=True),
+    "real_time_factor": MemoryMetric(_mean("speed.real_time_factor"), is_higher_better=True, is_time=True),
+    "bytes_per_entry": MemoryMetric(_mean("size.bytes_per_entry")),
+    "rss_growth_mb_per_minute": MemoryMetric(_mean("size.rss_growth_mb_per_minute"), is_time=True),
+    "peak_rss_mb": MemoryMetric(_largest("size.peak_rss_mb"), is_time=True),
+    **{
+        name: MemoryMetric(estimator, is_higher_better=True)
+        for name, estimator in {
+            "removal_precision": _share(_DONE, f"{_DONE} + update.false_forgets"),
+            "removal_recall": _share(_DONE, "update.removals"),
+            "removal_f1": _share(f"{_DONE} + {_DONE}", f"{_DONE} + update.removals + update.false_forgets"),
+            "addition_recall": _share("update.additions_done", "update.additions"),
+            "move_recall": _share("update.moves_done", "update.moves"),
+            "precision": _share("update.right_entries", "update.entries"),
+            "recall": _share("update.seen_remembered", "update.seen"),
+            "change_f1": _f1("gone", "come"),
+            "disappeared_f1": _f1("gone"),
+            "appeared_f1": _f1("come"),
+        }.items()
+    },
+    "false_forgets": MemoryMetric(_share("update.false_forgets", "update.standing", 100.0)),
+    "false_forgets_at_end": MemoryMetric(_share("update.false_forgets_at_end", "update.standing", 100.0)),
+    "duplicates": MemoryMetric(_share("update.duplicates", "update.remembered", 100.0)),
+    "half_life_frames": MemoryMetric(_half_life("evident", "frames")),
+    "half_life_evidence_frames": MemoryMetric(_half_life("evident", "evidence_frames")),
+    "half_life_s": MemoryMetric(_half_life("evident", "seconds")),
+    "half_life_m": MemoryMetric(_half_life("evident", "metres")),
+    "half_life_unseen_frames": MemoryMetric(_half_life("unseen", "frames")),
+    "half_life_to_find_frames": MemoryMetric(_half_life("appeared", "frames")),
+    "never_cleared": MemoryMetric(_not_over("evident")),
+    "never_found": MemoryMetric(_not_over("appeared")),
+    "brier": MemoryMetric(_share("belief.squared_error", "belief.n")),
+    "nll": MemoryMetric(_share("belief.log_loss", "belief.n")),
+    "ece": MemoryMetric(_ece),
+    **{
+        f"{name}_{state}": MemoryMetric(
+            _share(f"queries.{state}.{counts}", f"queries.{state}.n", 100.0), is_higher_better=True
+        )
+        for state in ("before", "after", "after_evidence")
+        for name, counts in (("hit_at_1", "hits_at_1"), ("hit_at_5", "hits_at_5"), ("mrr", "reciprocal_ranks"))
+    },
+}
+"""All figures by name; docs/memory-benchmark-metrics.md defines them."""
+
+RATIOS: dict[str, str] = {
+    **{f"{timed}_{name}_ms": f"speed.{timed}.{name}_ms" for timed in _TIMED for name in ("p50", "p95")},
+    "bytes_per_entry": "size.bytes_per_entry",
+    "peak_rss_mb": "size.peak_rss_mb",
 }
 """The values that are divided by the baseline's, by figure."""

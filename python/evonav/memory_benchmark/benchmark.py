@@ -20,8 +20,10 @@ from evonav.memory.forgetting import RULES
 from evonav.memory_benchmark.protocol import Memory
 from evonav.memory_benchmark.records import BenchmarkResult, MemoryHeader, MemoryResult, StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, MemorySource, measure_all
-from evonav.memory_benchmark.streams import StreamSpec, make_stream
-from evonav.memory_benchmark.streams.export.recording import RecordingSpec
+from evonav.memory_benchmark.streams import make_stream
+from evonav.memory_benchmark.streams.export.recording import Recording
+from evonav.memory_benchmark.streams.spec import StreamSpec
+from evonav.memory_benchmark.truth import Stream
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.report.machine import machine_name
 from evonav.report.measurements import finished, read_model
@@ -31,7 +33,7 @@ SILENCE_S = 600.0
 """Time without a frame after which a job is given up; the time limit of a call of a memory ends earlier."""
 HEADER_NAME, RECORD_DIR = "memory.json", "records"
 
-AnySpec = StreamSpec | RecordingSpec
+AnyStream = StreamSpec | Recording
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +46,6 @@ class NamedMemory:
     """Run it in the worker, not in a process of its own, unless the settings say where memories run."""
 
     @property
-    def source(self) -> MemorySource:
-        """Return what the runner makes it from."""
-        return self.component.create if self.runs_here else self.component
-
-    @property
     def digest(self) -> str | None:
         """SHA-256 of the file that it is written in; `None` for a module."""
         path = Path(self.component.path.rpartition(":")[0])
@@ -58,28 +55,15 @@ class NamedMemory:
         return None
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredMemories:
-    """Result of a command."""
-
-    result: BenchmarkResult
-    """All memories of the folder in the streams that were asked for."""
-    failures: tuple[tuple[str, str, str], ...]
-    """Memory, stream and last line of what went wrong with a job; the same command tries them again.
-
-    The failure of a memory is no failure of its job: it is part of the result.
-    """
-
-
 def benchmark(
     memories: Sequence[NamedMemory],
-    streams: Sequence[AnySpec],
+    streams: Sequence[AnyStream],
     out: Path,
     *,
     settings: MeasureSettings | None = None,
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
-) -> MeasuredMemories:
+) -> tuple[BenchmarkResult, list[tuple[str, str, str]]]:
     """Run every memory through every stream, and keep a record of each in a folder.
 
     Args:
@@ -89,6 +73,10 @@ def benchmark(
         num_workers: Number of processes; 0 runs everything in this one.
         on_progress: Called with the number of records there are, of those asked for, and the name of the latest
             stream.
+
+    Returns:
+        All memories of the folder in these streams; and memory, stream and last line of what went wrong with a job: the
+        same command tries it again. The failure of a memory is no failure of its job, but part of the result.
 
     Raises:
         InvalidArgumentError: There is no memory or stream, or one is named twice.
@@ -114,8 +102,12 @@ def benchmark(
         failures: list[tuple[str, str, str]] = []
         on_progress(num_done, num_all, "")
 
-        def text_of(job: tuple[AnySpec, list[NamedMemory]]) -> str:
-            return json.dumps({"stream": asdict(job[0]), "memories": list(map(asdict, job[1]))})
+        def text_of(job: tuple[AnyStream, list[NamedMemory]]) -> str:
+            stream, left = job
+            source = (
+                {"folder": str(stream.folder), "up": stream.up} if isinstance(stream, Recording) else asdict(stream)
+            )
+            return json.dumps({"stream": source, "memories": list(map(asdict, left))})
 
         config = json.dumps(asdict(settings))
         ended = finished(WORK, config, jobs, text_of, num_workers=num_workers, timeout_s=SILENCE_S)
@@ -127,7 +119,7 @@ def benchmark(
                     write_atomically(record_path(out, memory.name, stream.name), record + "\n")
             num_done += len(left)
             on_progress(num_done, num_all, stream.name)
-        return MeasuredMemories(read_folder(out, known, streams), tuple(sorted(failures)))
+        return read_folder(out, known, streams), sorted(failures)
 
 
 def record_path(folder: Path, memory: str, stream: str) -> Path:
@@ -135,7 +127,7 @@ def record_path(folder: Path, memory: str, stream: str) -> Path:
     return folder / RECORD_DIR / slug(memory) / f"{stream.replace('/', '_')}.json"
 
 
-def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnySpec]) -> BenchmarkResult:
+def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnyStream]) -> BenchmarkResult:
     """Read the records of memories in streams; those that are missing are left out.
 
     Raises:
@@ -159,9 +151,14 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
     def work(text: str) -> str:
         given = json.loads(text)
         memories = [NamedMemory(**{**one, "component": Component(**one["component"])}) for one in given["memories"]]
-        sources = [memory.component if run_settings.own_process else memory.source for memory in memories]
-        spec = given["stream"]
-        stream = RecordingSpec(**spec).read() if "folder" in spec else make_stream(StreamSpec(**spec))
+        sources: list[MemorySource] = [
+            memory.component.create if memory.runs_here and not run_settings.own_process else memory.component
+            for memory in memories
+        ]
+        source = given["stream"]
+        stream: Stream = (
+            Recording(Path(source["folder"]), source["up"]) if "folder" in source else make_stream(StreamSpec(**source))
+        )
         results = measure_all(sources, stream, run_settings, alive=alive)
         return json.dumps([result.model_dump_json() for result in results])
 
@@ -197,7 +194,7 @@ MEMORIES: dict[str, Component[Memory]] = {
 `clean-up` never forgets but by the clean-up of agents' maps, which drops entries with one detection.
 """
 PEERS: dict[str, Component[Memory]] = {
-    "open3d-faiss": Component("evonav.memory_benchmark.peers.open3d_faiss:Open3DFaissMemory"),
+    "open3d-faiss": Component("evonav.memory_benchmark.open3d_faiss:Open3DFaissMemory"),
 }
 """Memories of other libraries, which need the extra `bench`."""
 

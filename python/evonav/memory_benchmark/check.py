@@ -2,19 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from itertools import chain, islice
 
 import numpy as np
 
 from evonav.counted import counted
-from evonav.evaluation.contract.points import Check
+from evonav.evaluation.contract.points import Check, ContractReport
 from evonav.memory_benchmark.answers import MemoryFailedError
-from evonav.memory_benchmark.hosting.local import LocalMemory
+from evonav.memory_benchmark.local import HostedMemory
 from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import HostedMemory, MeasureSettings, MemorySource, host, measure
+from evonav.memory_benchmark.run import MeasureSettings, MemorySource, host, measure
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
-from evonav.sensors.observation import Detections, View, VisibleOccupancy
+from evonav.sensors.observation import NO_OCCUPANCY, Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
 
@@ -27,26 +27,7 @@ _MUG_SIZE_M = _BLOCK_PX / _FOCAL_PX * _MUG_M
 _MUG = SceneObject("mug", "Mug", "object", (0.0, _HEIGHT_M, _MUG_M), (_MUG_SIZE_M, _MUG_SIZE_M, 0.1))
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class MemoryReport:
-    """The result of all checks of a memory."""
-
-    memory: str
-    checks: tuple[Check, ...]
-
-    @property
-    def is_ok(self) -> bool:
-        """True if no check failed; there may be warnings."""
-        return not any(check.verdict == "fail" for check in self.checks)
-
-    def __repr__(self) -> str:
-        """Return the conclusion and every check, a line each."""
-        width = max(len(check.name) for check in self.checks)
-        lines = [f"{check.verdict:4}  {check.name:{width}}  {check.finding}" for check in self.checks]
-        return "\n".join([f"{self.memory}: {'keeps' if self.is_ok else 'breaks'} the contract", *lines])
-
-
-def check_memory(memory: MemorySource, *, timeout_s: float = 60.0) -> MemoryReport:
+def check_memory(memory: MemorySource, *, timeout_s: float = 60.0) -> ContractReport:
     """Run a memory through a tiny stream and check that it keeps the contract; no exception of it is raised.
 
     The stream shows a mug for four frames, and in a second visit the place where it stood for four more.
@@ -66,7 +47,7 @@ def check_memory(memory: MemorySource, *, timeout_s: float = 60.0) -> MemoryRepo
         ['updates']
     """
     name = memory if isinstance(memory, str) else getattr(memory, "path", None) or getattr(memory, "__name__", "memory")
-    return MemoryReport(str(name), tuple(_checks(memory, MeasureSettings(timeout_s=timeout_s, runs_twice=True))))
+    return ContractReport(str(name), tuple(_checks(memory, MeasureSettings(timeout_s=timeout_s, runs_twice=True))))
 
 
 def _checks(memory: MemorySource, settings: MeasureSettings) -> Iterator[Check]:
@@ -136,7 +117,7 @@ def _determinism(result: StreamResult) -> Check:
 
 def _reset(memory: HostedMemory, stream: "_TinyStream") -> Check:
     try:
-        _show(memory, stream, range(_NUM_FRAMES))
+        _show(memory, stream, _NUM_FRAMES)
         memory.reset(stream.info)
         num_left = len(memory.entries())
     except MemoryFailedError as error:
@@ -148,18 +129,14 @@ def _reset(memory: HostedMemory, stream: "_TinyStream") -> Check:
 
 def _last_points(memory: HostedMemory, stream: "_TinyStream") -> Iterator[Check]:
     """Check in this process what another one would hide: whether it writes into what it is given."""
-    assert isinstance(memory, LocalMemory)
-    before = [_arrays(frame) for frame, _ in stream.frames()]
+    before = [[array.copy() for array in frame.arrays()] for frame, _ in stream.frames()]
     try:
-        times_ms = _show(memory, stream, range(2 * _NUM_FRAMES))
+        times_ms = _show(memory, stream, 2 * _NUM_FRAMES)
     except MemoryFailedError as error:
         yield Check("frames", "fail", f"in this process: {error}")
         return
-    after = [_arrays(frame) for frame, _ in stream.frames()]
-    is_same = all(
-        np.array_equal(a, b) for old, new in zip(before, after, strict=True) for a, b in zip(old, new, strict=True)
-    )
-    if is_same:
+    after = [frame.arrays() for frame, _ in stream.frames()]
+    if all(map(np.array_equal, chain(*before), chain(*after))):
         yield Check("frames", "pass", "the arrays that it received are unchanged")
     else:
         yield Check("frames", "warn", "it writes into the arrays that it receives: copy them")
@@ -168,13 +145,11 @@ def _last_points(memory: HostedMemory, stream: "_TinyStream") -> Iterator[Check]
     yield Check("time", "warn" if np.median(times_ms) > SLOW_FRAME_MS else "pass", finding)
 
 
-def _show(memory: HostedMemory, stream: "_TinyStream", indices: Sequence[int]) -> list[float]:
-    """Show some frames of the stream from its start, and return the wall time of each in ms."""
+def _show(memory: HostedMemory, stream: "_TinyStream", num_frames: int) -> list[float]:
+    """Show the first frames of the stream, and return the wall time of each in ms."""
     memory.reset(stream.info)
     times_ms, visit = [], 0
-    for frame, _ in stream.frames():
-        if frame.index not in indices:
-            break
+    for frame, _ in islice(stream.frames(), num_frames):
         if frame.visit != visit:
             memory.visit(frame.time_s)
             visit = frame.visit
@@ -182,12 +157,6 @@ def _show(memory: HostedMemory, stream: "_TinyStream", indices: Sequence[int]) -
         times_ms.append(0.0 if cost is None else cost.wall_s * 1e3)
         memory.entries()
     return times_ms
-
-
-def _arrays(frame: MemoryFrame) -> list[np.ndarray]:
-    view = frame.view
-    assert view.rgb is not None
-    return [view.depth_m.copy(), view.rgb.copy(), view.detections.masks.copy(), view.detections.confidences.copy()]
 
 
 class _TinyStream:
@@ -198,7 +167,7 @@ class _TinyStream:
     def __init__(self) -> None:
         fov_rad = 2.0 * float(np.arctan(_SIDE_PX / 2.0 / _FOCAL_PX))
         self.info = StreamInfo(Intrinsics(_SIDE_PX, _SIDE_PX, fov_rad), ("Mug",), rate_hz=2.0)
-        self.changes = (TrueChange("mug", "Mug", "removed", _NUM_FRAMES, _MUG, None),)
+        self.changes: Sequence[TrueChange] = [TrueChange("mug", "Mug", "removed", _NUM_FRAMES, _MUG, None)]
         self._views = [self._view(is_there=index < _NUM_FRAMES) for index in range(2 * _NUM_FRAMES)]
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
@@ -222,12 +191,11 @@ class _TinyStream:
             middle = slice((_SIDE_PX - _BLOCK_PX) // 2, (_SIDE_PX + _BLOCK_PX) // 2)
             depth_m[middle, middle], masks[middle, middle], rgb[middle, middle] = _MUG_M, 0, (180, 30, 30)
         labels = ("Mug",) if is_there else ()
-        none = np.zeros((0, 2), np.int32)
         return View(
             pose=Pose(0.0, _HEIGHT_M, 0.0, 0.0, 0.0),
             intrinsics=self.info.intrinsics,
             depth_m=depth_m,
             detections=Detections(masks, labels, np.ones(len(labels), np.float32)),
-            occupancy=VisibleOccupancy(none, none),
+            occupancy=NO_OCCUPANCY,
             rgb=rgb,
         )

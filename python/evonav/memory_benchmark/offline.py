@@ -9,10 +9,10 @@ from pydantic.dataclasses import dataclass
 
 from evonav.errors import StoreError
 from evonav.memory_benchmark.answers import CheckedEntries, Hosting, MemoryFailedError, read_entries
-from evonav.memory_benchmark.hosting.local import Cost
-from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
+from evonav.memory_benchmark.local import Cost, HostedMemory
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, StreamInfo
 from evonav.memory_benchmark.records import StreamResult
-from evonav.memory_benchmark.run import MeasureSettings, judge_memories
+from evonav.memory_benchmark.run import measure
 from evonav.memory_benchmark.truth import Stream
 from evonav.records import sentence_of
 
@@ -49,16 +49,13 @@ def score(stream: Stream, entries_file: Path) -> StreamResult:
     Raises:
         StoreError: The file cannot be read, or a line is wrong; the message has file, line, field and value.
     """
-    return judge_memories([lambda: _Answers(entries_file)], stream, MeasureSettings())[0]
+    return measure(_Answers(entries_file), stream)
 
 
-class _Answers:
+class _Answers(HostedMemory):
     """A memory whose answers are read from a file."""
 
     hosting: Hosting = "offline"
-    can_locate = False
-    rss_bytes: int | None = None
-    peak_rss_bytes: int | None = None
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -105,10 +102,6 @@ class _Answers:
             raise StoreError(f"{self._path}, line {line}: frame = {answer.frame}: the last frame is {self._last}")
         return self._num_bytes
 
-    def locate(self, text: str, k: int) -> tuple[list[FoundPlace], Cost]:
-        """Refuse: files hold no answers to questions."""
-        raise NotImplementedError
-
     def close(self) -> None:
         """Close the file."""
         self._lines.close()
@@ -120,13 +113,9 @@ def _read_lines(path: Path) -> Generator[tuple[int, FrameAnswer]]:
         with path.open("rb") as file:
             for number, line in enumerate(file, start=1):
                 if line.strip():
-                    yield number, _read(path, number, line)
+                    try:
+                        yield number, _ANSWER.validate_json(line, strict=True)
+                    except ValidationError as error:
+                        raise StoreError(f"{path}, line {number}: {sentence_of(error)}") from None
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-
-
-def _read(path: Path, number: int, line: bytes) -> FrameAnswer:
-    try:
-        return _ANSWER.validate_json(line, strict=True)
-    except ValidationError as error:
-        raise StoreError(f"{path}, line {number}: {sentence_of(error)}") from None

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
 
 from evonav.records import Point3
 from evonav.sensors.observation import View
@@ -33,14 +35,17 @@ class MemoryFrame:
     view: View
     """Pose, depth, colours and detections."""
 
+    def arrays(self) -> list[NDArray[Any]]:
+        """Return the arrays that it has: depth, colours, masks, confidences, features."""
+        found = self.view.detections
+        every = (self.view.depth_m, self.view.rgb, found.masks, found.confidences, found.features)
+        return [array for array in every if array is not None]
 
-def read_only(frame: MemoryFrame) -> MemoryFrame:
-    """Make the arrays of a frame read-only, since all memories of a run are given the same ones; return the frame."""
-    found = frame.view.detections
-    for array in (frame.view.depth_m, frame.view.rgb, found.masks, found.confidences, found.features):
-        if array is not None:
+    def read_only(self) -> "MemoryFrame":
+        """Make its arrays read-only, since all memories of a run are given the same ones; return the frame."""
+        for array in self.arrays():
             array.flags.writeable = False
-    return frame
+        return self
 
 
 @dataclass(frozen=True, slots=True)

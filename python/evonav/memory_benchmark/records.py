@@ -7,9 +7,8 @@ from typing import Any
 from evonav.errors import InvalidArgumentError
 from evonav.memory_benchmark.answers import FailureKind, Hosting
 from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
-from evonav.memory_benchmark.metrics.retrieval import QueryCounts, QueryState
-from evonav.memory_benchmark.metrics.staleness import Spell
-from evonav.memory_benchmark.metrics.updates import UpdateCounts
+from evonav.memory_benchmark.metrics.counts import BeliefScore, QueryCounts, QueryState, UpdateCounts
+from evonav.memory_benchmark.metrics.spells import Spell
 from evonav.records import Version
 from evonav.report.measurements import MeasurementRecord, read_model
 
@@ -38,15 +37,6 @@ class Speed(MeasurementRecord):
     slope_per_1000_frames_ms: float | None
     samples: tuple[Sample, ...]
     """Time over frames and entries, thinned, for plots."""
-
-
-class BeliefScore(MeasurementRecord):
-    """Sums over entries with a `p_present`, see `metrics.belief.BeliefSums`."""
-
-    n: int
-    squared_error: float
-    log_loss: float
-    bins: tuple[tuple[float, float, float], ...]
 
 
 class StreamResult(MeasurementRecord):

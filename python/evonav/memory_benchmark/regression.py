@@ -48,12 +48,12 @@ def _figures(now: MemoryResult, before: MemoryResult) -> Iterator[BeforeAfter]:
     if not ours:
         return
     bootstrap = bootstrap_of(ours)
-    for metric in METRICS:
+    for name, metric in METRICS.items():
         if metric.is_time:
             continue
         new, old = metric.estimate(ours, bootstrap), metric.estimate(theirs, bootstrap)
         if new.value is not None and old.value is not None:
-            yield _difference(now.memory, metric.name, new, old, is_lower_better=metric.better == "lower")
+            yield _difference(f"{now.memory}: {name}", new, old, is_higher_better=metric.is_higher_better)
 
 
 def _times(
@@ -62,25 +62,21 @@ def _times(
     ours, theirs = paired(now.streams, before.streams)
     new_ratios = ratios(now.model_copy(update={"streams": tuple(ours)}), base_now)
     old_ratios = ratios(before.model_copy(update={"streams": tuple(theirs)}), base_before)
-    for metric in METRICS:
-        if not metric.is_time or metric.name not in new_ratios or metric.name not in old_ratios:
-            continue
-        new, old = new_ratios[metric.name], old_ratios[metric.name]
-        assert new.value is not None
-        assert old.value is not None
-        is_large = max(new.value, old.value) > TIME_TOLERANCE * min(new.value, old.value)
-        yield _difference(now.memory, metric.name, new, old, is_lower_better=True, is_large=is_large)
+    for name in (name for name in new_ratios if name in old_ratios and METRICS[name].is_time):
+        values = [found[name].value or 0.0 for found in (new_ratios, old_ratios)]
+        is_large = max(values) > TIME_TOLERANCE * min(values)
+        yield _difference(f"{now.memory}: {name}", new_ratios[name], old_ratios[name], is_large=is_large)
 
 
 def _difference(
-    memory: str, name: str, new: Estimate, old: Estimate, *, is_lower_better: bool, is_large: bool = True
+    name: str, new: Estimate, old: Estimate, *, is_higher_better: bool = False, is_large: bool = True
 ) -> BeforeAfter:
     assert new.value is not None
     assert old.value is not None
     if new.value == old.value:  # also of two infinite ones
-        return BeforeAfter(f"{memory}: {name}", old.value, new.value, is_worse=False)
+        return BeforeAfter(name, old.value, new.value, is_worse=False)
     ci95 = new.minus(old).ci95
     low, high = ci95 if ci95 is not None else (new.value - old.value,) * 2
     is_up, is_down = is_large and low > _EPSILON, is_large and high < -_EPSILON
-    is_worse, is_better = (is_up, is_down) if is_lower_better else (is_down, is_up)
-    return BeforeAfter(f"{memory}: {name}", old.value, new.value, is_worse, is_better, ci95)
+    is_worse, is_better = (is_down, is_up) if is_higher_better else (is_up, is_down)
+    return BeforeAfter(name, old.value, new.value, is_worse, is_better, ci95)

@@ -1,21 +1,148 @@
-"""Write the files of a run: `report.html`, `plot.svg` where matplotlib is installed, `result.json`, `summary.md`."""
+"""Show a result: its tables and plots, and the files of a run.
+
+They are `report.html`, `plot.svg` where matplotlib is installed, `result.json` and `summary.md`.
+"""
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from evonav.memory_benchmark.metrics.staleness import durations_of, kaplan_meier
-from evonav.memory_benchmark.records import BenchmarkResult
-from evonav.memory_benchmark.tables import HALF_LIFE, P95, Scores, memory_tables, scores
+from evonav.memory_benchmark.aggregate import BASELINE, estimates, ratios
+from evonav.memory_benchmark.metrics.spells import durations_of, kaplan_meier
+from evonav.memory_benchmark.records import BenchmarkResult, kinds_of
+from evonav.memory_benchmark.streams.spec import TITLES
 from evonav.parallel.folders import write_atomically
-from evonav.report.pages.template import page_text, text_of
+from evonav.report.pages.template import page_text
+from evonav.report.pages.template import text_of as file_text
 from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.specs import CurvePlot, Dot, Line, Plot, ScatterPlot
 from evonav.report.plots.style import plot_css
-from evonav.report.tables.table import markdown_tables
+from evonav.report.tables.numbers import NONE
+from evonav.report.tables.table import Table, markdown_tables
+from evonav.statistics import Estimate
 
 PAGE_NAME, JSON_NAME, MARKDOWN_NAME, PLOT_NAME = "report.html", "result.json", "summary.md", "plot.svg"
+
+NOT_REACHED = "not reached"
+FAILURES, REMARKS = "Failures", "Notes"
+"""Titles of tables that are there only if they have rows."""
+P95 = "observe_cpu_p95_ms"
+HALF_LIFE = "half_life_evidence_frames"
+RATIO = "p95_over_baseline"
+
+Column = tuple[str, str, float, int]
+"""Name of a figure, heading, factor and digits."""
+COLUMNS: tuple[Column, ...] = (
+    (P95, "p95 ms", 1.0, 2),
+    (RATIO, f"/ {BASELINE}", 1.0, 2),
+    ("slope_per_100_entries_ms", "ms per 100 entries", 1.0, 2),
+    (HALF_LIFE, "half-life, frames", 1.0, 1),
+    ("false_forgets", "false forgets %", 1.0, 2),
+    ("removal_f1", "removal F1 %", 100.0, 1),
+    ("change_f1", "change F1 %", 100.0, 1),
+    ("hit_at_1_before", "hit@1 before %", 1.0, 1),
+    ("hit_at_1_after_evidence", "hit@1 after %", 1.0, 1),
+    ("bytes_per_entry", "bytes an entry", 1.0, 0),
+)
+MORE: tuple[Column, ...] = (
+    ("observe_wall_p95_ms", "p95 wall ms", 1.0, 2),
+    ("locate_cpu_p95_ms", "locate p95 ms", 1.0, 3),
+    ("real_time_factor", "x real time", 1.0, 0),
+    ("slope_per_1000_frames_ms", "ms per 1,000 frames", 1.0, 2),
+    ("rss_growth_mb_per_minute", "RSS MB/min", 1.0, 1),
+    ("precision", "entries right %", 100.0, 1),
+    ("recall", "seen and remembered %", 100.0, 1),
+    ("duplicates", "duplicates %", 1.0, 1),
+    ("removal_recall", "removals %", 100.0, 1),
+    ("addition_recall", "additions %", 100.0, 1),
+    ("move_recall", "moves as one entry %", 100.0, 1),
+    ("half_life_s", "half-life, s", 1.0, 1),
+    ("half_life_m", "half-life, m", 1.0, 1),
+    ("half_life_unseen_frames", "unseen, frames", 1.0, 0),
+    ("never_cleared", "never cleared %", 1.0, 1),
+    ("hit_at_1_after", "hit@1 unaware %", 1.0, 1),
+    ("brier", "Brier", 1.0, 3),
+    ("nll", "NLL", 1.0, 3),
+    ("ece", "ECE", 1.0, 3),
+)
+NOTES = (
+    f"p95: 95th percentile of observe in CPU ms, mean over streams; / {BASELINE}: over that of the memory {BASELINE} "
+    "in the same streams. Half-life: frames with evidence after which half of the stale entries are gone (Kaplan and "
+    "Meier). Hit@1 before: of labels of which no object has changed; after: of which one has, and was seen to.",
+    "Intervals: 95%, houses resampled; – where one house or equal houses give none.",
+)
+
+Scores = Mapping[str, Mapping[str, Estimate]]
+"""Figures by memory and name."""
+
+
+def scores(result: BenchmarkResult, kind: str | None = None) -> dict[str, dict[str, Estimate]]:
+    """Return the figures of all memories, and the ratio of each to the baseline.
+
+    Args:
+        kind: Kind of streams; default: all.
+    """
+    baseline = next((one for one in result.memories if one.memory == BASELINE), None)
+    found = {}
+    for memory in result.memories:
+        figures = estimates(memory, kind)
+        ratio = None if baseline is None else ratios(memory, baseline, kind).get(P95)
+        found[memory.memory] = figures if ratio is None else {**figures, RATIO: ratio}
+    return found
+
+
+def memory_tables(result: BenchmarkResult) -> list[Table]:
+    """Build all tables: the main one, further figures, one for each kind of stream, failures, and notes."""
+    found = scores(result)
+    tables = [_table("Memories", result, found, COLUMNS, None, NOTES), _table("More", result, found, MORE, None)]
+    titles = {str(kind): f"{kind}: {title}" for kind, title in TITLES.items()}
+    kinds = kinds_of(result.memories)
+    for kind in kinds if len(kinds) > 1 else ():
+        tables.append(_table(titles.get(kind, kind), result, scores(result, kind), COLUMNS, kind))
+    rows = tuple(
+        (memory.memory, one.stream, one.failure.kind, str(one.num_frames), one.failure.message)
+        for memory in result.memories
+        for one in memory.failures
+        if one.failure is not None
+    )
+    if rows:
+        tables.append(Table(FAILURES, ("memory", "stream", "what", "frames", "message"), rows))
+    noted = tuple(
+        (memory.memory, one.stream, note) for memory in result.memories for one in memory.streams for note in one.notes
+    )
+    return [*tables, Table(REMARKS, ("memory", "stream", "note"), noted)] if noted else tables
+
+
+def _table(
+    title: str,
+    result: BenchmarkResult,
+    found: Scores,
+    columns: Sequence[Column],
+    kind: str | None,
+    notes: tuple[str, ...] = (),
+) -> Table:
+    cells = {
+        heading: [text_of(found[memory.memory].get(name), scale, digits) for memory in result.memories]
+        for name, heading, scale, digits in columns
+    }
+    shown = {heading: texts for heading, texts in cells.items() if set(texts) != {NONE}}
+    streams = []
+    for memory in result.memories:
+        num_failed = len([one for one in memory.failures if kind in (None, one.kind)])
+        streams.append(f"{len(memory.of_kind(kind))}{f' ({num_failed} failed)' if num_failed else ''}")
+    rows = zip([memory.memory for memory in result.memories], streams, *shown.values(), strict=True)
+    return Table(title, ("memory", "streams", *shown), tuple(rows), notes)
+
+
+def text_of(estimate: Estimate | None, scale: float = 1.0, digits: int = 1) -> str:
+    """Return a value with its interval: `3.0 [2.0, 5.0]`; infinite ones are `not reached` and `∞`."""
+    if estimate is None or estimate.value is None:
+        return NONE
+    value = NOT_REACHED if math.isinf(estimate.value) else f"{scale * estimate.value:.{digits}f}"
+    ends = ", ".join("∞" if math.isinf(end) else f"{scale * end:.{digits}f}" for end in estimate.ci95 or ())
+    return f"{value} [{ends or NONE}]"
 
 
 def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: int = 0) -> Path:
@@ -30,17 +157,18 @@ def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: i
     Raises:
         StoreError: A file cannot be written.
     """
-    found, tables = scores(result), memory_tables(result)
+    tables = memory_tables(result)
     folder.mkdir(parents=True, exist_ok=True)
     write_atomically(folder / JSON_NAME, result.model_dump_json() + "\n")
     write_atomically(folder / MARKDOWN_NAME, markdown_tables(tables))
-    plot = main_plot(found)
-    if plot.dots and has_renderer():
-        write_plots([plot], folder / PLOT_NAME)
+    latency, survival = latency_plot(scores(result)), survival_plot(result)
+    plots: list[Plot] = [*([latency] if latency.dots else []), *([survival] if survival.lines else [])]
+    if latency.dots and has_renderer():
+        write_plots([latency], folder / PLOT_NAME)
     streams = {stream.stream: stream for memory in result.memories for stream in memory.streams}
     text = page_text(
         "memory.html.j2",
-        text_of("report.css") + plot_css() + text_of("perception.css"),
+        file_text("report.css") + plot_css() + file_text("perception.css"),
         machine=result.machine,
         version=result.evonav_version,
         names=[memory.memory for memory in result.memories],
@@ -48,7 +176,7 @@ def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: i
         num_houses=len({stream.house for stream in streams.values()}),
         missing=num_missing,
         tables=tables,
-        plots=plot_elements(memory_plots(result, found)),
+        plots=plot_elements(plots),
     )
     return write_atomically(folder / PAGE_NAME, text)
 
@@ -57,7 +185,7 @@ MAX_FRAMES = 30
 """Frames of evidence that the survival curves show."""
 
 
-def main_plot(found: Scores) -> ScatterPlot:
+def latency_plot(found: Scores) -> ScatterPlot:
     """Return the plot of latency and half-life; memories without either are left out."""
     dots = []
     for name, figures in found.items():
@@ -86,18 +214,6 @@ def main_plot(found: Scores) -> ScatterPlot:
     )
 
 
-def memory_plots(result: BenchmarkResult, found: Scores) -> list[Plot]:
-    """Return the plots of a run, in reading order; those without anything to show are left out."""
-    plots: list[Plot] = []
-    main = main_plot(found)
-    if main.dots:
-        plots.append(main)
-    survival = survival_plot(result)
-    if survival.lines:
-        plots.append(survival)
-    return plots
-
-
 def survival_plot(result: BenchmarkResult) -> CurvePlot:
     """Return the share of stale entries that outlast so many frames of evidence, a line a memory."""
     lines = []
@@ -106,10 +222,9 @@ def survival_plot(result: BenchmarkResult) -> CurvePlot:
         durations, is_over = durations_of(spells, "evident", "evidence_frames")
         if not len(durations):
             continue
-        survival = kaplan_meier(durations, is_over)
+        ends, left = kaplan_meier(durations, is_over)
         frames = np.arange(MAX_FRAMES + 1)
-        number = np.searchsorted(survival.durations, frames, side="right")
-        shares = np.concatenate([[1.0], survival.shares])[number]
+        shares = np.concatenate([[1.0], left])[np.searchsorted(ends, frames, side="right")]
         points = tuple(zip(frames.astype(float).tolist(), (100.0 * shares).tolist(), strict=True))
         lines.append(Line(memory.memory, points, has_dots=False))
     return CurvePlot(

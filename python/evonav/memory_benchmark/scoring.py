@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 
 from evonav.evaluation.episode.staleness import STALE_MARGIN_M
 from evonav.memory_benchmark.answers import CheckedEntries
-from evonav.memory_benchmark.metrics.belief import BeliefSums
+from evonav.memory_benchmark.metrics.counts import (
+    BeliefScore,
+    BeliefSnapshot,
+    PlaceKey,
+    QueryCounts,
+    QueryState,
+    UpdateCounts,
+    change_counts,
+)
 from evonav.memory_benchmark.metrics.matching import NONE, BodyBoxes
-from evonav.memory_benchmark.metrics.retrieval import Queries
-from evonav.memory_benchmark.metrics.staleness import Clocks, Spell
-from evonav.memory_benchmark.metrics.tracked_change import TrackedChange, tracked
-from evonav.memory_benchmark.metrics.updates import EVIDENCE_PX, BeliefSnapshot, PlaceKey, UpdateCounts, change_counts
+from evonav.memory_benchmark.metrics.spells import Clocks, Spell, TrackedChange
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryFrame, StreamInfo
-from evonav.memory_benchmark.truth import FrameTruth, TrueChange
+from evonav.memory_benchmark.truth import EVIDENCE_PX, FrameTruth, TrueChange
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.simulator import SceneObject
 
@@ -26,32 +31,26 @@ BELIEVED_P = 0.5
 """An entry whose `p_present` is below is not believed: it counts in the belief scores alone."""
 
 
-@dataclass(slots=True)
 class _Scene:
     """The bodies of the house, and what the memory has of them. All arrays are over the bodies of `boxes`."""
 
-    objects: Sequence[SceneObject]
-    boxes: BodyBoxes
-    keys: list[PlaceKey]
-    index_of: dict[str, int]
-    is_object: NDArray[np.bool_]
-    num_matched: NDArray[np.intp]
-    """Right entries of each object in the last answer."""
-    is_covered: NDArray[np.bool_]
-    """Whether an entry of the object's label was near it in the last answer, perhaps nearer to another object."""
-    was_remembered: NDArray[np.bool_]
-    """Whether the object had a right entry in this visit or just before it."""
-    is_lost: NDArray[np.bool_]
-    """Whether it lost one in this visit."""
+    def __init__(self, objects: Sequence[SceneObject], boxes: BodyBoxes, keys: list[PlaceKey]) -> None:
+        self.objects, self.boxes, self.keys = objects, boxes, keys
+        self.index_of = {body.id: index for index, body in enumerate(boxes.bodies)}
+        self.is_object = np.array([body.kind == "object" for body in boxes.bodies], np.bool_)
+        self.num_matched = np.zeros(len(boxes), np.intp)
+        """Right entries of each object in the last answer."""
+        self.is_covered = np.zeros(len(boxes), np.bool_)
+        """Whether an entry of the object's label was near it in the last answer, perhaps nearer to another object."""
+        self.was_remembered = np.zeros(len(boxes), np.bool_)
+        """Whether the object had a right entry in this visit or just before it."""
+        self.is_lost = np.zeros(len(boxes), np.bool_)
+        """Whether it lost one in this visit."""
 
-
-@dataclass(frozen=True, slots=True)
-class _Answer:
-    """The last answer of a visit. Doors and windows are not counted."""
-
-    entries: CheckedEntries
-    num_believed: int
-    num_right: int
+    def num_entries_of(self, object_id: str) -> int:
+        """Return the right entries that an object has."""
+        index = self.index_of.get(object_id)
+        return 0 if index is None else int(self.num_matched[index])
 
 
 @dataclass(slots=True)
@@ -61,8 +60,10 @@ class Judge:
     info: StreamInfo
     changes: Sequence[TrueChange]
     counts: UpdateCounts = field(default_factory=UpdateCounts)
-    belief: BeliefSums = field(default_factory=BeliefSums)
-    queries: Queries = field(default_factory=Queries)
+    belief: BeliefScore = field(default_factory=BeliefScore)
+    queries: dict[QueryState, QueryCounts] = field(
+        default_factory=lambda: {"before": QueryCounts(), "after": QueryCounts(), "after_evidence": QueryCounts()}
+    )
     snapshots: list[BeliefSnapshot] = field(default_factory=list)
     tracked: list[TrackedChange] = field(default_factory=list)
     seen: set[PlaceKey] = field(default_factory=set)
@@ -73,7 +74,8 @@ class Judge:
     _stale: BodyBoxes = field(default_factory=lambda: BodyBoxes(()))
     _stale_changes: list[TrackedChange] = field(default_factory=list)
     _believed_old: frozenset[PlaceKey] = frozenset()
-    _answer: _Answer | None = None
+    _answer: tuple[CheckedEntries, int, int] | None = None
+    """The visit's last answer, and its numbers of believed and of right entries; doors and windows are not counted."""
     _digest: "hashlib._Hash" = field(default_factory=hashlib.sha256)
 
     def look(self, frame: MemoryFrame, truth: FrameTruth) -> None:
@@ -109,7 +111,7 @@ class Judge:
         scene.is_lost |= (scene.num_matched > 0) & ~scene.is_covered
         scene.was_remembered |= num_matched > 0
         scene.num_matched = num_matched
-        self._answer = _Answer(entries, len(believed), int((matches != NONE).sum()))
+        self._answer = (entries, len(believed), int((matches != NONE).sum()))
         self._believe_changes(entries, np.flatnonzero(is_believed & (matches == NONE)))
 
     def end_visit(self) -> None:
@@ -117,7 +119,8 @@ class Judge:
         scene, counts = self._scene, self.counts
         if scene is None or self._answer is None:
             return
-        self._take_belief(self._answer.entries)
+        entries, num_believed, num_right = self._answer
+        self._take_belief(entries)
         self._close_standing(np.ones(len(scene.boxes), np.bool_))
         is_remembered = scene.num_matched > 0
         scene.was_remembered, scene.is_lost = is_remembered.copy(), np.zeros_like(is_remembered)
@@ -125,8 +128,8 @@ class Judge:
             self._judge_removal(one)
             self._judge_arrival(one)
         is_seen = np.array([key in self.seen for key in scene.keys], np.bool_) & scene.is_object
-        counts.entries += self._answer.num_believed
-        counts.right_entries += self._answer.num_right
+        counts.entries += num_believed
+        counts.right_entries += num_right
         counts.seen += int(is_seen.sum())
         counts.seen_remembered += int((is_seen & is_remembered).sum())
         counts.remembered += int(is_remembered.sum())
@@ -168,11 +171,8 @@ class Judge:
             and (one.new_key is None or one.is_seen or not one.is_current)
             for one in of_label
         )
-        self.queries.take(
-            [body for body in scene.boxes.bodies if body.category == label],
-            places,
-            "before" if not of_label else "after_evidence" if is_known else "after",
-        )
+        state: QueryState = "before" if not of_label else "after_evidence" if is_known else "after"
+        self.queries[state].take([body for body in scene.boxes.bodies if body.category == label], places)
 
     def end(self) -> tuple[UpdateCounts, list[Spell]]:
         """Close the stream, and return its counts and spells."""
@@ -220,10 +220,9 @@ class Judge:
                     self._judge_arrival(earlier)
                     earlier.is_current = False
             key = (change.object_id, self.num_changes_of[change.object_id])
-            is_vacated = change.before is not None and _is_uncovered(change.before, boxes)
-            is_remembered = is_vacated and remembered.get(key, 0) > 0
-            self.tracked.append(tracked(index, change, self.clocks, key[1], is_remembered=is_remembered))
-            self.tracked[-1].is_open = is_vacated
+            is_open = change.before is not None and _is_uncovered(change.before, boxes)
+            is_remembered = is_open and remembered.get(key, 0) > 0
+            self.tracked.append(TrackedChange(index, change, self.clocks, key[1], is_remembered, is_open))
             self.num_changes_of[change.object_id] += 1
         for one in self.tracked:
             if one.is_open and one.change.before is not None and not _is_uncovered(one.change.before, boxes):
@@ -232,35 +231,18 @@ class Judge:
         self._stale_changes = [one for one in self.tracked if one.is_open]
         self._stale = BodyBoxes([one.change.before for one in self._stale_changes if one.change.before is not None])
         self._believed_old = frozenset()
-        self._scene = self._remapped(before, objects, boxes)
-
-    def _remapped(self, before: _Scene | None, objects: Sequence[SceneObject], boxes: BodyBoxes) -> _Scene:
-        keys = [(body.id, self.num_changes_of[body.id]) for body in boxes.bodies]
-        size = len(boxes)
-        scene = _Scene(
-            objects=objects,
-            boxes=boxes,
-            keys=keys,
-            index_of={body.id: index for index, body in enumerate(boxes.bodies)},
-            is_object=np.array([body.kind == "object" for body in boxes.bodies], np.bool_),
-            num_matched=np.zeros(size, np.intp),
-            is_covered=np.zeros(size, np.bool_),
-            was_remembered=np.zeros(size, np.bool_),
-            is_lost=np.zeros(size, np.bool_),
-        )
+        scene = _Scene(objects, boxes, [(body.id, self.num_changes_of[body.id]) for body in boxes.bodies])
         if before is not None:
             source = {key: index for index, key in enumerate(before.keys)}
-            pairs = [(source[key], index) for index, key in enumerate(keys) if key in source]
+            pairs = [(source[key], index) for index, key in enumerate(scene.keys) if key in source]
             old, now = np.array(pairs, np.intp).reshape(-1, 2).T
-            scene.num_matched[now] = before.num_matched[old]
-            scene.is_covered[now] = before.is_covered[old]
-            scene.was_remembered[now] = before.was_remembered[old]
-            scene.is_lost[now] = before.is_lost[old]
+            for name in ("num_matched", "is_covered", "was_remembered", "is_lost"):
+                getattr(scene, name)[now] = getattr(before, name)[old]
             is_gone = np.ones(len(before.boxes), np.bool_)
             is_gone[old] = False
             if self._answer is not None:  # in the middle of a visit: between two, they are counted already
                 self._close_standing(is_gone)
-        return scene
+        self._scene = scene
 
     def _close_standing(self, of: NDArray[np.bool_]) -> None:
         scene, counts = self._scene, self.counts
@@ -287,8 +269,7 @@ class Judge:
             one.empty.answer(self.clocks, place not in stale)
         for one in self.tracked:
             if one.is_current and one.new_key is not None:
-                index = scene.index_of.get(one.change.object_id)
-                one.found.answer(self.clocks, index is not None and bool(scene.num_matched[index] > 0))
+                one.found.answer(self.clocks, scene.num_entries_of(one.change.object_id) > 0)
 
     def _judge_removal(self, one: TrackedChange) -> None:
         if one.is_removal_judged or not (one.is_open and one.is_remembered and one.is_evident):
@@ -300,20 +281,13 @@ class Judge:
     def _judge_arrival(self, one: TrackedChange) -> None:
         if not one.is_current or not one.is_seen:
             return
-        scene = self._scene
-        index = None if scene is None else scene.index_of.get(one.change.object_id)
-        num_matched = 0 if scene is None or index is None else int(scene.num_matched[index])
+        num_matched = 0 if self._scene is None else self._scene.num_entries_of(one.change.object_id)
         if one.change.kind == "added" and not one.is_arrival_judged:
             one.is_arrival_judged = True
             self.counts.additions += 1
             self.counts.additions_done += num_matched > 0
-        if (
-            one.change.kind == "moved"
-            and one.is_remembered
-            and one.is_open
-            and one.is_evident
-            and not one.is_move_judged
-        ):
+        is_evident_move = one.change.kind == "moved" and one.is_remembered and one.is_open and one.is_evident
+        if is_evident_move and not one.is_move_judged:
             one.is_move_judged = True
             self.counts.moves += 1
             self.counts.moves_done += num_matched == 1 and one.empty.done is not None

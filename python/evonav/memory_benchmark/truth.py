@@ -3,12 +3,18 @@
 Only the judge reads this. No memory is given any of it.
 """
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Literal, Protocol
+
+import numpy as np
 
 from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo
 from evonav.world.simulator import SceneObject
+
+EVIDENCE_PX = 25
+"""Pixels in one frame from which on it is evidence of an object that is detected in it, or of an empty place."""
 
 ChangeKind = Literal["moved", "removed", "added"]
 
@@ -48,29 +54,47 @@ class FrameTruth:
 class Stream(Protocol):
     """One stream: the same frames whenever it is read."""
 
-    @property
-    def name(self) -> str:
-        """Its kind, house and seed, such as `S1/bundled-0012/0`."""
-
-    @property
-    def kind(self) -> str:
-        """`S0` to `S9`."""
-
-    @property
-    def house(self) -> str:
-        """The house that intervals are resampled by."""
-
-    @property
-    def info(self) -> StreamInfo:
-        """The public facts, which a memory is told."""
-
-    @property
-    def changes(self) -> Sequence[TrueChange]:
-        """All changes, in the order of time."""
-
-    @property
-    def has_truth(self) -> bool:
-        """False if nothing is known of what stands where: then only speed and size are measured."""
+    name: str
+    """Its kind, house and seed, such as `S1/bundled-0012/0`."""
+    kind: str
+    """`S0` to `S9`, or `recording`."""
+    house: str
+    """The house that intervals are resampled by."""
+    info: StreamInfo
+    """The public facts, which a memory is told."""
+    changes: Sequence[TrueChange]
+    """All changes, in the order of time."""
+    has_truth: bool
+    """False if nothing is known of what stands where: then only speed and size are measured."""
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
-        """Render the stream, one frame at a time."""
+        """Render or read the stream, one frame at a time."""
+
+
+class Digest:
+    """Hashes a stream while it is read: equal digests mean equal frames and equal truth, bit by bit."""
+
+    def __init__(self, stream: Stream) -> None:
+        """Begin with what is known before the first frame."""
+        self._hash = hashlib.sha256()
+        self._objects: object = None
+        self._add(stream.name, stream.kind, stream.house, astuple(stream.info), *map(astuple, stream.changes))
+
+    def add(self, frame: MemoryFrame, truth: FrameTruth) -> None:
+        """Add the next frame, all its arrays and its truth."""
+        self._add(frame.index, frame.time_s, frame.visit, astuple(frame.view.pose), frame.view.detections.labels)
+        for array in frame.arrays():
+            self._add(array.dtype.str, array.shape)
+            self._hash.update(np.ascontiguousarray(array).data)
+        if truth.objects is not self._objects:
+            self._objects = truth.objects
+            self._add(*map(astuple, truth.objects))
+        self._add(dict(truth.visible_px), dict(truth.empty_px), tuple(truth.detected_ids))
+
+    def hexdigest(self) -> str:
+        """Return the SHA-256 of what was added, 64 hexadecimal digits."""
+        return self._hash.hexdigest()
+
+    def _add(self, *values: object) -> None:
+        for value in values:
+            self._hash.update(f"{value!r}\0".encode())

@@ -59,6 +59,10 @@ class VisibleOccupancy:
     """`(B, 2)` blocked cells `[row, col]`, sorted."""
 
 
+NO_OCCUPANCY = VisibleOccupancy(np.empty((0, 2), np.int32), np.empty((0, 2), np.int32))
+"""The occupancy of views that have none."""
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """The sensor data of one camera pose."""

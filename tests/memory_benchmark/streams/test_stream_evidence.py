@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import evonav
-from evonav.memory_benchmark.streams import StreamSpec, make_stream
+from evonav.memory_benchmark.streams import make_stream
 from evonav.memory_benchmark.streams.evidence import (
     TOUCH_M,
     changes_between,
@@ -18,6 +18,7 @@ from evonav.memory_benchmark.streams.evidence import (
     num_looks_through,
     visible_px,
 )
+from evonav.memory_benchmark.streams.spec import StreamSpec
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections
 from evonav.world.camera import camera_axes, project, unproject
@@ -112,7 +113,7 @@ def test_visible_pixels_are_those_of_the_instance_image():
     simulator = EmbeddedSimulator(stream.spec.camera)
     simulator.reset(evonav.load_houses("bundled")[3])
     for index, (_, truth) in enumerate(stream.frames()):
-        frame = simulator.render(stream.plan.pose(index), rgb=False)
+        frame = simulator.render(stream.plan.frames[index].pose, rgb=False)
         expected = {}
         for number, body in enumerate(simulator.objects, start=1):
             count = int((frame.instances == number).sum())
@@ -188,6 +189,6 @@ def test_ground_truths_detections_are_all_of_their_own_objects():
     simulator = EmbeddedSimulator(stream.spec.camera)
     simulator.reset(evonav.load_houses("bundled")[3])
     for index, (_, truth) in enumerate(stream.frames()):
-        frame = simulator.render(stream.plan.pose(index), rgb=False)
+        frame = simulator.render(stream.plan.frames[index].pose, rgb=False)
         _, numbers = GroundTruthPerception().number(frame, simulator.objects)
         assert truth.detected_ids == tuple(simulator.objects[number].id for number in numbers)

@@ -13,9 +13,10 @@ from evonav.cli.options.shared import EXIT_INCOMPLETE, HOUSES, Against, listed, 
 from evonav.counted import counted
 
 if TYPE_CHECKING:  # the command must start fast
+    from evonav.memory_benchmark.benchmark import AnyStream
     from evonav.memory_benchmark.records import BenchmarkResult
-    from evonav.memory_benchmark.streams import StreamSpec
-    from evonav.memory_benchmark.streams.export.recording import RecordingSpec
+    from evonav.memory_benchmark.streams.export.recording import Recording
+    from evonav.memory_benchmark.streams.spec import StreamSpec
     from evonav.statistics import BeforeAfter
 
 EXIT_WORSE = 1
@@ -135,13 +136,13 @@ def memory(
 
     earlier = None if against is None else read_result(against)
     chosen = named_memories(listed(memories))
-    specs: list[StreamSpec | RecordingSpec] = [*read_recordings(recordings or (), up)]
+    specs: list[AnyStream] = [*read_recordings(recordings or (), up)]
     if streams or not recordings:
         specs += chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     own_process = None if in_process is None else not in_process
     settings = MeasureSettings(own_process=own_process, timeout_s=timeout, every=every, runs_twice=twice)
     with interruptible(out), progress_bar("streams") as on_progress:
-        measured = benchmark(
+        result, failures = benchmark(
             chosen,
             specs,
             out,
@@ -150,16 +151,16 @@ def memory(
             on_progress=on_progress,
         )
     failed: dict[tuple[str, str], list[str]] = {}
-    for name, stream, why in measured.failures:
+    for name, stream, why in failures:
         failed.setdefault((stream, why), []).append(name)
     for (stream, why), names in failed.items():
         typer.echo(f"failed: {', '.join(names)} {stream}: {why}", err=True)
-    _show(measured.result, out, len(measured.failures))
-    if measured.failures:
+    _show(result, out, len(failures))
+    if failures:
         typer.echo("incomplete: run the same command again to resume", err=True)
         raise typer.Exit(EXIT_INCOMPLETE)
     if earlier is not None and against is not None:
-        tell_worse(against, compare(measured.result, earlier))
+        tell_worse(against, compare(result, earlier))
 
 
 @memory_app.command(cls=Command)
@@ -177,8 +178,8 @@ def export(
 ) -> None:
     """Write streams as files, for systems in C++, in ROS or on another machine."""
     from evonav.memory_benchmark.streams import make_stream
-    from evonav.memory_benchmark.streams.export import export_stream
     from evonav.memory_benchmark.streams.export.layouts import LAYOUTS
+    from evonav.memory_benchmark.streams.export.write import export_stream
 
     layout_name = next((known for known in LAYOUTS if known == layout), None)
     if layout_name is None:
@@ -186,7 +187,7 @@ def export(
     specs = chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     with status("Writing streams") as show:
         for spec in specs:
-            name = folder_of(spec.name)
+            name = spec.name.replace("/", "_")
             show(name)
             truth = None if oracle is None else oracle / f"{name}.jsonl.xz"
             written = export_stream(make_stream(spec, rgb=colours), out / name, layout_name, oracle=truth)
@@ -217,7 +218,7 @@ def score(
     from evonav.memory_benchmark.offline import score as score_stream
     from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, read_result
     from evonav.memory_benchmark.regression import against as compare
-    from evonav.memory_benchmark.streams.export import read_exported
+    from evonav.memory_benchmark.streams.export.read import ExportedStream
     from evonav.report.machine import machine_name
 
     earlier = None if against is None else read_result(against)
@@ -231,7 +232,7 @@ def score(
             show(folder.name)
             truth = None if oracle is None else oracle / f"{folder.name}.jsonl.xz"
             file = entries if is_one and entries.is_file() else folder / entries
-            records.append(score_stream(read_exported(folder, oracle=truth), file))
+            records.append(score_stream(ExportedStream(folder, truth), file))
     from evonav import __version__
 
     scored = (MemoryResult(memory=system, streams=tuple(records)),)
@@ -271,32 +272,26 @@ def chosen_streams(
     return specs
 
 
-def read_recordings(folders: "Sequence[Path]", up: str) -> "list[RecordingSpec]":
+def read_recordings(folders: "Sequence[Path]", up: str) -> "list[Recording]":
     """Read recordings except for their images, and say what each has; `StoreError` for a missing or malformed file."""
-    from evonav.memory_benchmark.streams.export import read_recording
     from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
+    from evonav.memory_benchmark.streams.export.recording import Recording
 
     axis = next((known for known in EVONAV_FROM_WORLD if known == up), None)
     if axis is None:
         raise typer.BadParameter(f"--up {up}: expected {', '.join(EVONAV_FROM_WORLD)}")
     found = []
     for folder in folders:
-        recording = read_recording(folder, up=axis)
+        recording = Recording(folder, axis)
         labels = recording.info.labels
         has = f"detections of {counted(len(labels), 'label')}" if labels else "no detections"
         typer.echo(f"{folder}: {counted(recording.num_frames, 'frame')}, {has}, no truth: only speed and size")
-        found.append(recording.spec)
+        found.append(recording)
     return found
 
 
-def folder_of(stream: str) -> str:
-    """Return the name of a stream's folder."""
-    return stream.replace("/", "_")
-
-
 def _show(result: "BenchmarkResult", out: Path, num_missing: int) -> None:
-    from evonav.memory_benchmark.report import write_memory_report
-    from evonav.memory_benchmark.tables import FAILURES, REMARKS, memory_tables
+    from evonav.memory_benchmark.report import FAILURES, REMARKS, memory_tables, write_memory_report
 
     if not result.memories:
         return

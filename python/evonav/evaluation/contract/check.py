@@ -17,7 +17,7 @@ from evonav.agents.hosting.error_text import describe
 from evonav.agents.hosting.serving import refuse_in_agent_process
 from evonav.agents.registry import agent_factory, import_name, needed_arguments, new_agent
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
-from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, points_of
+from evonav.evaluation.contract.points import PACKAGE, PROTOCOL, Check, ContractReport, points_of
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.contract.situations import check_situations
 from evonav.evaluation.episode.episode import Episode
@@ -33,39 +33,13 @@ LARGE_MEMORY_MB = 2000.0
 ADVICE = "function without arguments that returns the agent, and name that"
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class AgentReport:
-    """The result of all checks of an agent."""
-
-    agent: str
-    checks: tuple[Check, ...]
-
-    @property
-    def is_ok(self) -> bool:
-        """True if no check failed; there may be warnings."""
-        return not any(check.verdict == "fail" for check in self.checks)
-
-    @property
-    def conclusion(self) -> str:
-        """The result in one line: whether the agent keeps the contract, breaks it, or could not be run at all."""
-        if any(check.name == "importable" and check.verdict == "fail" for check in self.checks):
-            return f"{self.agent}: cannot be checked"
-        return f"{self.agent}: {'keeps the contract' if self.is_ok else 'breaks the contract'}"
-
-    def __repr__(self) -> str:
-        """Return the conclusion and every check, a line each."""
-        width = max(len(check.name) for check in self.checks)
-        lines = [f"{check.verdict:4}  {check.name:{width}}  {check.finding}" for check in self.checks]
-        return "\n".join([self.conclusion, *lines])
-
-
 def check_agent(
     agent: str | Callable[..., Agent] | Agent,
     *,
     backend: Backend | None = None,
     seed: int = 0,
     timeout_s: float = 60.0,
-) -> AgentReport:
+) -> ContractReport:
     """Run an agent and check that it keeps the contract; no exception of the agent is raised.
 
     Args:
@@ -84,7 +58,7 @@ def check_agent(
     refuse_in_agent_process("evonav.check_agent")
     name, factory = _named(agent)
     examination = _Examination(name, factory, backend or Backend(), seed, timeout_s)
-    return AgentReport(name, tuple(examination.checks()))
+    return ContractReport(name, tuple(examination.checks()))
 
 
 @dataclass(slots=True)

@@ -29,6 +29,33 @@ class Check:
     """The finding, and what to do about it."""
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class ContractReport:
+    """The result of all checks of an agent or a memory."""
+
+    name: str
+    """Name of what was checked."""
+    checks: tuple[Check, ...]
+
+    @property
+    def is_ok(self) -> bool:
+        """True if no check failed; there may be warnings."""
+        return not any(check.verdict == "fail" for check in self.checks)
+
+    @property
+    def conclusion(self) -> str:
+        """The result in one line: whether it keeps the contract, breaks it, or could not be run at all."""
+        if any(check.name == "importable" and check.verdict == "fail" for check in self.checks):
+            return f"{self.name}: cannot be checked"
+        return f"{self.name}: {'keeps the contract' if self.is_ok else 'breaks the contract'}"
+
+    def __repr__(self) -> str:
+        """Return the conclusion and every check, a line each."""
+        width = max(len(check.name) for check in self.checks)
+        lines = [f"{check.verdict:4}  {check.name:{width}}  {check.finding}" for check in self.checks]
+        return "\n".join([self.conclusion, *lines])
+
+
 def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
     """Yield the checks of an agent that has run one episode."""
     yield _sensors(probe)

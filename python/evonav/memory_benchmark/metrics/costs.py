@@ -47,10 +47,13 @@ def percentiles(seconds: ArrayLike) -> Percentiles | None:
     return Percentiles(times_ms.size, float(times_ms.mean()), p50, p95, p99, float(times_ms.max()))
 
 
-def thinned(frames: ArrayLike, entries: ArrayLike, times_ms: ArrayLike, num: int = MAX_SAMPLES) -> list[Sample]:
-    """Return at most `num` samples: medians over equal parts of the frames."""
-    columns = np.column_stack([frames, entries, times_ms]).astype(np.float64)
-    parts = np.array_split(columns, num) if len(columns) > num else list(columns[:, None])
+def thinned(times: NDArray[np.float64], num: int = MAX_SAMPLES) -> list[Sample]:
+    """Return at most `num` samples: medians over equal parts of the frames.
+
+    Args:
+        times: `(N, 3)`: frame, entries, milliseconds.
+    """
+    parts = np.array_split(times, num) if len(times) > num else list(times[:, None])
     return [Sample(*np.median(part, axis=0).tolist()) for part in parts]
 
 
@@ -101,11 +104,6 @@ def slope_per_1000_frames(samples: Sequence[Sample]) -> float | None:
         return None
     slope = theil_sen(frames, np.array([sample.ms for sample in samples]), is_equal)
     return None if slope is None else 1000.0 * slope
-
-
-def real_time_factor(mean_wall_s: float, rate_hz: float) -> float:
-    """Return how many times faster than the stream's own rate the memory takes its frames."""
-    return 1.0 / (rate_hz * max(mean_wall_s, 1e-9))
 
 
 MB = 1e6

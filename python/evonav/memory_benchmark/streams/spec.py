@@ -96,6 +96,11 @@ class StreamSpec:
         return "/".join(parts)
 
     @property
+    def walk_kind(self) -> Kind:
+        """The kind whose houses and walks it has: S8 is S2 under other errors of perception."""
+        return "S2" if self.kind == "S8" else self.kind
+
+    @property
     def camera(self) -> SimulatorConfig:
         """The camera: 90 degrees wide, at AI2-THOR's height."""
         fov_deg = vertical_fov_deg(HORIZONTAL_FOV_DEG, self.width_px, self.height_px)

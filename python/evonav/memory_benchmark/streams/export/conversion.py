@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
-from evonav.world.simulator import Intrinsics
 
 F64 = NDArray[np.float64]
 UpAxis = Literal["z", "y", "-y"]
@@ -88,15 +87,3 @@ def rotation_of(quaternion: tuple[float, float, float, float]) -> F64:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def opencv_camera(intrinsics: Intrinsics) -> dict[str, float]:
-    """Return width, height, focal lengths and principal point in pixels, where (0, 0) is the first pixel's centre."""
-    return {
-        "w": intrinsics.width_px,
-        "h": intrinsics.height_px,
-        "fx": intrinsics.focal_px,
-        "fy": intrinsics.focal_px,
-        "cx": (intrinsics.width_px - 1) / 2.0,
-        "cy": (intrinsics.height_px - 1) / 2.0,
-    }

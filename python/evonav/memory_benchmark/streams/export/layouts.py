@@ -1,36 +1,34 @@
 """Name the files of an exported stream, and define what its text files hold."""
 
-from collections.abc import Sequence
+import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError
 
+from evonav.errors import StoreError
+from evonav.memory_benchmark.protocol import StreamInfo
 from evonav.memory_benchmark.truth import TrueChange
-from evonav.records import Record, Version
-from evonav.world.simulator import SceneObject
+from evonav.records import Record, Version, sentence_of
+from evonav.world.simulator import Intrinsics, SceneObject
 
 LayoutName = Literal["tum", "replica"]
 STREAM_FILE = "stream.json"
 FRAMES_FILE = "frames.jsonl"
 ORACLE_FILE = "oracle.jsonl.xz"
+CAMERA_FILE = "cam_params.json"
 WORLD = "right-handed, metres, z up: X = x, Y = z, Z = y of evonav; OpenCV's camera"
 
 
 @dataclass(frozen=True, slots=True)
 class FileLayout:
-    """The names of a layout's files, and its unit of depth."""
+    """The names of a layout's images, with the index of the frame, and its unit of depth."""
 
     rgb: str
-    """Path of an image of colours, with the index of the frame."""
     depth: str
     depth_scale: float
     """Number in the file for one metre."""
-
-    def folders(self) -> Sequence[str]:
-        """Return the folders that the images need."""
-        return tuple(dict.fromkeys(str(Path(name).parent) for name in (self.rgb, self.depth, MASKS)))
 
 
 LAYOUTS: dict[LayoutName, FileLayout] = {
@@ -41,11 +39,9 @@ LAYOUTS: dict[LayoutName, FileLayout] = {
 MASKS = "masks/{:06d}.png"
 FEATURES = "features/{:06d}.npy"
 
-Vector = tuple[float, float, float]
 
-
-class LayoutCamera(Record):
-    """A pinhole camera: (0, 0) is the centre of the first pixel, as OpenCV counts."""
+class Camera(Record):
+    """A pinhole camera, `camera` in `cam_params.json`: (0, 0) is the centre of the first pixel, as OpenCV counts."""
 
     w: PositiveInt
     h: PositiveInt
@@ -53,7 +49,15 @@ class LayoutCamera(Record):
     fy: PositiveFloat
     cx: float
     cy: float
-    vertical_fov_rad: PositiveFloat
+    scale: PositiveFloat = LAYOUTS["tum"].depth_scale
+    """Number in depth images for one metre."""
+
+    @staticmethod
+    def of(camera: Intrinsics, scale: float) -> "Camera":
+        """Return a camera of ours."""
+        cx, cy = (camera.width_px - 1) / 2.0, (camera.height_px - 1) / 2.0
+        focal_px = camera.focal_px
+        return Camera(w=camera.width_px, h=camera.height_px, fx=focal_px, fy=focal_px, cx=cx, cy=cy, scale=scale)
 
 
 class StreamFile(Record):
@@ -64,15 +68,13 @@ class StreamFile(Record):
     kind: str
     house: str
     digest: str
-    """SHA-256 of the stream as it was before depth was rounded, see `evonav.memory_benchmark.streams.digest`."""
+    """SHA-256 of the stream as it was before depth was rounded, see `evonav.memory_benchmark.truth.Digest`."""
     layout: LayoutName
     num_frames: NonNegativeInt
     has_rgb: bool
-    rate_hz: PositiveFloat
     depth_scale: PositiveFloat
-    camera: LayoutCamera
     world: str = WORLD
-    labels: tuple[str, ...]
+    info: StreamInfo
 
 
 class FrameLine(Record):
@@ -92,66 +94,70 @@ class FrameLine(Record):
     confidences: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = ()
 
 
-class ObjectLine(Record):
-    """One object of the oracle's part."""
-
-    id: str
-    category: str
-    centre_m: Vector
-    size_m: tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
-
-    @staticmethod
-    def of(body: SceneObject) -> "ObjectLine":
-        """Return the line of an object."""
-        return ObjectLine(id=body.id, category=body.category, centre_m=body.centre_m, size_m=body.size_m)
-
-    def object(self) -> SceneObject:
-        """Return the object."""
-        return SceneObject(self.id, self.category, "object", self.centre_m, self.size_m)
-
-
-class ChangeLine(Record):
-    """One change of the oracle's part."""
-
-    object_id: str
-    label: str
-    kind: Literal["moved", "removed", "added"]
-    frame: NonNegativeInt
-    before: ObjectLine | None
-    after: ObjectLine | None
-
-    @staticmethod
-    def of(change: TrueChange) -> "ChangeLine":
-        """Return the line of a change."""
-        return ChangeLine(
-            object_id=change.object_id,
-            label=change.label,
-            kind=change.kind,
-            frame=change.frame,
-            before=None if change.before is None else ObjectLine.of(change.before),
-            after=None if change.after is None else ObjectLine.of(change.after),
-        )
-
-    def change(self) -> TrueChange:
-        """Return the change."""
-        before = None if self.before is None else self.before.object()
-        after = None if self.after is None else self.after.object()
-        return TrueChange(self.object_id, self.label, self.kind, self.frame, before, after)
-
-
 class OracleHead(Record):
     """The first line of the oracle's file."""
 
     name: str
     digest: str
-    changes: tuple[ChangeLine, ...]
+    changes: tuple[TrueChange, ...]
 
 
 class TruthLine(Record):
     """A further line of the oracle's file: the truth of one frame."""
 
-    objects: tuple[ObjectLine, ...] | None
+    objects: tuple[SceneObject, ...] | None
     """Objects of the house; `None` if they are those of the frame before."""
     visible_px: dict[str, PositiveInt]
     empty_px: dict[NonNegativeInt, PositiveInt]
     detected_ids: tuple[str | None, ...]
+
+
+R = TypeVar("R", bound=Record)
+
+
+def record_of(kind: type[R], path: Path, text: str) -> R:
+    """Return a record that is JSON in a file.
+
+    Raises:
+        StoreError: A field is wrong; the message names file, field and value.
+    """
+    try:
+        return kind.model_validate_json(text)
+    except ValidationError as error:
+        raise StoreError(f"{path}: {sentence_of(error)}; it is in {text[:200]!r}") from error
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a file.
+
+    Raises:
+        StoreError: It cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+
+
+def read_camera(folder: Path) -> Camera:
+    """Return the camera of a folder's `cam_params.json`.
+
+    Raises:
+        StoreError: The file is missing or malformed.
+    """
+    path = folder / CAMERA_FILE
+    try:
+        return Camera.model_validate(json.loads(text_of(path))["camera"])
+    except (ValueError, KeyError, TypeError) as error:
+        expected = ', expected {"camera": {"w", "h", "fx", "fy", "cx", "cy", "scale"}}'
+        raise StoreError(f"{path}: cannot be read{expected}: {error}") from error
+
+
+def read_frame_lines(folder: Path) -> list[FrameLine]:
+    """Return the lines of a folder's `frames.jsonl`.
+
+    Raises:
+        StoreError: The file is missing, or a line is malformed.
+    """
+    path = folder / FRAMES_FILE
+    return [record_of(FrameLine, path, text) for text in text_of(path).splitlines() if text.strip()]

@@ -2,15 +2,12 @@
 
 import lzma
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
-from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.protocol import MemoryFrame, StreamInfo, read_only
+from evonav.memory_benchmark.protocol import MemoryFrame
 from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.layouts import (
     FRAMES_FILE,
@@ -20,118 +17,71 @@ from evonav.memory_benchmark.streams.export.layouts import (
     OracleHead,
     StreamFile,
     TruthLine,
+    read_frame_lines,
+    record_of,
+    text_of,
 )
-from evonav.memory_benchmark.streams.rendered import NO_OCCUPANCY
 from evonav.memory_benchmark.truth import FrameTruth, TrueChange
-from evonav.records import Record, sentence_of
-from evonav.sensors.observation import Detections, View
+from evonav.sensors.observation import NO_OCCUPANCY, Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SceneObject
 
-R = TypeVar("R", bound=Record)
-
-
-def read_exported(folder: Path, *, oracle: Path | None = None) -> "ExportedStream":
-    """Return a stream that `export_stream` wrote; its images are read while it is read.
-
-    Args:
-        oracle: File of the truth. Default: `oracle.jsonl.xz` in the folder, if it is there.
-
-    Raises:
-        StoreError: A file is missing or damaged, or the truth is that of another stream.
-    """
-    return ExportedStream(folder, oracle)
-
 
 class ExportedStream:
-    """A `Stream` in files."""
+    """A `Stream` that `export_stream` wrote; its images are read while it is read."""
 
     def __init__(self, folder: Path, oracle: Path | None = None) -> None:
-        """Read all but the images; see `read_exported`."""
+        """Read all but the images.
+
+        Args:
+            oracle: File of the truth, without which truth and changes are empty. Default: `oracle.jsonl.xz`.
+
+        Raises:
+            StoreError: A file is missing or damaged, or the truth is that of another stream.
+        """
         self.folder = folder
-        self.file = _record(StreamFile, folder / STREAM_FILE, _text_of(folder / STREAM_FILE))
+        self.file = record_of(StreamFile, folder / STREAM_FILE, text_of(folder / STREAM_FILE))
+        self.name, self.kind, self.house, self.info = self.file.name, self.file.kind, self.file.house, self.file.info
         self._lines = read_frame_lines(folder)
         if len(self._lines) != self.file.num_frames:
             raise StoreError(f"{folder / FRAMES_FILE}: {len(self._lines)} lines, expected {self.file.num_frames}")
-        oracle = oracle or folder / ORACLE_FILE
-        self._oracle = oracle if oracle.exists() else None
-        if self._head is not None and self._head.digest != self.file.digest:
-            raise StoreError(f"{oracle}: the truth of another stream, {self._head.name}")
-
-    @property
-    def has_truth(self) -> bool:
-        """True if the oracle's file is there; otherwise truth and changes are empty."""
-        return self._oracle is not None
-
-    @property
-    def name(self) -> str:
-        """The exported stream's name."""
-        return self.file.name
-
-    @property
-    def kind(self) -> str:
-        """The exported stream's kind."""
-        return self.file.kind
-
-    @property
-    def house(self) -> str:
-        """The house that intervals are resampled by."""
-        return self.file.house
-
-    @property
-    def num_frames(self) -> int:
-        """Number of frames."""
-        return self.file.num_frames
-
-    @property
-    def info(self) -> StreamInfo:
-        """The public facts that a memory is told."""
-        camera = self.file.camera
-        return StreamInfo(Intrinsics(camera.w, camera.h, camera.vertical_fov_rad), self.file.labels, self.file.rate_hz)
-
-    @cached_property
-    def _head(self) -> OracleHead | None:
-        if self._oracle is None:
-            return None
-        return _record(OracleHead, self._oracle, next(_oracle_lines(self._oracle), ""))
-
-    @property
-    def changes(self) -> Sequence[TrueChange]:
-        """All changes, in the order of time; none without the truth."""
-        return () if self._head is None else tuple(one.change() for one in self._head.changes)
+        self._oracle = oracle or folder / ORACLE_FILE
+        self.has_truth = self._oracle.exists()
+        self.changes: Sequence[TrueChange] = ()
+        if self.has_truth:
+            head = record_of(OracleHead, self._oracle, next(self._oracle_lines(), ""))
+            if head.digest != self.file.digest:
+                raise StoreError(f"{self._oracle}: the truth of another stream, {head.name}")
+            self.changes = head.changes
 
     def frames(self) -> Iterator[tuple[MemoryFrame, FrameTruth]]:
         """Read the stream, one frame at a time."""
-        truths, intrinsics = self._truths(), self.info.intrinsics
+        truths = self._truths()
         for line in self._lines:
-            if line.pose is None:
-                raise StoreError(f"{self.folder / FRAMES_FILE}: frame {line.index} has no `pose`")
-            view = View(
-                Pose(*line.pose),
-                intrinsics,
-                images.read_depth(self.folder / line.depth, self.file.depth_scale),
-                read_detections(self.folder, line, (intrinsics.height_px, intrinsics.width_px)),
-                NO_OCCUPANCY,
-                None if line.rgb is None else images.read_rgb(self.folder / line.rgb),
-            )
+            view = view_of(self.folder, line, self.info.intrinsics, self.file.depth_scale)
             truth = next(truths, None)
             if truth is None:
                 raise StoreError(f"{self._oracle}: no truth of frame {line.index}")
-            yield read_only(MemoryFrame(line.index, line.time_s, line.visit, view)), truth
+            yield MemoryFrame(line.index, line.time_s, line.visit, view).read_only(), truth
 
     def _truths(self) -> Iterator[FrameTruth]:
-        if self._oracle is None:
-            for line in self._lines:
-                yield no_truth(len(line.labels))
+        if not self.has_truth:
+            yield from (no_truth(len(line.labels)) for line in self._lines)
             return
         objects: tuple[SceneObject, ...] = ()
-        lines = _oracle_lines(self._oracle)
+        lines = self._oracle_lines()
         next(lines, None)
         for text in lines:
-            truth = _record(TruthLine, self._oracle, text)
-            if truth.objects is not None:
-                objects = tuple(one.object() for one in truth.objects)
+            truth = record_of(TruthLine, self._oracle, text)
+            objects = objects if truth.objects is None else truth.objects
             yield FrameTruth(objects, truth.visible_px, truth.empty_px, truth.detected_ids)
+
+    def _oracle_lines(self) -> Iterator[str]:
+        try:
+            with lzma.open(self._oracle, "rt", encoding="utf-8") as file:
+                yield from file
+        except (OSError, EOFError, lzma.LZMAError, UnicodeDecodeError) as error:
+            raise StoreError(f"{self._oracle}: cannot be read: {error}") from error
 
 
 def no_truth(num_detections: int) -> FrameTruth:
@@ -139,25 +89,27 @@ def no_truth(num_detections: int) -> FrameTruth:
     return FrameTruth((), {}, {}, (None,) * num_detections)
 
 
-def read_frame_lines(folder: Path) -> list[FrameLine]:
-    """Return the lines of a folder's `frames.jsonl`.
+def view_of(folder: Path, line: FrameLine, intrinsics: Intrinsics, depth_scale: float) -> View:
+    """Read the images of a frame.
 
     Raises:
-        StoreError: The file is missing, or a line is malformed.
+        StoreError: An image cannot be read or has another shape, the pose is missing, or masks, labels and confidences
+            do not fit each other.
     """
-    path = folder / FRAMES_FILE
-    return [_record(FrameLine, path, text) for text in _text_of(path).splitlines() if text.strip()]
+    if line.pose is None:
+        raise StoreError(f"{folder / FRAMES_FILE}: frame {line.index} has no `pose`")
+    shape = (intrinsics.height_px, intrinsics.width_px)
+    depth_m = images.read_depth(folder / line.depth, depth_scale)
+    rgb = None if line.rgb is None else images.read_rgb(folder / line.rgb)
+    for name, image in ((line.depth, depth_m), (line.rgb, rgb)):
+        if image is not None and image.shape[:2] != shape:
+            raise StoreError(f"{folder / str(name)}: shape {image.shape[:2]}, expected {shape}")
+    found = _detections(folder, line, shape)
+    return View(Pose(*line.pose), intrinsics, depth_m, found, NO_OCCUPANCY, rgb)
 
 
-def read_detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> Detections:
-    """Return the detections of a frame; none if it has no masks.
-
-    Args:
-        shape: `(H, W)` of the image.
-
-    Raises:
-        StoreError: Masks, labels and confidences do not fit each other or the image.
-    """
+def _detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> Detections:
+    """Return the detections of a frame; none if it has no masks."""
     if line.masks is None:
         return Detections(np.full(shape, -1, np.int32), (), np.empty(0, np.float32))
     masks = images.read_masks(folder / line.masks)
@@ -174,25 +126,3 @@ def read_detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> De
         except (OSError, ValueError) as error:
             raise StoreError(f"{folder / line.features}: cannot be read: {error}") from error
     return Detections(masks, line.labels, np.array(confidences, np.float32), features)
-
-
-def _text_of(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
-
-
-def _oracle_lines(path: Path) -> Iterator[str]:
-    try:
-        with lzma.open(path, "rt", encoding="utf-8") as file:
-            yield from file
-    except (OSError, EOFError, lzma.LZMAError, UnicodeDecodeError) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
-
-
-def _record(kind: type[R], path: Path, text: str) -> R:
-    try:
-        return kind.model_validate_json(text)
-    except ValidationError as error:
-        raise StoreError(f"{path}: {sentence_of(error)}; it is in {text[:200]!r}") from error

@@ -2,33 +2,33 @@
 
 import json
 import lzma
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.protocol import MemoryFrame
-from evonav.memory_benchmark.streams.digest import Digest
 from evonav.memory_benchmark.streams.export import images
-from evonav.memory_benchmark.streams.export.conversion import opencv_camera, quaternion_of, world_from_camera
+from evonav.memory_benchmark.streams.export.conversion import quaternion_of, world_from_camera
 from evonav.memory_benchmark.streams.export.layouts import (
+    CAMERA_FILE,
     FEATURES,
     FRAMES_FILE,
     LAYOUTS,
     MASKS,
     ORACLE_FILE,
     STREAM_FILE,
-    ChangeLine,
+    Camera,
     FileLayout,
     FrameLine,
-    LayoutCamera,
     LayoutName,
-    ObjectLine,
     OracleHead,
     StreamFile,
     TruthLine,
 )
-from evonav.memory_benchmark.truth import FrameTruth, Stream
+from evonav.memory_benchmark.truth import Digest, Stream
+from evonav.world.pose import Pose
 
 
 def export_stream(
@@ -55,110 +55,98 @@ def export_stream(
     try:
         if folder.exists() and any(folder.iterdir()):
             raise StoreError(f"{folder}: the folder is not empty")
-        folder.mkdir(parents=True, exist_ok=True)
-        oracle.parent.mkdir(parents=True, exist_ok=True)
-        return _Writer(stream, folder, layout, oracle).write()
+        for path in (*(folder / name for name in (LAYOUTS[layout].rgb, LAYOUTS[layout].depth, MASKS)), oracle):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        return _written(stream, folder, layout, oracle)
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written: {error}") from error
 
 
-class _Writer:
-    """Writes one stream."""
-
-    def __init__(self, stream: Stream, folder: Path, layout: LayoutName, oracle: Path) -> None:
-        self.stream, self.folder, self.oracle = stream, folder, oracle
-        self.layout_name: LayoutName = layout
-        self.layout: FileLayout = LAYOUTS[layout]
-        self.lines: list[FrameLine] = []
-        self.truths: list[TruthLine] = []
-        self.matrices: list[np.ndarray] = []
-
-    def write(self) -> StreamFile:
-        for name in (*self.layout.folders(), str(Path(FEATURES).parent)):
-            (self.folder / name).mkdir(parents=True, exist_ok=True)
-        hashed, objects = Digest(self.stream), None
-        for frame, truth in self.stream.frames():
-            hashed.add(frame, truth)
-            self._frame(frame)
-            self._truth(truth, is_new=truth.objects is not objects)
-            objects = truth.objects
-        if not any((self.folder / Path(FEATURES).parent).iterdir()):
-            (self.folder / Path(FEATURES).parent).rmdir()
-        info, digest = self.stream.info, hashed.hexdigest()
-        camera = opencv_camera(info.intrinsics) | {"vertical_fov_rad": info.intrinsics.vertical_fov_rad}
-        written = StreamFile(
-            name=self.stream.name,
-            kind=self.stream.kind,
-            house=self.stream.house,
-            digest=digest,
-            layout=self.layout_name,
-            num_frames=len(self.lines),
-            has_rgb=bool(self.lines) and self.lines[0].rgb is not None,
-            rate_hz=info.rate_hz,
-            depth_scale=self.layout.depth_scale,
-            camera=LayoutCamera.model_validate(camera),
-            labels=info.labels,
-        )
-        changes = tuple(map(ChangeLine.of, self.stream.changes))
-        head = OracleHead(name=self.stream.name, digest=digest, changes=changes)
-        lines = [one.model_dump_json() for one in (head, *self.truths)]
-        self.oracle.write_bytes(lzma.compress("".join(f"{line}\n" for line in lines).encode(), preset=1))
-        self._text(FRAMES_FILE, [one.model_dump_json(exclude_none=True) for one in self.lines])
-        self._trajectory(written)
-        self._text(STREAM_FILE, [written.model_dump_json(indent=1)])
-        return written
-
-    def _frame(self, frame: MemoryFrame) -> None:
-        view, index, pose = frame.view, frame.index, frame.view.pose
-        names = {"depth": self.layout.depth.format(index), "masks": MASKS.format(index)}
-        images.write_depth(self.folder / names["depth"], view.depth_m, self.layout.depth_scale)
-        images.write_masks(self.folder / names["masks"], view.detections.masks)
-        if view.rgb is not None:
-            names["rgb"] = self.layout.rgb.format(index)
-            images.write_rgb(self.folder / names["rgb"], view.rgb)
-        if view.detections.features is not None:
-            names["features"] = FEATURES.format(index)
-            np.save(self.folder / names["features"], view.detections.features)
-        self.lines.append(
-            FrameLine(
-                index=index,
-                time_s=frame.time_s,
-                visit=frame.visit,
-                pose=(*pose.position_m, pose.yaw_rad, pose.horizon_rad),
-                labels=view.detections.labels,
-                confidences=tuple(view.detections.confidences.tolist()),
-                **names,
-            )
-        )
-        self.matrices.append(world_from_camera(pose))
-
-    def _truth(self, truth: FrameTruth, *, is_new: bool) -> None:
-        self.truths.append(
+def _written(stream: Stream, folder: Path, name: LayoutName, oracle: Path) -> StreamFile:
+    layout, info = LAYOUTS[name], stream.info
+    hashed, objects = Digest(stream), None
+    lines: list[FrameLine] = []
+    truths: list[TruthLine] = []
+    for frame, truth in stream.frames():
+        hashed.add(frame, truth)
+        lines.append(_write_frame(frame, folder, layout))
+        truths.append(
             TruthLine(
-                objects=tuple(map(ObjectLine.of, truth.objects)) if is_new else None,
+                objects=None if truth.objects is objects else tuple(truth.objects),
                 visible_px=dict(truth.visible_px),
                 empty_px=dict(truth.empty_px),
                 detected_ids=tuple(truth.detected_ids),
             )
         )
+        objects = truth.objects
+    digest = hashed.hexdigest()
+    written = StreamFile(
+        name=stream.name,
+        kind=stream.kind,
+        house=stream.house,
+        digest=digest,
+        layout=name,
+        num_frames=len(lines),
+        has_rgb=bool(lines) and lines[0].rgb is not None,
+        depth_scale=layout.depth_scale,
+        info=info,
+    )
+    head = OracleHead(name=stream.name, digest=digest, changes=tuple(stream.changes))
+    text = "".join(f"{one.model_dump_json()}\n" for one in (head, *truths))
+    oracle.write_bytes(lzma.compress(text.encode(), preset=1))
+    _write_lines(folder / FRAMES_FILE, (one.model_dump_json(exclude_none=True) for one in lines))
+    camera = Camera.of(info.intrinsics, layout.depth_scale).model_dump()
+    _write_lines(folder / CAMERA_FILE, [json.dumps({"camera": camera}, indent=1)])
+    _write_trajectory(folder, written, lines)
+    _write_lines(folder / STREAM_FILE, [written.model_dump_json(indent=1)])
+    return written
 
-    def _trajectory(self, written: StreamFile) -> None:
-        """Write poses, lists of images and the camera as programs for the layout expect them."""
-        camera = written.camera.model_dump(exclude={"vertical_fov_rad"})
-        self._text("cam_params.json", [json.dumps({"camera": {**camera, "scale": written.depth_scale}}, indent=1)])
-        if self.layout_name == "replica":
-            self._text("traj.txt", [" ".join(f"{value:.9f}" for value in one.ravel()) for one in self.matrices])
-            return
-        comment = f"# {written.name}; world: {written.world}"
-        for name in ("rgb", "depth"):
-            listed = [f"{line.time_s:.6f} {getattr(line, name)}" for line in self.lines if getattr(line, name)]
-            if listed:
-                self._text(f"{name}.txt", [comment, "# timestamp filename", *listed])
-        rows = []
-        for line, matrix in zip(self.lines, self.matrices, strict=True):
-            values = (*matrix[:3, 3].tolist(), *quaternion_of(matrix[:3, :3]))
-            rows.append(f"{line.time_s:.6f} {' '.join(f'{value:.9f}' for value in values)}")
-        self._text("groundtruth.txt", [comment, "# timestamp tx ty tz qx qy qz qw", *rows])
 
-    def _text(self, name: str, lines: list[str]) -> None:
-        (self.folder / name).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+def _write_frame(frame: MemoryFrame, folder: Path, layout: FileLayout) -> FrameLine:
+    """Write the images of a frame, and return its line."""
+    view, index, found = frame.view, frame.index, frame.view.detections
+    names = {"depth": layout.depth.format(index), "masks": MASKS.format(index)}
+    images.write_depth(folder / names["depth"], view.depth_m, layout.depth_scale)
+    images.write_masks(folder / names["masks"], found.masks)
+    if view.rgb is not None:
+        names["rgb"] = layout.rgb.format(index)
+        images.write_rgb(folder / names["rgb"], view.rgb)
+    if found.features is not None:
+        names["features"] = FEATURES.format(index)
+        (folder / names["features"]).parent.mkdir(exist_ok=True)
+        np.save(folder / names["features"], found.features)
+    return FrameLine(
+        index=index,
+        time_s=frame.time_s,
+        visit=frame.visit,
+        pose=(*view.pose.position_m, view.pose.yaw_rad, view.pose.horizon_rad),
+        labels=found.labels,
+        confidences=tuple(found.confidences.tolist()),
+        **names,
+    )
+
+
+def _write_trajectory(folder: Path, written: StreamFile, lines: Sequence[FrameLine]) -> None:
+    """Write poses and lists of images as programs for the layout expect them."""
+    matrices = [world_from_camera(Pose(*line.pose)) for line in lines if line.pose is not None]
+    if written.layout == "replica":
+        _write_lines(folder / "traj.txt", (_decimals(matrix.ravel()) for matrix in matrices))
+        return
+    comment = f"# {written.name}; world: {written.world}"
+    for name in ("rgb", "depth"):
+        listed = [f"{line.time_s:.6f} {getattr(line, name)}" for line in lines if getattr(line, name)]
+        if listed:
+            _write_lines(folder / f"{name}.txt", [comment, "# timestamp filename", *listed])
+    rows = [
+        f"{line.time_s:.6f} {_decimals((*matrix[:3, 3], *quaternion_of(matrix[:3, :3])))}"
+        for line, matrix in zip(lines, matrices, strict=True)
+    ]
+    _write_lines(folder / "groundtruth.txt", [comment, "# timestamp tx ty tz qx qy qz qw", *rows])
+
+
+def _decimals(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.9f}" for value in values)
+
+
+def _write_lines(path: Path, lines: Iterable[str]) -> None:
+    path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

@@ -23,7 +23,7 @@ from evonav.memory_benchmark.answers import (
     MemoryFailedError,
     checked,
 )
-from evonav.memory_benchmark.hosting.local import Cost
+from evonav.memory_benchmark.local import Cost, HostedMemory
 from evonav.memory_benchmark.protocol import FoundPlace, Memory, MemoryFrame, StreamInfo
 
 _KINDS: dict[ErrorKind, FailureKind] = {ErrorKind.TIMEOUT: "hung", ErrorKind.CRASH: "died"}
@@ -33,30 +33,27 @@ class _MemoryProcess(AgentProcess):
     """A process with a memory in it."""
 
     noun = "memory"
-    serving = "evonav.memory_benchmark.hosting.serving"
+    serving = "evonav.memory_benchmark.local"
     max_answer_bytes = 400 * MAX_ENTRIES
 
 
-class RemoteMemory:
+class RemoteMemory(HostedMemory):
     """A memory in a process of its own; its answers were checked there and are read as plain data."""
 
     hosting: Hosting = "process"
 
-    def __init__(self, memory: Component[Memory], *, timeout_s: float, memory_mb: int | None = None) -> None:
+    def __init__(self, memory: Component[Memory], *, timeout_s: float) -> None:
         """Start the process and make the memory in it.
 
         Args:
             memory: Import path and keyword arguments of its factory.
             timeout_s: Time limit of a call.
-            memory_mb: Largest address space; default: no limit.
 
         Raises:
             MemoryFailedError: It cannot be made.
         """
-        self.rss_bytes: int | None = None
-        self.peak_rss_bytes: int | None = None
         try:
-            self._process = _MemoryProcess(memory.path, AgentHosting(timeout_s=timeout_s, memory_mb=memory_mb))
+            self._process = _MemoryProcess(memory.path, AgentHosting(timeout_s=timeout_s))
         except AgentFailedError as error:
             raise MemoryFailedError("load", str(error)) from None
         try:
@@ -92,7 +89,7 @@ class RemoteMemory:
         return checked(entries)
 
     def num_bytes(self, num_entries: int) -> int | None:
-        """Return the size that the memory tells; `None` if it tells none."""
+        """Return the size that the memory reports; `None` if it reports none."""
         parts = self._ask("num_bytes", num_entries)
         if parts["peak_mb"] is not None:
             self.peak_rss_bytes = round(float(parts["peak_mb"]) * (1 << 20))

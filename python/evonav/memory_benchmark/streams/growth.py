@@ -1,18 +1,15 @@
 """Plan tours of houses side by side, until a number of objects has been seen (S7)."""
 
-from collections.abc import Sequence
 from itertools import cycle, islice
 
 from evonav._core import House
 from evonav.house.files import stream_houses
 from evonav.memory_benchmark.streams.evidence import visible_px
-from evonav.memory_benchmark.streams.kinds.visits import Frames, generator_of, walk_in
 from evonav.memory_benchmark.streams.plan import PlannedScene, StreamPlan
 from evonav.memory_benchmark.streams.spec import MIN_ROOMS, StreamSpec, source_of
+from evonav.memory_benchmark.streams.visits import generator_of, walk_in
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.embedded import EmbeddedSimulator
-from evonav.world.pose import Pose
-from evonav.world.simulator import SceneObject
 
 CHECKPOINTS = (50, 100, 200, 400, 800)
 """Numbers of objects at which a memory is measured."""
@@ -39,38 +36,27 @@ def growth(spec: StreamSpec, houses: list[House]) -> StreamPlan:
 
     An object is seen at the first frame in which ground-truth perception reports it in the range of evidence.
     """
-    frames, scenes, seen = Frames(), list[PlannedScene](), set[str]()
+    plan, seen = StreamPlan([], [], []), set[str]()
     goals = sorted({goal for goal in CHECKPOINTS if goal < spec.max_objects} | {spec.max_objects})
-    checkpoints: list[tuple[int, int]] = []
     right_m = 0.0
     simulator = EmbeddedSimulator(spec.camera, allow_unknown_assets=spec.allow_unknown_assets)
     for number, house in enumerate(cycle(houses)):
         house_json = house.to_json()
         simulator.reset(house_json)
-        left_m, end_m = _extent_m(simulator.objects)
-        scenes.append(PlannedScene(house_json, (right_m - left_m, 0.0), f"{number}/"))
+        left_m = min(body.centre_m[0] - body.size_m[0] / 2.0 for body in simulator.objects)
+        end_m = max(body.centre_m[0] + body.size_m[0] / 2.0 for body in simulator.objects)
+        prefix = f"{number}/"
+        plan.scenes.append(PlannedScene(house_json, (right_m - left_m, 0.0), prefix))
         right_m += end_m - left_m + GAP_M
         for pose in islice(walk_in(spec, house_json, None, f"house {number}"), spec.frames_a_visit):
-            frames.add(number, 1, [pose])
-            seen |= {scenes[-1].prefix + object_id for object_id in _reported(simulator, pose)}
+            plan.add(number, 1, [pose])
+            frame = simulator.render(pose, rgb=False)
+            least_px = _GROUND_TRUTH.min_px(frame)
+            seen |= {prefix + one for one, px in visible_px(frame, simulator.objects).items() if px >= least_px}
             while goals and len(seen) >= goals[0]:
-                checkpoints.append((goals.pop(0), len(frames.poses) - 1))
+                plan.checkpoints.append((goals.pop(0), len(plan.frames) - 1))
             if not goals:
                 break
-        if not goals or len(scenes) > MAX_TOURS:
+        if not goals or len(plan.scenes) > MAX_TOURS:
             break
-    return frames.plan(scenes, tuple(checkpoints))
-
-
-def _extent_m(bodies: Sequence[SceneObject]) -> tuple[float, float]:
-    """Return the smallest and the largest x of a house."""
-    return (
-        min(body.centre_m[0] - body.size_m[0] / 2.0 for body in bodies),
-        max(body.centre_m[0] + body.size_m[0] / 2.0 for body in bodies),
-    )
-
-
-def _reported(simulator: EmbeddedSimulator, pose: Pose) -> set[str]:
-    frame = simulator.render(pose, rgb=False)
-    least_px = _GROUND_TRUTH.min_px(frame)
-    return {object_id for object_id, number in visible_px(frame, simulator.objects).items() if number >= least_px}
+    return plan

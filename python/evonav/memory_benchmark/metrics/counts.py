@@ -1,8 +1,16 @@
-"""Count what a memory removes, adds, moves, forgets and doubles, and the changes that it claims."""
+"""Count what a memory removes, adds, moves, forgets and doubles, how sure it was of it, and where it finds things."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.evaluation.episode.staleness import distance_to_box_m
+from evonav.memory_benchmark.protocol import FoundPlace
+from evonav.world.simulator import SceneObject
 
 PlaceKey = tuple[str, int]
 """An object at one of its places: its id, and how often it had moved before."""
@@ -63,10 +71,6 @@ def change_counts(snapshots: Sequence[BeliefSnapshot]) -> tuple[ChangeCounts, Ch
     return gone, come
 
 
-EVIDENCE_PX = 25
-"""Pixels in one frame from which on it is evidence of an object that is detected in it, or of an empty place."""
-
-
 @dataclass(slots=True)
 class UpdateCounts:
     """Counts of one stream; each change is judged at the end of the visit in which its evidence came."""
@@ -105,3 +109,101 @@ class UpdateCounts:
     """Claims that something is gone, see `change_counts`."""
     come: ChangeCounts = field(default_factory=ChangeCounts)
     """Claims that something has come."""
+
+
+NUM_BINS = 10
+"""Bins of the calibration error, of equal width."""
+LEAST_P = 1e-6
+"""Probabilities are kept this far from 0 and 1 in the logarithmic score."""
+
+
+@dataclass(slots=True)
+class BeliefScore:
+    """Sums over entries with a `p_present`, at the first and the last answer of each visit.
+
+    An entry is right if it is matched with an object, by the definition of *stale*.
+    """
+
+    n: int = 0
+    squared_error: float = 0.0
+    """Sum of (p - right)^2; by `n`, the Brier score (Brier, Monthly Weather Review 1950)."""
+    log_loss: float = 0.0
+    """Sum of -log of the probability given to what is so; by `n`, the NLL in nats."""
+    bins: list[list[float]] = field(default_factory=lambda: [[0.0, 0.0, 0.0] for _ in range(NUM_BINS)])
+    """Entries, sum of their probabilities and right ones, by probability."""
+
+    def take(self, p: NDArray[np.float64], is_right: NDArray[np.bool_]) -> None:
+        """Add entries.
+
+        Args:
+            p: `(N,)` probabilities.
+            is_right: `(N,)`.
+        """
+        right = is_right.astype(np.float64)
+        self.n += len(p)
+        self.squared_error += float(np.sum((p - right) ** 2))
+        inside = np.clip(p, LEAST_P, 1.0 - LEAST_P)
+        self.log_loss -= float(np.sum(np.where(right == 1.0, np.log(inside), np.log1p(-inside))))
+        sums = np.array(self.bins)
+        bins = np.minimum((p * NUM_BINS).astype(np.intp), NUM_BINS - 1)
+        np.add.at(sums, bins, np.column_stack([np.ones(len(p)), p, right]))
+        self.bins = sums.tolist()
+
+
+def calibration_error(bins: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the expected calibration error: the mean distance of bin means from the share of right entries.
+
+    Source: Naeini et al., AAAI 2015.
+
+    Args:
+        bins: `(..., NUM_BINS, 3)`, see `BeliefScore.bins`.
+
+    Returns:
+        `(...)`; NaN without entries.
+    """
+    total = bins[..., 0].sum(axis=-1)
+    gap = np.abs(bins[..., 1] - bins[..., 2]).sum(axis=-1)
+    error: NDArray[np.float64] = np.divide(gap, total, out=np.full_like(total, np.nan), where=total > 0)
+    return error
+
+
+HIT_M = 1.0
+"""Distance from a place to an object's box up to which the place is a hit."""
+NUM_PLACES = 5
+"""Places that are asked for."""
+
+QueryState = Literal["before", "after", "after_evidence"]
+"""Whether an object of the label has changed so far, and whether there was evidence of all of these changes."""
+
+
+@dataclass(slots=True)
+class QueryCounts:
+    """Counts of the questions of one state."""
+
+    n: int = 0
+    hits_at_1: int = 0
+    hits_at_5: int = 0
+    reciprocal_ranks: float = 0.0
+    """Sum of 1 / rank of the first true place; 0 for an answer without one."""
+
+    def take(self, objects: Sequence[SceneObject], places: Sequence[FoundPlace]) -> None:
+        """Add the answer to a question.
+
+        Args:
+            objects: All that the question names, where it stands now.
+            places: The answer, the best first.
+        """
+        self.n += 1
+        rank = true_rank(objects, places)
+        if rank is not None:
+            self.hits_at_1 += rank == 1
+            self.hits_at_5 += rank <= NUM_PLACES
+            self.reciprocal_ranks += 1.0 / rank
+
+
+def true_rank(objects: Sequence[SceneObject], places: Sequence[FoundPlace]) -> int | None:
+    """Return the 1-based rank of the first place within `HIT_M` of an object; `None` if there is none."""
+    for rank, place in enumerate(places, start=1):
+        if any(distance_to_box_m(place.position_m, body) <= HIT_M for body in objects):
+            return rank
+    return None

@@ -2,32 +2,28 @@
 
 import math
 from collections import Counter
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evonav._core import House
 from evonav.memory_benchmark.streams.evidence import num_looks_through
-from evonav.memory_benchmark.streams.kinds.visits import visits
 from evonav.memory_benchmark.streams.plan import StreamPlan
 from evonav.memory_benchmark.streams.rendered import RenderedStream
 from evonav.memory_benchmark.streams.spec import StreamSpec
+from evonav.memory_benchmark.streams.visits import visits
+from evonav.memory_benchmark.truth import EVIDENCE_PX
 from evonav.world.simulator import Frame, SceneObject
 
 MAX_GLANCES = 5
 """Largest number of frames of a visit that show a changed place."""
 SIDE_RAD = math.radians(45.0)
 """Largest angle, at the place, between the first glance and another: all come from one side."""
-EVIDENT_PX = 25
-"""Pixels from which a glance is evidence, as in ground-truth perception."""
 HIDDEN_SHARE = 0.5
 """A place is partly hidden if at most this share of its box's pixels in the image shows it."""
 CANDIDATES = 2
 """Frames candidates for each frame of a visit: those that show too much are left out."""
-
-I64 = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +34,7 @@ class _Look:
     """Direction from the place to the camera."""
     is_hidden: bool
     is_evident: bool
-    """Whether it shows at least `EVIDENT_PX` pixels of the place."""
+    """Whether it shows at least `EVIDENCE_PX` pixels of the place."""
 
 
 def glances(spec: StreamSpec, house: House) -> StreamPlan:
@@ -46,7 +42,7 @@ def glances(spec: StreamSpec, house: House) -> StreamPlan:
 
     A changed place is the old box of an object that has gone, until it is taken, and an object that has moved or is
     new, in this visit or before. It counts as shown with one pixel, at any distance. Frames in which all such places
-    are partly hidden are preferred; others are taken for places that would have no glance of `EVIDENT_PX` else.
+    are partly hidden are preferred; others are taken for places that would have no glance of `EVIDENCE_PX` else.
 
     Args:
         house: The house before the changes.
@@ -55,21 +51,12 @@ def glances(spec: StreamSpec, house: House) -> StreamPlan:
         HouseError: The house does not change at any attempt.
     """
     candidates = visits(replace(spec, frames_a_visit=CANDIDATES * spec.frames_a_visit), house)
-    stream = RenderedStream(spec, candidates)
-    shown_in = _glances_of(stream)
-    frames = np.concatenate(
-        [
-            _selected(np.flatnonzero(candidates.visits == visit), shown_in, spec.frames_a_visit)
-            for visit in np.unique(candidates.visits)
-        ]
-    )
-    return replace(
-        candidates,
-        frame_scenes=candidates.frame_scenes[frames],
-        visits=candidates.visits[frames],
-        times_s=candidates.times_s[frames],
-        poses=candidates.poses[frames],
-    )
+    shown_in = _glances_of(RenderedStream(spec, candidates))
+    indices: dict[int, list[int]] = {}
+    for index, frame in enumerate(candidates.frames):
+        indices.setdefault(frame.visit, []).append(index)
+    chosen = [index for mine in indices.values() for index in _selected(mine, shown_in, spec.frames_a_visit)]
+    return replace(candidates, frames=[candidates.frames[index] for index in chosen])
 
 
 def _glances_of(stream: RenderedStream) -> list[Mapping[Hashable, _Look]]:
@@ -94,10 +81,10 @@ def _look(frame: Frame, place: SceneObject, count: int) -> _Look:
     nothing = np.full_like(frame.depth_m, np.inf)
     in_box = num_looks_through(nothing, frame.pose, frame.intrinsics, place)
     bearing_rad = math.atan2(frame.pose.x_m - place.centre_m[0], frame.pose.z_m - place.centre_m[2])
-    return _Look(bearing_rad, count <= HIDDEN_SHARE * in_box, count >= EVIDENT_PX)
+    return _Look(bearing_rad, count <= HIDDEN_SHARE * in_box, count >= EVIDENCE_PX)
 
 
-def _selected(frames: I64, shown_in: list[Mapping[Hashable, _Look]], num_frames: int) -> I64:
+def _selected(frames: Sequence[int], shown_in: list[Mapping[Hashable, _Look]], num_frames: int) -> list[int]:
     """Return the frames of one visit that stay, ascending."""
     counts, bearings_rad, evident = Counter[Hashable](), dict[Hashable, float](), set[Hashable]()
     glanced: list[int] = []
@@ -110,7 +97,7 @@ def _selected(frames: I64, shown_in: list[Mapping[Hashable, _Look]], num_frames:
         )
 
     for needs_hidden in (True, False):
-        for index in frames.tolist():
+        for index in frames:
             shown = shown_in[index]
             new = {place for place, look in shown.items() if look.is_evident} - evident
             is_wanted = all(look.is_hidden for look in shown.values()) if needs_hidden else bool(new)
@@ -121,5 +108,5 @@ def _selected(frames: I64, shown_in: list[Mapping[Hashable, _Look]], num_frames:
                 evident |= new
                 for place, look in shown.items():
                     bearings_rad.setdefault(place, look.bearing_rad)
-    others = [index for index in frames.tolist() if not shown_in[index]]
-    return np.array(sorted([*glanced, *others[: num_frames - len(glanced)]]), np.int64)
+    others = [index for index in frames if not shown_in[index]]
+    return sorted([*glanced, *others[: num_frames - len(glanced)]])

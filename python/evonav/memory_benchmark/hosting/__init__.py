@@ -1,1 +1,0 @@
-"""Run a benchmarked memory in this process or in one of its own."""

@@ -1,1 +1,0 @@
-"""Memories of other libraries, to compare ours with (extra `bench`)."""
