@@ -7,12 +7,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 MAX_SHOWN = 100
 """Longest wrong value in a sentence, in characters."""
 
-Real = Annotated[float, Field(ge=-1e9, le=1e9)]
-"""Metres, radians or degrees, far beyond any house. Sums and squares of such numbers are finite."""
-Point2 = tuple[Real, Real]
-"""`(x, z)` in metres."""
-Point3 = tuple[Real, Real, Real]
-"""`(x, y, z)` in metres, or Unity Euler angles in degrees."""
 Version = Annotated[int, Field(ge=1, le=1, strict=True)]
 """The version of a file's format, of which there is one so far. `Literal[1]` would take `true` for it."""
 

@@ -45,7 +45,7 @@ def test_a_belief_is_read_as_written():
         ({"probabilities": (0.5, math.nan, 0.2)}, "places.probabilities.1 = nan: Input should be a finite number"),
         ({"probabilities": (0.5,)}, "places.probabilities: 1 values, expected one for each of the 3 centres_m"),
         ({"cell_m": 0.0}, "places.cell_m = 0.0: must be above 0"),
-        ({"centres_m": ((0.0, 2e6), (0.0, 0.0), (0.0, 0.0))}, "places.centres_m.0 = 2000000.0: must be -1000000"),
+        ({"centres_m": ((0.0, 2e6), (0.0, 0.0), (0.0, 0.0))}, "places.centres_m.0.1 = 2000000.0: Input should be less"),
         ({"centres_m": ((0.0, 0.0),) * 20_001, "probabilities": (0.0,) * 20_001}, "20001 squares, must be at most"),
     ],
 )

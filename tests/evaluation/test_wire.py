@@ -12,10 +12,11 @@ from evonav.agents.agent import EntryBelief, Move, NavigateTo, SensorConfig, Sto
 from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting import wire
 from evonav.errors import InvalidArgumentError
+from evonav.points import MAX_M
 from evonav.world.simulator import Action
 
-COORDINATES = st.floats(-wire.MAX_M, wire.MAX_M)
-SIZES = st.floats(0.0, wire.MAX_M)
+COORDINATES = st.floats(-MAX_M, MAX_M)
+SIZES = st.floats(0.0, MAX_M)
 POINTS = st.tuples(COORDINATES, COORDINATES)
 TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=20)
 ENTRIES = st.builds(
@@ -63,8 +64,8 @@ def test_beliefs_are_refused_or_within_their_limits(entry, num_entries, count) -
     except InvalidArgumentError:
         return
     assert found.chosen_entry == read
-    assert all(abs(value) <= wire.MAX_M for value in read.centre_m)
-    assert all(0.0 <= value <= wire.MAX_M for value in read.size_m)
+    assert all(abs(value) <= MAX_M for value in read.centre_m)
+    assert all(0.0 <= value <= MAX_M for value in read.size_m)
     assert abs(read.entry_id) <= 2**63
     assert 0 <= found.num_entries <= wire.MAX_COUNT
     assert abs(found.counters["conflicts"]) <= wire.MAX_COUNT
@@ -88,8 +89,8 @@ def test_numbers_of_numpy_and_halves_of_pairs_are_written() -> None:
     ("action", "message"),
     [
         ("forward", "'forward' is no action: answer Move"),
-        (NavigateTo((math.nan, 0.0)), r"action\.navigate_to = .*coordinates = nan: must be -1000000 to 1000000"),
-        (NavigateTo((1.0, 2.0), (math.inf, 0.0)), "coordinates = inf: must be"),
+        (NavigateTo((math.nan, 0.0)), r"action\.navigate_to\.position_m\.0 = nan: .*finite"),
+        (NavigateTo((1.0, 2.0), (math.inf, 0.0)), r"face_m\.0 = inf: .*finite"),
         (NavigateTo((1.0, 2.0, 3.0)), r"action\.navigate_to\.position_m = \[1\.0, 2\.0, 3\.0\]"),
         (NavigateTo("ab"), r"action\.navigate_to\.position_m = 'ab'"),
         (Move("MoveAhead!"), r"action\.move\.action = 'MoveAhead!'"),

@@ -1,8 +1,9 @@
 """The agent contract: what evonav evaluates, and every answer that an agent may give."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from evonav.points import Point2, Point3, Real
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Action
@@ -19,6 +20,8 @@ class Move:
     """
 
     action: Action
+    kind: Literal["move"] = field(default="move", kw_only=True, repr=False)
+    """The name of this type of answer in files, as in all answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +34,11 @@ class NavigateTo:
         NavigateTo(position_m=(3.5, 2.0), face_m=None)
     """
 
-    position_m: tuple[float, float]
+    position_m: Point2
     """`(x, z)`; snapped to the nearest free point."""
-    face_m: tuple[float, float] | None = None
+    face_m: Point2 | None = None
     """`(x, z)` to face on arrival; default: the direction of travel."""
+    kind: Literal["navigate_to"] = field(default="navigate_to", kw_only=True, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,7 @@ class Stop:
 
     reason: str = "arrived"
     """`arrived`, or why the agent gave up; recorded, not scored."""
+    kind: Literal["stop"] = field(default="stop", kw_only=True, repr=False)
 
 
 AgentAction = Move | NavigateTo | Stop
@@ -59,7 +64,7 @@ class ViewSchedule:
     """Views of a round: `count` cameras, `spacing_deg` apart, centred on the heading; the heading view comes last."""
 
     count: int
-    spacing_deg: float
+    spacing_deg: Real
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +83,9 @@ class SensorConfig:
     needs_rgb: bool = False
     motion: Literal["waypoints", "actions"] = "waypoints"
     """The unit of the stage's budget: 50 decision rounds, or 500 discrete actions (UniGoal; paper, Sec. C.3)."""
-    max_travel_m: float = 1.0
+    max_travel_m: Real = 1.0
     """Path length that a `NavigateTo` covers in one round."""
-    occupancy_range_m: float = 3.0
+    occupancy_range_m: Real = 3.0
 
 
 class Agent(Protocol):
@@ -122,11 +127,11 @@ class EntryBelief:
 
     entry_id: int
     label: str
-    centre_m: tuple[float, float, float]
-    size_m: tuple[float, float, float]
+    centre_m: Point3
+    size_m: Point3
     """Edge lengths of the axis-aligned box."""
     num_detections: int
-    p_present: float | None = None
+    p_present: Real | None = None
     """Probability that the object is still there, 0 to 1, if the agent has one: it is scored as a stage begins."""
 
 
@@ -141,9 +146,9 @@ class PlaceBelief:
         >>> belief = evonav.PlaceBelief(cell_m=0.5, centres_m=((1.25, 2.75), (1.75, 2.75)), probabilities=(0.6, 0.3))
     """
 
-    cell_m: float
+    cell_m: Real
     """Edge of the squares."""
-    centres_m: tuple[tuple[float, float], ...]
+    centres_m: tuple[Point2, ...]
     """Middles of the squares, `(x, z)`."""
-    probabilities: tuple[float, ...]
+    probabilities: tuple[Real, ...]
     """Probability of each square, 0 to 1."""

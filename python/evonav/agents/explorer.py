@@ -8,7 +8,7 @@ import numpy as np
 from evonav.agents.grid import eroded
 from evonav.memory import Frontier, FrontierConfig, OccupancyMap
 from evonav.memory.occupancy import UNKNOWN
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
 COARSE_M = 0.25

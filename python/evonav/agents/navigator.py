@@ -20,7 +20,7 @@ from evonav.memory.colours import Layout
 from evonav.memory.objects import ObjectEntry, ObjectUpdate
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.memory.views import StoredView, ViewStore
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 
 DAY_S = 86400.0

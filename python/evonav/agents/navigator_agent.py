@@ -16,7 +16,7 @@ from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.rules import TextMatch
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

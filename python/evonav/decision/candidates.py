@@ -5,7 +5,7 @@ from typing import Literal
 
 from evonav.decision.pictures import Picture
 from evonav.memory.colours import Layout
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ from typing import Literal
 
 from evonav._core import House, Wall, object_outlines
 from evonav._core import Opening as HouseOpening
-from evonav.records import Point2, Point3, Record
+from evonav.points import Point2, Point3
+from evonav.records import Record
 
 OpeningKind = Literal["door", "window"]
 

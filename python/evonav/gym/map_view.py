@@ -17,7 +17,7 @@ from evonav.drawing.floor_plan import Frame, frame_of
 from evonav.drawing.plan import HousePlan, plan_of
 from evonav.gym.config import NavConfig
 from evonav.gym.worlds import StageWorld
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.metrics.scoring import StageScore
 from evonav.gym.config import STEP_COST, SUCCESS_REWARD, NavConfig
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.world.pose import Pose
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import View
 
 Box = tuple[Point3, Point3]

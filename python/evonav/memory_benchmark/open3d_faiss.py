@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from evonav.component import optional_module
 from evonav.memory import ObjectMapConfig
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import View
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import View
 from evonav.world.simulator import Intrinsics
 

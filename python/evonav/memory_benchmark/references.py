@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from evonav.memory import forgetting
 from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.world.camera import unproject
 
 SEEN_BYTES = 150

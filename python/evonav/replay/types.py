@@ -13,7 +13,7 @@ from evonav.agents.agent import PlaceBelief
 from evonav.agents.explanation import FrontierBelief
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EntryRecord, PoseRecord, RoundRecord, StageRecord
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `ReplayedMap.cells`; explored cells are free ones that were seen from close by."""

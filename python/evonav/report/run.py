@@ -17,7 +17,7 @@ from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import FailureCause
 

@@ -16,7 +16,7 @@ from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.convert import pose_record, sensor_config
 from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 
 TOLERANCE = 1e-9
 """Allowed difference of a claimed score, since other machines may round sums differently."""

@@ -9,7 +9,8 @@ from pydantic import (
     PositiveInt,
 )
 
-from evonav.records import Point2, Point3, Record, Version
+from evonav.points import Point2, Point3
+from evonav.records import Record, Version
 from evonav.tasks.records import Id, PoseRecord, Probability, Sha256
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]

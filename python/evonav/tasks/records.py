@@ -17,7 +17,8 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import Field, ValidationError
 
 from evonav.errors import TaskError
-from evonav.records import Point3, Record, sentences_of, wrong_value
+from evonav.points import Point3
+from evonav.records import Record, sentences_of, wrong_value
 from evonav.world.pose import Pose
 
 MAX_FILE_BYTES = 64 * 2**20

@@ -4,6 +4,9 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
+from evonav.points import Point3, Real
+
+_HORIZON_RAD = math.radians(30.0)
 _DECIMALS_DEG = 4
 """Decimals of an angle in degrees: angles are whole multiples of 1e-4 degrees, see `Pose.canonical`."""
 
@@ -19,12 +22,12 @@ class Pose:
         ((1.0, 0.9, 2.0), 90.0)
     """
 
-    x_m: float
-    y_m: float
-    z_m: float
-    yaw_rad: float
+    x_m: Real
+    y_m: Real
+    z_m: Real
+    yaw_rad: Real
     """Yaw, 0 along +z, growing towards +x (clockwise seen from above)."""
-    horizon_rad: float = math.radians(30.0)
+    horizon_rad: Real = _HORIZON_RAD
     """Camera pitch, positive looking down (30 degrees is ProcTHOR's default)."""
 
     @staticmethod
@@ -34,7 +37,7 @@ class Pose:
         return Pose(x_m, y_m, z_m, canonical_yaw_rad(yaw_rad), canonical_horizon_rad(horizon_rad))
 
     @property
-    def position_m(self) -> tuple[float, float, float]:
+    def position_m(self) -> Point3:
         """Position `(x, y, z)` in metres."""
         return (self.x_m, self.y_m, self.z_m)
 

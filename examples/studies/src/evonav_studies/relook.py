@@ -14,7 +14,7 @@ from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
 from evonav.memory.presence import Presence
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose

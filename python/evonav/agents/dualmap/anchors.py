@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from evonav.agents.relatedness import Feature
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.objects import ObjectEntry
-from evonav.records import Point3
+from evonav.points import Point3
 
 CONTENT_M = 0.1
 """Edge of the cube by which contents are described: their places are not remembered."""

@@ -10,7 +10,7 @@ from evonav.agents.frontier_update.own_exploration import OwnExploration, Place
 from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectMap, ObjectUpdate
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

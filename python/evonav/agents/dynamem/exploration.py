@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.memory.occupancy import BLOCKED, FREE, OccupancyMap
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, View
 
 NEVER = -1

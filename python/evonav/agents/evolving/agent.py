@@ -22,7 +22,7 @@ from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 

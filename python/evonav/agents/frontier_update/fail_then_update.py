@@ -12,7 +12,7 @@ from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal, TaskInfo
 

@@ -9,7 +9,7 @@ from evonav.agents.agent import AgentAction, NavigateTo
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.decision.candidates import FrontierCandidate
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 
 

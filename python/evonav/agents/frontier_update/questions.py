@@ -15,7 +15,7 @@ from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)

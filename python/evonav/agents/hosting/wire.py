@@ -15,14 +15,11 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 import numpy as np
 from pydantic import (
     AfterValidator,
-    ConfigDict,
     Discriminator,
     FailFast,
     Field,
-    Tag,
     TypeAdapter,
     ValidationError,
-    with_config,
 )
 from pydantic_core import PydanticSerializationError, to_json, to_jsonable_python
 
@@ -35,12 +32,12 @@ from evonav.agents.agent import (
     PlaceBelief,
     SensorConfig,
     Stop,
-    ViewSchedule,
 )
 from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.errors import InvalidArgumentError
+from evonav.points import MAX_M
 from evonav.records import sentence_of
 from evonav.world.simulator import Action
 
@@ -53,8 +50,6 @@ MAX_DEPTH = 32
 """Limit of lists and dictionaries in each other, in diagnostics."""
 MAX_VALUE = 200
 """Longest value in an error, in characters."""
-MAX_M = 1e6
-"""Largest coordinate and edge of a box, in metres: sums and squares of such numbers are finite."""
 MAX_LABEL = 1000
 """Longest label of an entry, in characters."""
 MAX_PLACES = 20_000
@@ -135,17 +130,11 @@ def _plain(value: object) -> object:
 # Actions
 
 
-def _near(action: NavigateTo) -> NavigateTo:
-    _check("coordinates", (*action.position_m, *(action.face_m or ())), -MAX_M, MAX_M)
-    return action
-
-
-_KINDS = {"move": Move, "navigate_to": NavigateTo, "stop": Stop}
 _Action = Annotated[
-    Annotated[Move, AfterValidator(lambda move: Stop() if move.action is Action.STOP else move), Tag("move")]
-    | Annotated[NavigateTo, AfterValidator(_near), Tag("navigate_to")]
-    | Annotated[Stop, AfterValidator(lambda stop: Stop(stop.reason[:MAX_MESSAGE])), Tag("stop")],
-    Discriminator(lambda value: value.get("kind") if isinstance(value, dict) else None),
+    Annotated[Move, AfterValidator(lambda move: Stop() if move.action is Action.STOP else move)]
+    | NavigateTo
+    | Annotated[Stop, AfterValidator(lambda stop: Stop(stop.reason[:MAX_MESSAGE]))],
+    Discriminator("kind"),
 ]
 _ACTION: Part[AgentAction] = Part("action", _Action, MAX_DIAGNOSTICS_BYTES)
 
@@ -156,10 +145,9 @@ def write_action(action: object) -> bytes:
     Raises:
         InvalidArgumentError: It is no action, or not JSON-ready.
     """
-    for kind, of_kind in _KINDS.items():
-        if isinstance(action, of_kind):
-            values = {field.name: getattr(action, field.name) for field in fields(of_kind)}
-            return _ACTION.write({"kind": kind, **values})
+    for kind in (Move, NavigateTo, Stop):
+        if isinstance(action, kind):
+            return _ACTION.write({field.name: getattr(action, field.name) for field in fields(kind)})
     raise InvalidArgumentError(f"{action!r} is no action: answer Move(Action), NavigateTo((x, z)) or Stop()")
 
 
@@ -183,7 +171,6 @@ def _check(name: str, values: Iterable[float], least: float, most: float) -> Non
 
 
 def _possible_entry(entry: EntryBelief) -> EntryBelief:
-    _check("centre_m", entry.centre_m, -MAX_M, MAX_M)
     _check("size_m", entry.size_m, 0.0, MAX_M)
     if len(entry.label) > MAX_LABEL:
         raise ValueError(f"label must have at most {MAX_LABEL} characters")
@@ -203,8 +190,7 @@ def _check_places(places: PlaceBelief) -> None:
         raise ValueError(f"places.probabilities: {num} values, expected one for each of the {num_expected} centres_m")
     if num > MAX_PLACES:
         raise ValueError(f"places.centres_m: {num} squares, must be at most {MAX_PLACES}")
-    for index, (centre_m, probability) in enumerate(zip(places.centres_m, places.probabilities, strict=True)):
-        _check(f"places.centres_m.{index}", centre_m, -MAX_M, MAX_M)
+    for index, probability in enumerate(places.probabilities):
         _check(f"places.probabilities.{index}", (probability,), 0, 1)
     total = math.fsum(places.probabilities)
     if total > 1.0 + SUM_SLACK:
@@ -234,10 +220,6 @@ def _check_depth(value: object, depth: int) -> None:
     for part in value.values() if isinstance(value, dict) else value:
         _check_depth(part, depth - 1)
 
-
-# Only `details` may hold NaN or infinity.
-for _kind in (SensorConfig, ViewSchedule, EntryBelief, PlaceBelief, RoundDiagnostics):
-    with_config(ConfigDict(allow_inf_nan=False))(_kind)
 
 SENSORS: Part[SensorConfig] = Part("sensors", SensorConfig, MAX_DIAGNOSTICS_BYTES)
 """The sensors that an agent needs; the limits of the protocol are not checked here."""

@@ -25,7 +25,7 @@ from evonav.decision.pictures import picture_of
 from evonav.decision.question import DecisionModel
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

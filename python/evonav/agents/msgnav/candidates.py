@@ -6,7 +6,7 @@ from typing import Literal
 
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.pictures import Picture
-from evonav.records import Point2
+from evonav.points import Point2
 
 
 @dataclass(frozen=True, slots=True)

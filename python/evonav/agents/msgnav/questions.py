@@ -21,7 +21,7 @@ from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesN
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher, gap_m
 from evonav.decision.text.ranking import rank_entries
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.memory.objects import ObjectMap, SightConfig
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
 

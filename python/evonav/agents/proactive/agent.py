@@ -40,7 +40,7 @@ from evonav.decision.text.language import similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 

@@ -18,7 +18,7 @@ from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
 FRONTIER_REACH_M = 4.0

@@ -21,7 +21,7 @@ from evonav.decision.home_statistics import room_ratios
 from evonav.decision.text.language import ParsedGoal, canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 
 AT_DOOR_M = 0.75
 """Largest distance between a frontier and the box of a door that leads to what is behind it."""

@@ -13,7 +13,7 @@ from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.posterior import Posterior, Surroundings
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.occupancy import BLOCKED, UNKNOWN, OccupancyMap
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
 FULL_KNOWN_SHARE = 0.5

@@ -9,7 +9,7 @@ from evonav.agents.grid import box_distance_m
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text.language import canonical, is_structure
 from evonav.memory.objects import ObjectMap, ObjectUpdate
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 from evonav.sensors.observation import View
 from evonav.world.camera import project, unproject_pixels
 

@@ -9,7 +9,7 @@ from evonav.agents.grid import CoarseFrame
 from evonav.agents.proactive.posterior import Posterior, Surroundings
 from evonav.agents.proactive.search import Option, shown_from, window_sums
 from evonav.memory.occupancy import OccupancyMap
-from evonav.records import Point2
+from evonav.points import Point2
 
 Placed = Sequence[tuple[Point2, float]]
 """Places and their weights."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from evonav import _core
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import StoredView, ViewStore
-from evonav.records import Point2
+from evonav.points import Point2
 
 RECLUSTER_REACH_M = 4.0
 """Entries nearer to the agent than this are clustered again (3D-Mem: the 3.5 m of its detections and 0.5 m)."""

@@ -11,7 +11,7 @@ from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate, rank_entries
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, View
 
 Cells = NDArray[np.int32]

@@ -8,7 +8,7 @@ import numpy as np
 from evonav.agents.unigoal.bev import BevMap, Cells
 from evonav.agents.unigoal.planner import UniGoalPlanner
 from evonav.memory.views import boxes_of
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE
 from evonav.world.pose import Pose

@@ -24,7 +24,7 @@ from evonav.decision.pictures import Picture
 from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import View
 from evonav.tasks.public import Goal
 from evonav.tasks.vocabulary import CODE_CATEGORIES, FALLBACK_CATEGORY, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY

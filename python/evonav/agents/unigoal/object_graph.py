@@ -12,7 +12,7 @@ from typing import Literal
 
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import LABEL_TRANSLATION, relabelled
 

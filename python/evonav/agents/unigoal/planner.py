@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from evonav.agents.unigoal.bev import BevMap, Cells
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
 

@@ -18,7 +18,7 @@ from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, View
 
 

@@ -16,7 +16,7 @@ from evonav.agents.value_maps.pursuit import SAME_M, Pursuit
 from evonav.decision.question import DecisionModel
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectMap, ObjectUpdate
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

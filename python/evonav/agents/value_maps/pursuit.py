@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from evonav.agents.frontier_update.own_exploration import Place
-from evonav.records import Point2
+from evonav.points import Point2
 
 SAME_M = 0.5
 """A place this near the last one stands for it if the last one is gone (VLFM, OneMap)."""

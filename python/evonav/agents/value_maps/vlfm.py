@@ -12,7 +12,7 @@ from evonav.agents.value_maps.cone_map import ConeMap, ConeMapConfig, largest_wi
 from evonav.agents.value_maps.pursuit import Pursuit
 from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectMap, ObjectUpdate
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import Goal
 

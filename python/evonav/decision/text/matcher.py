@@ -12,7 +12,7 @@ from functools import partial
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, is_structure, parse_goal, similarity
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 ROOM_SIGNS: dict[str, tuple[str, ...]] = {

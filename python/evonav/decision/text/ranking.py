@@ -12,7 +12,7 @@ from evonav.decision.question import AnswerError
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.tasks.public import Goal
 
 _DECIMALS = 4

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.world.pose import Pose, moved, turned
 from evonav.world.simulator import Action, OccupancyGrid, Simulator
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

@@ -6,7 +6,7 @@ The evaluator's stages and Gymnasium's environments end and score by this one st
 from dataclasses import dataclass
 
 from evonav.evaluation.metrics.scoring import StageScore, score_stage
-from evonav.records import Point2
+from evonav.points import Point2
 
 
 @dataclass(slots=True)

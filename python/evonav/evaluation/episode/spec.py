@@ -13,7 +13,7 @@ from evonav.evaluation.records.floor_plans import FloorPlan, floor_plan_of, imag
 from evonav.evaluation.records.oracle import during_record, target_record, transition_record
 from evonav.evaluation.records.schema import EndState, GoalRecord, StageRecord, TargetRecord
 from evonav.house import House
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import Goal

@@ -22,7 +22,7 @@ from evonav.evaluation.records.convert import action_record, pose_record, sensin
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import EndState, ErrorKind, MemoryRecord, RoundRecord, StageRecord
 from evonav.perception import Perception, StageScene
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose

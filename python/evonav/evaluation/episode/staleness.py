@@ -20,7 +20,7 @@ from evonav.agents.agent import EntryBelief
 from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.changes import Relocation
 from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, StaleEntryRecord
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
 from evonav.world.pose import Pose

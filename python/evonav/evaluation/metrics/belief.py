@@ -8,7 +8,7 @@ from statistics import median
 import numpy as np
 
 from evonav.evaluation.records.base import BeliefRecord, PlacesRecord
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 
 NUM_BINS = 10
 """Number of bins of the expected calibration error, all of the same width."""

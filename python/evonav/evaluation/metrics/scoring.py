@@ -6,7 +6,7 @@ Evaluation, replays, the verification of submissions and Gymnasium all score wit
 import math
 from dataclasses import dataclass
 
-from evonav.records import Point2
+from evonav.points import Point2
 
 SUCCESS_RADIUS_M = 2.0
 """The paper's success radius."""

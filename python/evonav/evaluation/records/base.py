@@ -5,7 +5,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
-from evonav.records import Point2, Real, Record
+from evonav.points import Point2, Real
+from evonav.records import Record
 
 CheckedT = TypeVar("CheckedT", bound="CheckedRecord")
 

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from evonav.evaluation.records.base import Whole, WholeRecord
-from evonav.records import Point3, Real
+from evonav.points import Point3, Real
 
 
 class Relocation(WholeRecord):

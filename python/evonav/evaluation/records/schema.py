@@ -13,7 +13,8 @@ from pydantic import Field
 
 from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Whole, WholeRecord
 from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
-from evonav.records import Point2, Point3, Real, Version
+from evonav.points import Point2, Point3, Real
+from evonav.records import Version
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from evonav import _core
 from evonav.generation.result import Anchor, Appearance, Relations, Tint
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.tasks.colours import colour_word
 from evonav.tasks.language import MATERIALS, NUMBERS, listed, noun_of, plural_of, with_article
 

@@ -12,7 +12,7 @@ from evonav import _core
 from evonav.generation.validation.changes import Found
 from evonav.generation.validation.problems import ProblemKind
 from evonav.house import House, HouseObject
-from evonav.records import Point2, Point3
+from evonav.points import Point2, Point3
 from evonav.tasks.manifest import Task
 from evonav.tasks.oracle import DuringRecord, OracleStage
 from evonav.tasks.parameters import GenerationParameters
