@@ -3,13 +3,14 @@
 The names in the core's enums are compared in `rust/evonav-core/tests/generation/schema.rs`.
 """
 
+import json
 from collections.abc import Iterator
 from typing import Any, get_args
 
 import pytest
 
 from evonav import _core
-from evonav.generation.result import Anchor, GenerationResult, Given, GivenStage
+from evonav.generation.result import Anchor, GenerationResult, GivenStage
 from evonav.house import House, bundled_houses
 from evonav.records import Record
 from evonav.tasks.parameters import DuringStage, Extensions, GenerationParameters, Occurrence, Schedule
@@ -23,14 +24,14 @@ LEFT_OUT = {"during"}
 PEOPLE = Extensions(schedule=Schedule(num_persons=2, minutes_between_stages=90, tidiness=0.5))
 
 
-def result_of(house: House, seed: int, parameters: GenerationParameters) -> GenerationResult:
+def result_of(house: House, seed: int, parameters: GenerationParameters, *given: GivenStage) -> GenerationResult:
     text, _, _ = _core.generate_task(
         house,
         seed=seed,
         label="test",
         parameters_json=parameters.model_dump_json(),
         allow_unknown_assets=False,
-        given_json=Given().model_dump_json(),
+        given_json=json.dumps({"stages": [stage.model_dump() for stage in given]}),
     )
     return GenerationResult.model_validate_json(text)
 
@@ -99,15 +100,7 @@ def test_given_goals_reach_the_core() -> None:
     task = result_of(house, 0, parameters).task
     assert task is not None
     goal_id = task.stages[1].target.id
-    given = Given(stages=(GivenStage(goal_id=goal_id), GivenStage(is_evolved=False)))
-    text, _, _ = _core.generate_task(
-        house,
-        seed=0,
-        label="test",
-        parameters_json=parameters.model_dump_json(),
-        allow_unknown_assets=False,
-        given_json=given.model_dump_json(),
-    )
-    stages = GenerationResult.model_validate_json(text).task.stages  # type: ignore[union-attr]
+    given = (GivenStage(goal_id=goal_id), GivenStage(is_evolved=False))
+    stages = result_of(house, 0, parameters, *given).task.stages  # type: ignore[union-attr]
     assert stages[0].target.id == goal_id
     assert stages[1].evolution.outcome == "not_triggered"

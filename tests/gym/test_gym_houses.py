@@ -13,8 +13,7 @@ from evonav.generation.pipeline import generate_task
 from evonav.gym.sources import HouseTasks
 from evonav.house import House, stream_houses
 from evonav.house.files import HouseTexts
-from evonav.house.generated import SPLIT_SEEDS, house_maker
-from evonav.house.making import make_houses
+from evonav.house.generated import SPLIT_SEEDS, house_maker, make_houses
 
 SMALL = {"observations": ("depth", "pose", "category"), "width_px": 32, "height_px": 32, "max_steps": 3}
 

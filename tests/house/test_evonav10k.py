@@ -20,8 +20,7 @@ from evonav.generation.worker import GenerationOptions
 from evonav.house import House, evonav10k, stream_houses
 from evonav.house.evonav10k import SPLITS, MadeSplit, made_split, split_path
 from evonav.house.files import HouseTexts
-from evonav.house.generated import house_maker
-from evonav.house.making import MakingProgress
+from evonav.house.generated import MakingProgress, house_maker
 from evonav.house.procthor10k import Split
 from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import read_dataset

@@ -16,8 +16,7 @@ from evonav.generation.house_check import check_house, odd_bodies
 from evonav.generation.validation import validate_folder
 from evonav.generation.worker import GenerationOptions
 from evonav.house import House, stream_houses
-from evonav.house.generated import house_maker, read_house_parameters
-from evonav.house.making import MakingProgress, make_houses
+from evonav.house.generated import MakingProgress, house_maker, make_houses, read_house_parameters
 from evonav.parallel.worker import Workforce
 from evonav.tasks.parameters import GenerationParameters
 

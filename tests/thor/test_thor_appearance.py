@@ -18,10 +18,8 @@ OF_LIGHTING = {
 
 
 @pytest.fixture
-def controller(start_controller, house):
-    controller = start_controller(scene=house, width=96, height=72, **IMAGES)
-    controller.step("TeleportFull", **house["metadata"]["agent"], raise_for_failure=True)
-    return controller
+def controller(controller_in, house):
+    return controller_in(house, width=96, height=72, **IMAGES)
 
 
 def step(controller, action: str, **arguments: Any):
@@ -65,7 +63,7 @@ def _openable(controller) -> str:
     return next(one["objectId"] for one in controller.last_event.metadata["objects"] if one["openable"])
 
 
-def test_draws_differ_and_are_the_same_in_an_equal_session(controller, start_controller, house) -> None:
+def test_draws_differ_and_are_the_same_in_an_equal_session(controller) -> None:
     def session(controller) -> list[np.ndarray]:
         step(controller, "SetRandomSeed", seed=4)
         return [step(controller, name).frame for name in ("RandomizeMaterials", "RandomizeColors") * 2]

@@ -10,10 +10,8 @@ ALL_IMAGES = {"renderDepthImage": True, "renderInstanceSegmentation": True, "ren
 
 
 @pytest.fixture
-def controller(start_controller, house):
-    controller = start_controller(scene=house, width=WIDTH, height=HEIGHT, **ALL_IMAGES)
-    controller.step("TeleportFull", **house["metadata"]["agent"], raise_for_failure=True)
-    return controller
+def controller(controller_in, house):
+    return controller_in(house, width=WIDTH, height=HEIGHT, **ALL_IMAGES)
 
 
 def vector(x: float, y: float, z: float) -> dict[str, float]:

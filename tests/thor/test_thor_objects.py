@@ -11,26 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 from recorded_data import data_folder, data_path, needs_data
+from thor_engine import Json, engine_in, records
 
 from evonav.house import bundled_houses
 from evonav.thor import edits, objects
 from evonav.thor.asset_metadata import metadata_of_asset
-from evonav.thor.engine import Engine
-
-Json = dict[str, Any]
 
 ROOT = Path(__file__).parents[2]
 RECORDED = data_path("ram81-procthor-1k")
 needs_recorded = needs_data("ram81-procthor-1k", "ram81-procthor-100k-history", "procthor-databases")
-
-
-def engine_of(house: Json) -> Engine:
-    engine = Engine()
-    engine.configure()
-    assert engine.execute({"action": "CreateHouse", "house": house}).is_success
-    start = engine.scene.simulator.pose
-    engine.agent.x_m, engine.agent.z_m = start.x_m, start.z_m
-    return engine
 
 
 @cache
@@ -46,7 +35,7 @@ def recorded_cubes() -> list[Json]:
 @needs_recorded
 def test_records_have_the_fields_of_recorded_ones() -> None:
     house = json.loads(next(iter(bundled_houses(1))).to_json())
-    scene = engine_of(house).scene
+    scene = engine_in(house).scene
     fields = set(recorded_cubes()[0])
     assert all(set(record) == fields for record in objects.static_records(scene))
 
@@ -118,10 +107,10 @@ def records_in(node: Any) -> list[Json]:
 
 def test_an_object_in_a_fridge_is_cold() -> None:
     house = json.loads(list(bundled_houses(3))[2].to_json())
-    records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
-    fridge = next(record for record in records.values() if record["objectType"] == "Fridge")
+    found = records(engine_in(house))
+    fridge = next(record for record in found.values() if record["objectType"] == "Fridge")
     assert fridge["receptacleObjectIds"]
-    cold = {object_id for object_id, record in records.items() if record["temperature"] == "Cold"}
+    cold = {object_id for object_id, record in found.items() if record["temperature"] == "Cold"}
     assert cold == set(fridge["receptacleObjectIds"])
 
 
@@ -147,7 +136,7 @@ def test_objects_have_the_same_receptacles_as_recorded_cubes() -> None:
     houses = rows(RECORDED / "val.jsonl.gz")
     agreed = total = 0
     for index in sorted({episode["scene"] for episode in rows(RECORDED / "procthor-attr-onav-locobot-val.jsonl.gz")}):
-        scene = engine_of(houses[index]).scene
+        scene = engine_in(houses[index]).scene
         reach_m = houses[index]["proceduralParameters"]["receptacleHeight"]
         receptacles = [r for r in objects.static_records(scene) if r["receptacle"] and r["objectType"] != "Floor"]
         boxes = [r["axisAlignedBoundingBox"] for r in receptacles]
@@ -182,16 +171,16 @@ def test_doors_and_windows_are_in_their_walls() -> None:
     """Position and turn follow from the wall; our body of a window, which has no leaf, has its middle there too."""
     num_windows = 0
     for house in rows(data_path("ram81-procthor-100k-history/uniform-hard-val-75.jsonl.gz"))[:3]:
-        records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
+        found = records(engine_in(house))
         for entry in house["windows"]:
-            record, wall = records[entry["id"]], records[entry["wall0"]]
+            record, wall = found[entry["id"]], found[entry["wall0"]]
             middle_m = record["axisAlignedBoundingBox"]["center"]
             assert list(record["position"].values()) == pytest.approx(list(middle_m.values()), abs=0.06)
             assert (record["rotation"]["y"] - wall["rotation"]["y"]) % 360 == pytest.approx(180)
             num_windows += 1
         for entry in house["doors"]:
-            assert records[entry["id"]]["objectType"] in ("Doorway", "Doorframe")
-            assert records[entry["id"]]["openness"] == pytest.approx(
-                entry["openness"] if records[entry["id"]]["openable"] else 0.0
+            assert found[entry["id"]]["objectType"] in ("Doorway", "Doorframe")
+            assert found[entry["id"]]["openness"] == pytest.approx(
+                entry["openness"] if found[entry["id"]]["openable"] else 0.0
             )
     assert num_windows > 5

@@ -99,7 +99,7 @@ def test_stop_ends_the_engine(clients: Any) -> None:
     assert client.process.returncode == 0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_a_killed_client_leaves_no_engine(clients: Any, seed: int) -> None:
     """From before the engine opened its pipes to amid its answers."""
     client = clients()
@@ -127,7 +127,9 @@ def _assert_fails_soon(client: Client, within_s: float = WITHIN_S) -> None:
     assert "stopped" in words
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGSEGV))]
+)
 @pytest.mark.parametrize("victim", ["process", "worker"])
 def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signals, victim: str) -> None:
     client = clients()
@@ -138,6 +140,7 @@ def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signa
     _assert_fails_soon(client)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("size_px", [300, 1500])
 def test_an_engine_killed_at_any_moment_ends_the_client_soon(clients: Any, seed: int, size_px: int) -> None:
@@ -161,6 +164,7 @@ def test_both_processes_of_the_engine_killed(clients: Any) -> None:
     assert "failed" in client.process.stdout.read()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_worker_and_supervisor_are_both_killed(clients: Any, seed: int) -> None:
     client = clients()

@@ -1,14 +1,17 @@
 """`visible` against what the pictures show."""
 
+import json
 import math
 
 import numpy as np
 import pytest
-from test_thor_object_placement import engine_of
+from thor_engine import engine_in, records
 
+from evonav.house import bundled_houses
 from evonav.thor import objects
 from evonav.world.simulator import Frame
 
+HOUSES = [json.loads(house.to_json()) for house in bundled_houses(6)]
 REACH_M = 1.5
 LEAST_PX = 60
 
@@ -36,7 +39,7 @@ def test_objects_near_and_in_the_image_are_visible(number: int) -> None:
 
     Both but for slivers: AI2-THOR looks at some points of an object, a picture at some others.
     """
-    engine = engine_of(number)
+    engine = engine_in(HOUSES[number])
     simulator, agent = engine.scene.simulator, engine.agent
     rng = np.random.default_rng(number)
     reachable_m = simulator.reachable_positions()
@@ -61,24 +64,23 @@ def test_objects_near_and_in_the_image_are_visible(number: int) -> None:
 
 
 def test_nothing_is_visible_beyond_the_requested_distance() -> None:
-    engine = engine_of(2)
+    engine = engine_in(HOUSES[2])
     agent = engine.agent
     agent.yaw_deg = 180.0
-    records = {record["objectId"]: record for record in objects.static_records(engine.scene)}
     smaller: set[str] = set()
     for reach_m in (0.3, 1.0, 2.0, 6.0):
         seen = objects.visible_ids(engine.scene, agent, reach_m)
         assert smaller <= seen
         smaller = seen
         for object_id in seen:
-            box = records[object_id]["axisAlignedBoundingBox"]
+            box = records(engine)[object_id]["axisAlignedBoundingBox"]
             gaps_m = [abs(getattr(agent, f"{a}_m") - box["center"][a]) - 0.5 * box["size"][a] for a in "xz"]
             assert math.hypot(*(max(gap_m, 0.0) for gap_m in gaps_m)) <= reach_m
     assert len(smaller) > 3
 
 
 def test_views_are_distances_from_the_agent_to_the_pivot() -> None:
-    engine = engine_of(1)
+    engine = engine_in(HOUSES[1])
     agent = engine.agent
     for record, distance_m, _ in objects.views(engine):
         position = record["position"]

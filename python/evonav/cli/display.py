@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress
     from evonav.generation.dataset import GenerationProgress
-    from evonav.house.making import MakingProgress
+    from evonav.house.generated import MakingProgress
     from evonav.report.plots.specs import Plot
     from evonav.report.tables.table import Table
 

@@ -1,5 +1,6 @@
 """Generate tasks from houses: the core runs Algorithm 1 of the paper, this module writes its result as a task."""
 
+import json
 import re
 from collections.abc import Sequence
 
@@ -14,7 +15,7 @@ from evonav.generation.instructions.describe import (
     basic_instruction,
     unified_instruction,
 )
-from evonav.generation.result import GeneratedStage, GenerationResult, Given, GivenStage
+from evonav.generation.result import GeneratedStage, GenerationResult, GivenStage
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import HouseSource, PublicStage, Task, TaskHeader
@@ -71,7 +72,7 @@ def generate_task(
         label=house_sha256 if attempt == 0 else f"{house_sha256} attempt {attempt}",
         parameters_json=config.model_dump_json(),
         allow_unknown_assets=allow_unknown_assets,
-        given_json=Given(stages=tuple(given)).model_dump_json(),
+        given_json=json.dumps({"stages": [stage.model_dump() for stage in given]}),
     )
     result = GenerationResult.model_validate_json(text)
     if result.rejected is not None:

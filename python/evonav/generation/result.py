@@ -97,10 +97,3 @@ class GivenStage(Record):
     """Id of the goal object."""
     is_evolved: bool | None = None
     """Whether the transition before the stage evolves the house."""
-
-
-class Given(Record):
-    """The parts of a task that are given instead of drawn."""
-
-    stages: tuple[GivenStage, ...] = ()
-    """Given parts of each stage from the first; their number is K. Empty: K is drawn, too."""

@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from evonav.errors import HouseError, InvalidArgumentError
-from evonav.house.making import MakingProgress, make_houses
+from evonav.house.generated import MakingProgress, make_houses
 from evonav.house.procthor10k import Split, cache_folder
 from evonav.parallel.folders import writing
 from evonav.parallel.worker import Workforce

@@ -158,8 +158,7 @@ def make(
     set_: PoolSet = None,
 ) -> None:
     """Make houses from a seed, as ProcTHOR does; run again to resume."""
-    from evonav.house.generated import read_house_parameters
-    from evonav.house.making import make_houses
+    from evonav.house.generated import make_houses, read_house_parameters
 
     parameters = read_house_parameters(config)
     with interruptible(out), house_progress(count) as show:

@@ -17,8 +17,8 @@ from evonav.generation.statistics.metrics import (
     PAPER_MODES,
     QUANTITIES,
     RATIOS,
+    Tally,
 )
-from evonav.generation.statistics.tally import Tally
 from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, TaskSummary, read_summaries
 from evonav.statistics import ClusterBootstrap, chi_square, effective_size, weighted_quantiles, wilson
 from evonav.tasks.dataset import DATASET_NAME, read_dataset

@@ -1,17 +1,19 @@
-"""Motion, positions and paths through AI2-THOR's own client and its helpers."""
+"""Motion, positions, paths and objects through AI2-THOR's own client and its helpers."""
 
 import gzip
 import json
 import math
 from collections import defaultdict
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from recorded_data import data_path, needs_data
 
-from evonav.house import bundled_houses
+from evonav.house import bundled_houses, stream_houses
 
 metrics = pytest.importorskip("ai2thor.util.metrics", reason="the thor dependency group (ai2thor) is not installed")
 
@@ -46,25 +48,6 @@ def test_a_short_episode_with_both_engines(controller: Any, house: Json) -> None
             assert " is blocking Agent 0 from moving by (0.2500, 0.0000, 0.0000)." in event.metadata["errorMessage"]
 
 
-def test_mistakes_raise_and_failures_do_not(controller: Any) -> None:
-    with pytest.raises(ValueError, match="missing the following arguments"):
-        controller.step("TeleportFull", horizon=0, standing=True)
-    with pytest.raises(ValueError, match="moveMagnitude"):
-        controller.step("MoveAhead", moveMagnitude="far")
-    event = controller.step("LookDown", degrees=100)
-    assert not event.metadata["lastActionSuccess"]
-    assert event.metadata["errorCode"] == "LookDownCantExceedMin"
-    event = controller.step("TeleportFull", position={"x": 99, "y": 0.9, "z": 0}, rotation=0, horizon=0, standing=True)
-    assert "out of scene bounds" in event.metadata["errorMessage"]
-
-
-@pytest.mark.parametrize(("mode", "word"), [("arm", "arm"), ("stretch", "stretch"), ("drone", "drone")])
-def test_other_modes_fail_at_the_start(start_controller: StartController, house: Json, mode: str, word: str) -> None:
-    controller = start_controller(scene=house)
-    with pytest.raises(RuntimeError, match=word):
-        controller.reset(scene=house, agentMode=mode)
-
-
 def test_metrics_of_the_client(controller: Any, house: Json) -> None:
     start = controller.last_event.metadata["agent"]
     positions = controller.step("GetReachablePositions").metadata["actionReturn"]
@@ -90,13 +73,14 @@ def test_metrics_of_the_client(controller: Any, house: Json) -> None:
         metrics.get_shortest_path_to_point(controller, start["position"], away)
 
 
-def test_house_starts_as_they_are(start_controller: StartController) -> None:
-    houses = [json.loads(house.to_json()) for house in bundled_houses(8)]
-    controller = start_controller(scene=houses[0])
-    for house in houses:
-        controller.reset(scene=house)
-        event = controller.step("TeleportFull", **house["metadata"]["agent"])
-        assert event.metadata["lastActionSuccess"], event.metadata["errorMessage"]
+def test_other_modes_fail_at_the_start(controller: Any, house: Json) -> None:
+    with pytest.raises(RuntimeError, match="'drone' is not supported"):
+        controller.reset(scene=house, agentMode="drone")
+
+
+def test_house_starts_as_they_are(controller_in: StartController) -> None:
+    for house in bundled_houses(8):
+        controller_in(json.loads(house.to_json()))
 
 
 @pytest.mark.slow
@@ -128,3 +112,63 @@ def test_recorded_locobot_starts(start_controller: StartController) -> None:
     assert num_points == 434
     assert num_taken >= 0.995 * num_points
     assert num_reached >= 0.99 * num_points
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_every_room_of_a_made_house_is_reached(controller_in: StartController, number: int) -> None:
+    """`House.validate` of the package `procthor`: the house loads, the start is free, each room has five places."""
+    house = next(islice(stream_houses("endless:21"), number, None))
+    document = json.loads(house.to_json())
+    controller = controller_in(document)
+    places = controller.step("GetReachablePositions", raise_for_failure=True).metadata["actionReturn"]
+    for room in house.rooms:
+        assert sum(house.room_of(place["x"], place["z"]) == room.id for place in places) >= 5, room.id
+    loaded = {item["objectId"] for item in controller.last_event.metadata["objects"]}
+    assert {item.id for item in house.objects} <= loaded
+
+
+def movable(controller: Any) -> list[Json]:
+    return [r for r in controller.last_event.metadata["objects"] if r["pickupable"] or r["moveable"]]
+
+
+def test_the_client_moves_removes_and_restores_objects(controller: Any) -> None:
+    before = {r["objectId"]: r for r in controller.last_event.metadata["objects"]}
+    poses = [
+        {"objectName": r["name"], "position": r["position"], "rotation": r["rotation"]} for r in movable(controller)
+    ]
+    assert controller.step(action="SetObjectPoses", objectPoses=poses)
+    after = {r["objectId"]: r for r in controller.last_event.metadata["objects"]}
+    assert set(after) == set(before)
+    gone = movable(controller)[0]["objectId"]
+    assert controller.step("DisableObject", objectId=gone)
+    assert controller.last_event.get_object(gone) is None
+    assert controller.step("EnableObject", objectId=gone)
+    back = controller.last_event.get_object(gone)["axisAlignedBoundingBox"]["center"]
+    assert back == pytest.approx(after[gone]["axisAlignedBoundingBox"]["center"])
+    assert not controller.step("DisableObject", objectId="Ghost")
+    assert controller.last_event.metadata["errorMessage"] == ""
+
+
+def test_an_object_put_before_the_agent_is_seen_there(controller: Any) -> None:
+    """In the picture, in the metadata, and by `GetObjectInFrame`."""
+    lamp = next((r for r in movable(controller) if r["axisAlignedBoundingBox"]["size"]["y"] > 0.2), None)
+    assert lamp is not None
+    seen = False
+    for pose in controller.step("GetReachablePositions").metadata["actionReturn"]:
+        for yaw_deg, (dx_m, dz_m) in ((0, (0.0, 0.9)), (90, (0.9, 0.0))):
+            controller.step("Teleport", position=pose, rotation=yaw_deg, horizon=30, standing=True)
+            spot = {"x": pose["x"] + dx_m, "y": 1.2, "z": pose["z"] + dz_m}
+            if controller.step("PlaceObjectAtPoint", objectId=lamp["objectId"], position=spot):
+                event = controller.step("Pass")
+                seen = lamp["objectId"] in event.instance_masks
+                break
+        if seen:
+            break
+    assert seen
+    rows, cols = np.nonzero(event.instance_masks[lamp["objectId"]])
+    row, col = int(rows[len(rows) // 2]), int(cols[len(cols) // 2])
+    height, width = event.frame.shape[:2]
+    found = controller.step("GetObjectInFrame", x=(col + 0.5) / width, y=(row + 0.5) / height)
+    assert found.metadata["actionReturn"] == lamp["objectId"]
+    assert found.get_object(lamp["objectId"])["visible"]
+    assert lamp["objectId"] in controller.step("GetVisibleObjects").metadata["actionReturn"]
