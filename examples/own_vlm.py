@@ -27,7 +27,7 @@ class OwnVlm:
                 if title is not None:
                     candidates[title] = float(part.pixels.mean())
                 title = None
-            elif found := re.search(r"((?:Object|Frontier) \d+):[^:\n]*$", part.text):
+            elif found := re.search(r"((?:Object|Frontier) \d+):[^:\n]*$", part):
                 title = found[1]
         brightest = max(candidates, key=candidates.__getitem__, default="Frontier 0")
         return f"{brightest}\nIt is the brightest of {len(candidates)}."

@@ -1,4 +1,4 @@
-"""Fit how much the goal's picture tells: the numbers of `evonav.decision.appearance.picture`.
+"""Fit how much the goal's picture tells: the numbers of `evonav.decision.appearance`.
 
     python scripts/data/calibrate_goal_pictures.py --out OUT
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import evonav
-from evonav.decision.appearance.picture import goal_layout
+from evonav.decision.appearance import goal_layout
 from evonav.house.files import HouseTexts
 from evonav.memory.colours import Layout, distance, layouts
 from evonav.memory.views import NUM_LARGEST

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotChoice, SnapshotQuestion
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.prompts import Picture, Text
+from evonav.decision.prompts import Picture
 from evonav.decision.question import AnswerError
 from evonav.decision.rules import TextMatch
 from evonav.tasks.public import Goal
@@ -103,7 +103,7 @@ def test_the_prompt_shows_the_heading_view_then_snapshots_with_crops_then_fronti
     (turn,) = SHOWN.prompt().turns
     shades = [int(part.pixels[0, 0, 0]) for part in turn.parts if isinstance(part, Picture)]
     assert shades == [1, 100, 4, 101, 2, 5, 80, 90]
-    words = "\n".join(part.text for part in turn.parts if isinstance(part, Text))
+    words = "\n".join(part for part in turn.parts if isinstance(part, str))
     assert "Snapshot 1, Object 1: Mug" in words
     assert MUG_GOAL.unified_instruction in words
     # Nothing of what only rules may use.
@@ -114,7 +114,7 @@ def test_the_prompt_shows_the_heading_view_then_snapshots_with_crops_then_fronti
 def test_without_images_the_prompt_is_words():
     bare = ObjectCandidate(1, "Mug", (0.0, 0.0, 0.0), (0.1, 0.1, 0.1), 1)
     question = SnapshotQuestion(MUG_GOAL, (0.0, 0.0), [SnapshotCandidate(0, [bare])], (), [bare], 5)
-    assert all(isinstance(part, Text) for part in question.prompt().turns[0].parts)
+    assert all(isinstance(part, str) for part in question.prompt().turns[0].parts)
 
 
 def test_the_prefilter_drops_unknown_names_and_keeps_ten():

@@ -7,10 +7,10 @@ import pytest
 
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.frontier_update.questions import ChooseQuestion
-from evonav.decision.appearance.matcher import AppearanceMatcher
+from evonav.decision.appearance import AppearanceMatcher
 from evonav.decision.backends import appearance_match
 from evonav.decision.candidates import FrontierCandidate, ObjectAppearance, ObjectCandidate
-from evonav.decision.metered import Metered
+from evonav.decision.question import Metered
 from evonav.decision.rules import AppearanceMatch
 from evonav.decision.text.language import parse_goal
 from evonav.errors import InvalidArgumentError

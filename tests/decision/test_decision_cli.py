@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import evonav
 from evonav.cli import app
-from evonav.decision.prompts import CHANGE_NOTICE, Prompt, Text, Turn
+from evonav.decision.prompts import CHANGE_NOTICE, Prompt, Turn
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.mock_answers import mock_answer
@@ -218,9 +218,9 @@ def test_the_stand_in_serves_until_it_is_stopped() -> None:
         url = server.stdout.readline().split()[1].rstrip(";")
         client = VlmClient(VlmConfig("m", base_url=url, api_key=KEY))
         with pytest.raises(VlmError, match="refusal"):
-            client.ask(Prompt.of(Text("Well?")))
+            client.ask(Prompt.of("Well?"))
         with pytest.raises(VlmError, match="response_format"):
-            client.ask(Prompt((Turn("user", (Text("Well?"),)),), {"type": "object"}))
+            client.ask(Prompt((Turn("user", ("Well?",)),), {"type": "object"}))
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 0
         assert "2 requests served" in server.stdout.read()

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from evonav.component import Component
+from evonav.decision.vlm.account import Ledger, Usage
 from evonav.decision.vlm.client import Pace
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.cost_estimate import estimate_run, ratio_error
 from evonav.evaluation.hosting.isolation import AgentHosting

@@ -12,14 +12,12 @@ from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.unigoal.agent import UniGoal
 from evonav.component import Component
-from evonav.decision.appearance.matcher import AppearanceMatcher
-from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
+from evonav.decision.appearance import AppearanceMatcher, PictureConfig, goal_layout, picture_ratio
 from evonav.decision.backends import appearance_match, counting, custom, vlm
 from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
 from evonav.decision.goal_input import GoalInput, PictureGoal, goal_as_given
-from evonav.decision.metered import Metered
 from evonav.decision.prompts import Picture, goal_prompt
-from evonav.decision.question import Question, Reply
+from evonav.decision.question import Metered, Question, Reply
 from evonav.decision.rules import AppearanceMatch, TextMatch
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.store import RunStore

@@ -11,7 +11,7 @@ from scripted_model import Scripted
 
 from evonav.component import Component
 from evonav.decision.noisy import GARBAGE, NoiseRates, Noisy
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, Question, Reply
 from evonav.errors import InvalidArgumentError
@@ -36,7 +36,7 @@ class Letter(Question[str]):
     goal: Goal = GOAL
 
     def prompt(self) -> Prompt:
-        return Prompt.of(Text(f"One of {self.letters}?"))
+        return Prompt.of(f"One of {self.letters}?")
 
     def parse(self, text: str) -> str:
         if len(text) != 1 or text not in self.letters:

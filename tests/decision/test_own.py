@@ -9,8 +9,8 @@ from test_noisy import Letter
 
 from evonav.decision.backends import custom
 from evonav.decision.custom_model import CustomClient
-from evonav.decision.options import PromptOptions
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.options import AskedOptions
+from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.errors import VlmError
@@ -63,26 +63,26 @@ class Failing:
 def test_asked_once_and_kept_by_attempt(tmp_path: Path) -> None:
     store = ResponseCache(tmp_path / "e.sqlite")
     asking = Asking()
-    model = VlmDecision(CustomClient("mine", asking, store=store), PromptOptions(structured="off"))
+    model = VlmDecision(CustomClient("mine", asking, store=store), AskedOptions(structured="off"))
     assert [model.answer(Letter(), attempt).answer for attempt in (0, 0, 1, 0)] == ["a", "a", "b", "a"]
     assert len(asking.prompts) == 2
-    replay = VlmDecision(CustomClient("mine", asking, store=store, mode="replay"), PromptOptions(structured="off"))
+    replay = VlmDecision(CustomClient("mine", asking, store=store, mode="replay"), AskedOptions(structured="off"))
     assert replay.answer(Letter(), 1).answer == "b"
     for client in (replay.client, CustomClient("other", asking, store=store, mode="replay")):
         with pytest.raises(VlmError, match="not_recorded"):
-            client.ask(Prompt.of(Text("never asked")))
+            client.ask(Prompt.of("never asked"))
 
 
 def test_lost_answers_are_lost_and_kept_and_bugs_are_told(tmp_path: Path) -> None:
     store = ResponseCache(tmp_path / "e.sqlite")
     failing = Failing(TimeoutError("too slow"))
-    model = VlmDecision(CustomClient("mine", failing, store=store), PromptOptions(structured="off"))
+    model = VlmDecision(CustomClient("mine", failing, store=store), AskedOptions(structured="off"))
     for _ in range(2):
         with pytest.raises(AnswerError, match="too slow") as caught:
             model.answer(Letter())
         assert caught.value.fault == "lost"
     assert failing.num == 1
-    broken = VlmDecision(CustomClient("mine", Failing(KeyError("x")), store=store), PromptOptions(structured="off"))
+    broken = VlmDecision(CustomClient("mine", Failing(KeyError("x")), store=store), AskedOptions(structured="off"))
     with pytest.raises(DecisionError, match="mine: KeyError"):
         broken.answer(Letter(), 1)
     assert len(store) == 0

@@ -12,7 +12,7 @@ import pytest
 
 from evonav.component import Component
 from evonav.decision.noisy import GARBAGE
-from evonav.decision.prompts import Picture, Text
+from evonav.decision.prompts import Picture
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.rules import TextMatch
 from evonav.decision.vlm.decision import read_json, with_schema
@@ -101,8 +101,8 @@ def test_prompts_say_their_grammar_and_are_the_same_again(
     for kind, pairs in asked.items():
         for question, _ in pairs:
             parts, again = question.prompt().parts, question.prompt().parts
-            assert isinstance(parts[-1], Text), kind
-            assert "nswer" in parts[-1].text or kind == "describe", kind
+            assert isinstance(parts[-1], str), kind
+            assert "nswer" in parts[-1] or kind == "describe", kind
             assert len(parts) == len(again)
             for part, other in zip(parts, again, strict=True):
                 if isinstance(part, Picture):
@@ -112,7 +112,7 @@ def test_prompts_say_their_grammar_and_are_the_same_again(
                     assert np.array_equal(part.pixels, other.pixels)
                 else:
                     assert part == other
-                    assert part.text.strip()
+                    assert part.strip()
 
 
 def test_garbage_is_no_answer(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from evonav.decision.pictures import Picture
-from evonav.decision.prompts import Prompt, Text, Turn
+from evonav.decision.prompts import Prompt, Turn
 from evonav.decision.vlm.relay import Known, read_request, request_bytes
 from evonav.errors import InvalidArgumentError
 
@@ -22,16 +22,13 @@ def jpeg_of(pixels: np.ndarray) -> bytes:
 
 
 FILE = Picture(jpeg_of(DRAWS.integers(0, 256, (30, 40, 3), np.uint8)))
-PLAIN = Prompt((Turn("system", (Text("Be brief."),)), Turn("user", (NARROW, Text("or"), FILE, WIDE, NARROW))))
-AS_JSON = Prompt((*PLAIN.turns, Turn("user", (WIDE, Text("as JSON"), FILE))), {"type": "object"})
+PLAIN = Prompt((Turn("system", ("Be brief.",)), Turn("user", (NARROW, "or", FILE, WIDE, NARROW))))
+AS_JSON = Prompt((*PLAIN.turns, Turn("user", (WIDE, "as JSON", FILE))), {"type": "object"})
 MESSAGE = request_bytes((AS_JSON, PLAIN), 3, 1)
 
 
 def parts_of(prompt: Prompt) -> list[tuple[str, list[str]]]:
-    return [
-        (turn.role, [part.text if isinstance(part, Text) else part.name for part in turn.parts])
-        for turn in prompt.turns
-    ]
+    return [(turn.role, [part if isinstance(part, str) else part.name for part in turn.parts]) for turn in prompt.turns]
 
 
 def test_a_request_is_read_as_it_was_asked_and_holds_each_image_once() -> None:
@@ -80,7 +77,7 @@ def test_an_image_has_the_name_of_its_shape_and_values() -> None:
         (b'[0,"or",', b'[3,"or",', "parts: image 3 of 3"),
         (b'[0,"or",', b'[-1,"or",', "parts: image -1 of 3"),
         (b"\xff\xd8\xff", b"\xff\xd7\xff", "jpeg: no image"),
-        (b'"role":"user"', b'"role":"evaluator"', "prompts.0.turns.1.role = 'evaluator': Input should be"),
+        (b'["user"', b'["evaluator"', "prompts.0.0.1.0 = 'evaluator': Input should be"),
         (b"\n", b"", "Invalid JSON"),
     ],
 )

@@ -21,7 +21,7 @@ import pytest
 import short_stages
 
 from evonav.cli.doctor import all_checks
-from evonav.decision.prompts import Picture, Prompt, Text
+from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.mock_answers import mock_answer
@@ -32,7 +32,7 @@ from evonav.errors import DecisionError
 from vlm_stub import Stub, check_request, serving
 
 KEY = "sk-Canary/+7Zq0123<&\"'456789abcdefgh=="
-QUESTION = Prompt.of(Text("What is this?"), Picture(np.zeros((4, 4, 3), np.uint8)))
+QUESTION = Prompt.of("What is this?", Picture(np.zeros((4, 4, 3), np.uint8)))
 
 FORMS: dict[str, Callable[[str], str]] = {
     "as it is": lambda key: key,
@@ -170,7 +170,7 @@ def test_a_key_that_no_header_can_hold_is_named_and_not_shown(stub: Stub, broken
 
 
 def test_a_line_end_after_a_key_is_no_part_of_it(stub: Stub) -> None:
-    assert VlmClient(VlmConfig("m", base_url=stub.url, api_key=f"{KEY}\r\n")).ask(QUESTION).text == "A mug."
+    assert VlmClient(VlmConfig("m", base_url=stub.url, api_key=f"{KEY}\r\n")).ask(QUESTION) == "A mug."
     assert stub.keys == {f"Bearer {KEY}"}
 
 

@@ -17,18 +17,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from evonav.decision.prompts import Picture, Prompt, Text, Turn
-from evonav.decision.vlm.account import Account, Price, image_tokens, read_prices
-from evonav.decision.vlm.answer import ModelAnswer
+from evonav.decision.prompts import Picture, Prompt, Turn
+from evonav.decision.vlm.account import Account, Price, Usage, image_tokens, read_prices
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Usage
-from evonav.decision.vlm.response_cache import ResponseCache, StoredFailure, key_of
+from evonav.decision.vlm.response_cache import ResponseCache, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
 IMAGE = np.random.default_rng(0).integers(0, 256, (30, 40, 3), dtype=np.uint8)
-QUESTION = Prompt.of(Text("What is this?"), Picture(IMAGE), Text("One word."))
+QUESTION = Prompt.of("What is this?", Picture(IMAGE), "One word.")
 
 
 @pytest.fixture
@@ -57,8 +55,7 @@ def told(client: VlmClient, question: Prompt = QUESTION) -> str:
 
 def test_asks_and_counts(stub: Stub, config: VlmConfig) -> None:
     client = VlmClient(config, account=Account(Price(2.5, 10.0)))
-    answer = client.ask(QUESTION)
-    assert answer == ModelAnswer("A mug, seen 1 times.", "gpt-4o-2024-08-06", Usage(1000, 100), answer.key, False)
+    assert client.ask(QUESTION) == "A mug, seen 1 times."
     assert client.account.usage == Usage(1000, 100)
     assert client.account.cost_usd == pytest.approx(0.0035)
     assert stub.keys == {f"Bearer {KEY}"}
@@ -81,7 +78,7 @@ def test_conversations_and_schemas_are_sent(stub: Stub, config: VlmConfig) -> No
         "required": ["index"],
         "additionalProperties": False,
     }
-    question = Prompt((Turn("system", (Text("Be brief."),)), *QUESTION.turns), schema).then("Mug.", "Sure?")
+    question = Prompt((Turn("system", ("Be brief.",)), *QUESTION.turns), schema).then("Mug.", "Sure?")
     other = replace(config, temperature=None, seed=None, max_tokens_field="max_completion_tokens")
     VlmClient(other).ask(question)
     (request,) = stub.requests
@@ -100,27 +97,24 @@ def test_what_was_kept_is_had_again_without_a_server(config: VlmConfig, path: Pa
     store = ResponseCache(path)
     # Nobody listens there any more, and a replay does not even need a key.
     client = VlmClient(replace(config, base_url=stub.url, api_key=None), store=store, mode="replay")
-    again = client.ask(QUESTION)
-    assert (again.text, again.key, again.model, again.usage) == (first.text, first.key, first.model, first.usage)
-    assert again.is_replayed
-    assert not first.is_replayed
+    assert client.ask(QUESTION) == first == "A mug. ☕"
     assert (client.account.usage, client.account.num_replayed) == (Usage(), 1)
-    assert told(client, Prompt.of(Text("And this?"))) == "not_recorded"
-    assert told(client, Prompt.of(Text("What is this?"), Picture(IMAGE[::-1]), Text("One word."))) == "not_recorded"
+    assert told(client, Prompt.of("And this?")) == "not_recorded"
+    assert told(client, Prompt.of("What is this?", Picture(IMAGE[::-1]), "One word.")) == "not_recorded"
     # Where the answer comes from is no part of the question, but the model is.
     assert VlmClient(replace(config, base_url="http://elsewhere"), store=store, mode="replay").is_cached(QUESTION)
     assert not VlmClient(replace(config, model="other"), store=store, mode="replay").is_cached(QUESTION)
 
 
 def test_replay_imports_no_client(config: VlmConfig, path: Path) -> None:
-    VlmClient(config, store=ResponseCache(path), mode="record").ask(Prompt.of(Text("Hello?")))
+    VlmClient(config, store=ResponseCache(path), mode="record").ask(Prompt.of("Hello?"))
     script = f"""
 import sys
 from evonav.decision.vlm.response_cache import ResponseCache
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache({str(path)!r}), mode="replay")
-print(client.ask(Prompt.of(Text("Hello?"))).text)
+print(client.ask(Prompt.of("Hello?")))
 assert not {{"openai", "httpx", "httpx2"}} & sys.modules.keys()
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -132,8 +126,8 @@ def test_modes(stub: Stub, config: VlmConfig, path: Path) -> None:
     VlmClient(config, store=store, mode="live").ask(QUESTION)
     assert len(store) == 0
     auto = VlmClient(config, store=store)
-    assert [auto.ask(QUESTION).is_replayed for _ in range(3)] == [False, True, True]
-    assert len(stub.requests) == 2
+    assert len({auto.ask(QUESTION) for _ in range(3)}) == 1
+    assert (len(stub.requests), auto.account.num_replayed) == (2, 2)
     VlmClient(config, store=store, mode="record").ask(QUESTION)
     assert (len(stub.requests), len(store)) == (3, 1)
     with pytest.raises(InvalidArgumentError, match="needs a file"):
@@ -147,7 +141,7 @@ def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: 
     for order in (1, -1):
         store = ResponseCache(tmp_path / f"{order}.sqlite")
         client = VlmClient(config, store=store, mode="record")
-        questions = [Prompt.of(Text(f"Number {i}?"), Picture(IMAGE)) for i in range(4)]
+        questions = [Prompt.of(f"Number {i}?", Picture(IMAGE)) for i in range(4)]
         for question in questions[::order]:
             client.ask(question)
         store.close()
@@ -168,7 +162,7 @@ def test_an_image_that_an_agent_keeps_as_a_file_is_stored_as_that_file(tmp_path:
     with sqlite3.connect(path) as db:  # of an earlier version
         db.execute("CREATE TABLE pictures (name TEXT PRIMARY KEY, webp BLOB NOT NULL) STRICT")
     store = ResponseCache(path)
-    store.put({"n": 1}, (picture,), {})
+    store.store({"n": 1}, (picture,), {})
     store.close()
     with sqlite3.connect(path) as db:
         assert db.execute("SELECT * FROM pictures").fetchall() == [(picture.name, picture.source)]
@@ -184,9 +178,9 @@ def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: P
         {"text": f"Your key is {KEY}, and I live at {stub.url}."},
         {"status": 500, "raw": f"{KEY} at {stub.url}".encode(), "headers": {"Retry-After-Ms": "5"}},
     ]
-    assert client.ask(QUESTION).text == "Your key is ***, and I live at ***."
+    assert client.ask(QUESTION) == "Your key is ***, and I live at ***."
     keeping = VlmClient(replace(config, max_retries=0), store=client.store, keeps_failures=True)
-    assert told(keeping, Prompt.of(Text("Well?"))) == "server"
+    assert told(keeping, Prompt.of("Well?")) == "server"
     assert client.store.num_failures == 1
     client.store.close()
     assert KEY not in repr(config)
@@ -198,7 +192,7 @@ def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: P
 
 def test_a_key_of_one_letter_leaves_answers_whole(config: VlmConfig, stub: Stub) -> None:
     stub.script = [{"text": "Continue Exploration"}]
-    assert VlmClient(replace(config, api_key="x")).ask(Prompt.of(Text("?"))).text == "Continue Exploration"
+    assert VlmClient(replace(config, api_key="x")).ask(Prompt.of("?")) == "Continue Exploration"
 
 
 def test_keys_come_from_the_environment(stub: Stub, config: VlmConfig, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,7 +220,7 @@ def test_passing_faults_are_tried_again(stub: Stub, config: VlmConfig, fault: di
     stub.script = [fault]
     client = VlmClient(config)
     began_s = time.monotonic()
-    assert client.ask(QUESTION).text.startswith("A mug")
+    assert client.ask(QUESTION).startswith("A mug")
     assert len(stub.requests) == 2
     # By itself the client would wait half a second at most.
     assert time.monotonic() - began_s > float(fault.get("headers", {}).get("Retry-After", 0.0)) - 0.05
@@ -294,14 +288,13 @@ def test_the_first_outcome_kept_is_everybodys(path: Path) -> None:
     """Two processes that asked the same: the second to come back takes over what the first has kept."""
     first, second = ResponseCache(path), ResponseCache(path)
     for number, (ours, theirs) in enumerate(
-        (({"a": 1}, {"a": 2}), (StoredFailure("timeout", "late"), {"a": 3}), ({"a": 4}, StoredFailure("server", "500")))
+        (({"a": 1}, {"a": 2}), (VlmError("timeout", "late"), {"a": 3}), ({"a": 4}, VlmError("server", "500")))
     ):
         request = {"number": number}
-        assert first.keep_first(request, {}, ours) == ours
-        assert second.keep_first(request, {}, theirs) == ours
-        assert second.outcome(key_of(request)) == ours
+        assert first.store(request, (), ours) is ours
+        for stored in (second.store(request, (), theirs), second.outcome(key_of(request))):
+            assert (str(stored), type(stored)) == (str(ours), type(ours))
     assert (len(first), first.num_failures) == (2, 1)
-    assert (second.forget_failures(), first.num_failures) == (1, 0)
 
 
 def test_a_cache_opens_while_another_process_creates_it(path: Path) -> None:
@@ -321,7 +314,7 @@ def test_no_more_questions_at_a_time_than_asked_for(stub: Stub, config: VlmConfi
     stub.reply = lambda _: {"text": "Yes.", "hang_s": 0.03}
     client = VlmClient(replace(config, max_concurrency=3))
     with ThreadPoolExecutor(12) as pool:
-        list(pool.map(lambda i: client.ask(Prompt.of(Text(f"{i}?"))), range(24)))
+        list(pool.map(lambda i: client.ask(Prompt.of(f"{i}?")), range(24)))
     assert stub.most_at_once == 3
     assert client.account.num_asked == 24
     assert client.account.usage == Usage(24_000, 2400)
@@ -335,7 +328,7 @@ def test_the_limit_is_not_passed(stub: Stub, config: VlmConfig) -> None:
 
     def ask(index: int) -> None:
         try:
-            client.ask(Prompt.of(Text(f"{index}? " + "word " * 700)))
+            client.ask(Prompt.of(f"{index}? " + "word " * 700))
         except VlmError as error:
             kinds.append(error.kind)
 
@@ -352,7 +345,7 @@ def test_the_limit_is_not_passed(stub: Stub, config: VlmConfig) -> None:
 
 
 def test_estimates_hold_what_is_used(config: VlmConfig) -> None:
-    estimate = VlmClient(config).estimate(Prompt.of(Text("word " * 300), Picture(np.zeros((300, 300, 3), np.uint8))))
+    estimate = VlmClient(config).estimate(Prompt.of("word " * 300, Picture(np.zeros((300, 300, 3), np.uint8))))
     assert estimate.input_tokens >= 300 + 255
     assert estimate.output_tokens == 300
     # The figures of OpenAI's documentation.

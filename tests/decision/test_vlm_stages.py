@@ -13,7 +13,6 @@ from short_tasks import short_tasks
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS, MockReply, faulty, without_schemas
-from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -296,17 +295,6 @@ def test_every_agent_asks_what_the_api_takes_and_goes_on_after_bad_answers(run: 
     assert faults["invalid_answers"] > 0
     assert faults["failed_decisions"] > 0
     assert run("again", None, agents=[agent]) == bad
-
-
-def test_failures_can_be_asked_again(run: Run, tmp_path: Path) -> None:
-    run.max_rounds = 1
-    with serving(answers) as stub:
-        stub.script = [FAULTS["malformed"], {**FAULTS["server_error"], "headers": {"Retry-After-Ms": "5"}}]
-        first = run("first", stub.url, agents=["fu"], server={"max_retries": 0})
-        assert counters(first[0])["lost_answers"] == 1
-        store = ResponseCache(tmp_path / "exchanges.sqlite")
-        assert store.num_failures == store.forget_failures() > 0
-        assert counters(run("again", stub.url, agents=["fu"])[0])["lost_answers"] == 0
 
 
 def test_a_model_that_is_not_to_look_gets_no_images(run: Run) -> None:

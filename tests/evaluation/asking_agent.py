@@ -22,7 +22,7 @@ class Asking:
     def begin_stage(self, goal):
         text = goal.unified_instruction
         self._found = {
-            "answer": self._client.ask(Prompt.of("What is 1 + 1?")).text,
+            "answer": self._client.ask(Prompt.of("What is 1 + 1?")),
             "first cached": self._client.ask_first((Prompt.of("Another question?"), Prompt.of("What is 1 + 1?")))[0],
             "none cached": self._client.ask_first((Prompt.of(f"{text}?"), Prompt.of(f"{text}!")), otherwise=1)[0],
             "key": os.environ.get("OPENAI_API_KEY"),
@@ -40,7 +40,7 @@ class Asking:
 
     def _large(self):
         try:
-            return self._client.ask(Prompt.of("x" * (65 << 20))).text
+            return self._client.ask(Prompt.of("x" * (65 << 20)))
         except (DecisionError, InvalidArgumentError) as error:
             return str(error)
 

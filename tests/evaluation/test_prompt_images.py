@@ -9,7 +9,6 @@ from scripted_model import Scripted
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
 from evonav.decision.pictures import Picture
-from evonav.decision.prompts import Text
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
@@ -140,8 +139,8 @@ def test_prompts_put_each_picture_under_its_title(recorded):
     titled = {}
     for before, part in pairwise(parts):
         if isinstance(part, Picture):
-            assert isinstance(before, Text)
-            titled[before.text.splitlines()[-1]] = part
+            assert isinstance(before, str)
+            titled[before.splitlines()[-1]] = part
     assert titled["What the robot sees ahead:"] is question.heading_view
     for index, candidate in enumerate(question.objects):
         assert titled[f"Object {index}: {candidate.label}"] is candidate.crop

@@ -17,7 +17,7 @@ from evonav.agents.agent import EntryBelief, NavigateTo, SensorConfig
 from evonav.agents.explanation import RoundDiagnostics
 from evonav.agents.hosting import wire
 from evonav.decision.prompts import Picture, Prompt
-from evonav.decision.vlm.answer import read_answer, read_response, usage_of
+from evonav.decision.vlm.client import read_answer, read_response, usage_of
 from evonav.decision.vlm.relay import read_request, request_bytes, response_type
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.house import bundled_houses, stream_houses
@@ -199,6 +199,6 @@ def responses(_folder: Path) -> Reader:
             response_type().validate_json(data, strict=True)
         response = read_response(data.decode(errors="replace"))
         usage_of(response)
-        read_answer(response, "key", is_replayed=False)
+        read_answer(response)
 
     return Reader([json_bytes(whole), request], read)

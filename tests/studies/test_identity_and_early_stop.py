@@ -13,7 +13,7 @@ from toy_house import moved_table_stages, stage_case
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
 from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
 from evonav.agents.frontier_update.questions import IdentityQuestion
-from evonav.decision.appearance.matcher import AppearanceMatcher
+from evonav.decision.appearance import AppearanceMatcher
 from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
 from evonav.decision.text.matcher import Matcher
 from evonav.evaluation.protocol import ProtocolConfig

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.account import Ledger
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
 from evonav.evaluation.metrics.navigation import rates

@@ -1,4 +1,4 @@
-from .prompts import Picture, Prompt, Text
+from .prompts import Picture, Prompt
 from .query import QueryLogEntry, QuerySession
 from .question import AnswerError, ClosedQuestion, DecisionModel, Question, Reply, YesNoQuestion, first_line
 from .text.matcher import Matcher
@@ -14,7 +14,6 @@ __all__ = [
     "QuerySession",
     "Question",
     "Reply",
-    "Text",
     "YesNoQuestion",
     "first_line",
 ]

@@ -5,20 +5,25 @@ how the model is reached are `decision_host_options`. A key is neither: it is re
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from evonav.decision.custom_model import CustomClient, load_custom_model, needs_of
 from evonav.decision.goal_input import GoalInput
 from evonav.decision.noisy import NoiseRates, Noisy
-from evonav.decision.options import CustomOptions, VlmOptions
-from evonav.decision.question import DecisionModel
+from evonav.decision.options import AskedOptions, CustomOptions, VlmOptions
+from evonav.decision.prompts import with_notice
+from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.rules import AppearanceMatch, TextMatch
+from evonav.decision.vlm.account import Ledger, Usage
 from evonav.decision.vlm.client import VlmClient
-from evonav.decision.vlm.counting import Counting
-from evonav.decision.vlm.decision import VlmDecision
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.decision import VlmDecision, with_schema
 from evonav.decision.vlm.relay import RelayedClient
 from evonav.errors import InvalidArgumentError
+
+A = TypeVar("A")
+
+OUTPUT_TOKENS = 100
+"""Assumed length of an answer: a line and a sentence or two of reasons."""
 
 
 def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> DecisionModel:
@@ -100,6 +105,38 @@ def counting(seed: int, *, ledger: str, **options: Any) -> DecisionModel:  # noq
     given = VlmOptions.read(options)
     counted = Counting(TextMatch(), VlmClient(given.config), Ledger(ledger), str(seed), given)
     return _with_noise(counted, given.noise, seed)
+
+
+class Counting(DecisionModel):
+    """A decision model that notes what its questions would cost; its rules know no more of a picture than the type."""
+
+    def __init__(
+        self, model: DecisionModel, client: VlmClient, ledger: Ledger, name: str, options: AskedOptions
+    ) -> None:
+        """Count the questions to `model`.
+
+        Args:
+            client: Client that estimates and asks nothing.
+            ledger: Ledger of requests and tokens, a row a kind of question.
+            name: Name of the episode, which precedes the kind.
+            options: The options by which the model that is not asked would be prompted.
+        """
+        self.needs = frozenset({"images"}) if options.images else frozenset()
+        self.goal_input = options.goal_input
+        self._model = model
+        self._client = client
+        self._ledger = ledger
+        self._name = name
+        self._options = options
+
+    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
+        """Return the model's answer."""
+        prompt = with_notice(question.prompt(), tells_of_change=self._options.tells_of_change)
+        if self._options.structured != "off":
+            prompt = with_schema(prompt, question.answer_schema())
+        used = Usage(self._client.estimate(prompt).input_tokens, OUTPUT_TOKENS)
+        self._ledger.settle(f"{self._name} {question.kind}", 0.0, used)
+        return self._model.answer(question, attempt)
 
 
 def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: int) -> DecisionModel:

@@ -8,13 +8,11 @@ from collections.abc import Callable
 from typing import Any, Protocol, cast
 
 from evonav.component import import_callable
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
 from evonav.decision.question import DecisionModel, Need
-from evonav.decision.vlm.account import Account
-from evonav.decision.vlm.answer import ModelAnswer
+from evonav.decision.vlm.account import Account, Usage
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 
@@ -63,7 +61,7 @@ class CustomClient(CachingClient):
         turns = [
             {
                 "role": turn.role,
-                "content": [part.text if isinstance(part, Text) else {"image": part.name} for part in turn.parts],
+                "content": [part if isinstance(part, str) else {"image": part.name} for part in turn.parts],
             }
             for turn in prompt.turns
         ]
@@ -89,11 +87,11 @@ class CustomClient(CachingClient):
             raise DecisionError(f"{self.name}: ask: expected a string, got {type(text).__name__}")
         return {"text": text}
 
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
+    def _read(self, response: JsonObject) -> str:
         text = str(response["text"])
         if not text.strip():
             raise VlmError("empty", "an empty answer")
-        return ModelAnswer(text, self.name, Usage(), key, is_replayed)
+        return text
 
 
 def needs_of(model: object) -> frozenset[Need]:

@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import Field, ValidationError
 
 from evonav.decision.goal_input import GoalInput
-from evonav.decision.vlm.account import Account, Price
+from evonav.decision.vlm.account import Account, Ledger, Price
 from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.client import VlmClient, VlmConfig
-from evonav.decision.vlm.ledger import Ledger
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
 from evonav.records import Record, sentence_of
@@ -32,8 +31,8 @@ _IDENTITY = {"path", "model", "structured", "images", "tells_of_change", "goal_i
 O = TypeVar("O", bound="AskedOptions")  # noqa: E741 - a type of options
 
 
-class PromptOptions(Record):
-    """The options by which a model is prompted and answers."""
+class AskedOptions(Record):
+    """Options of all models that are asked by prompts. `identity()` decides answers, `host()` how they are reached."""
 
     structured: Structured = "auto"
     images: bool = True
@@ -42,11 +41,6 @@ class PromptOptions(Record):
     """Prompts say that things may have been moved; see `with_notice`."""
     goal_input: GoalInput = "text"
     """Form of the goal that agents go by."""
-
-
-class AskedOptions(PromptOptions):
-    """Options of all models that are asked by prompts. `identity()` decides answers, `host()` how they are reached."""
-
     noise: dict[str, float] | None = None
     """Rates of mistakes, by the names of `NoiseRates`."""
     cache: str | None = None

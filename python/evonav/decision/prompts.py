@@ -12,21 +12,15 @@ CHANGE_NOTICE = "Things in this home may have been moved since the robot last sa
 """The sentence with which all prompts of an informed model begin, whatever the agent."""
 
 
-@dataclass(frozen=True, slots=True)
-class Text:
-    """A text in a prompt."""
-
-    text: str
-
-
-Part = Text | Picture
+Part = str | Picture
+Role = Literal["system", "user", "assistant"]
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
     """One side's message in a conversation."""
 
-    role: Literal["system", "user", "assistant"]
+    role: Role
     parts: tuple[Part, ...]
 
 
@@ -39,9 +33,9 @@ class Prompt:
     """JSON Schema that the answer must follow (`response_format`), for servers that support it."""
 
     @classmethod
-    def of(cls, *parts: Part | str) -> "Prompt":
-        """Create a prompt of one turn; a string stands for a `Text`."""
-        return cls((Turn("user", tuple(Text(part) if isinstance(part, str) else part for part in parts)),))
+    def of(cls, *parts: Part) -> "Prompt":
+        """Create a prompt of one turn."""
+        return cls((Turn("user", parts),))
 
     @property
     def parts(self) -> list[Part]:
@@ -56,11 +50,11 @@ class Prompt:
     @property
     def text(self) -> str:
         """The texts alone; `<image>` stands for an image."""
-        return "\n".join(part.text if isinstance(part, Text) else "<image>" for part in self.parts)
+        return "\n".join(part if isinstance(part, str) else "<image>" for part in self.parts)
 
     def then(self, answer: str, reply: str) -> "Prompt":
         """Return the prompt that follows an answer."""
-        turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
+        turns = (*self.turns, Turn("assistant", (answer,)), Turn("user", (reply,)))
         return Prompt(turns, self.schema)
 
 
@@ -72,7 +66,7 @@ def with_notice(prompt: Prompt, *, tells_of_change: bool) -> Prompt:
     if not tells_of_change:
         return prompt
     first, *others = prompt.turns
-    return Prompt((Turn(first.role, (Text(CHANGE_NOTICE), *first.parts)), *others), prompt.schema)
+    return Prompt((Turn(first.role, (CHANGE_NOTICE, *first.parts)), *others), prompt.schema)
 
 
 def goal_prompt(goal: Goal, *contents: str | tuple[str, Picture | None]) -> Prompt:
@@ -93,6 +87,6 @@ def goal_prompt(goal: Goal, *contents: str | tuple[str, Picture | None]) -> Prom
         title, picture = (content, None) if isinstance(content, str) else content
         lines.append(title)
         if picture is not None:
-            parts += [Text("\n".join(lines)), picture]
+            parts += ["\n".join(lines), picture]
             lines = []
     return Prompt.of(*parts, *(["\n".join(lines)] if lines else []))

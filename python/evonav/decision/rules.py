@@ -7,7 +7,7 @@
 import math
 from typing import TypeVar
 
-from evonav.decision.appearance.matcher import AppearanceMatcher, MistakenMatcher
+from evonav.decision.appearance import AppearanceMatcher, MistakenMatcher
 from evonav.decision.goal_input import GoalInput, check_goal_input
 from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.text.matcher import Matcher, TextMatchConfig

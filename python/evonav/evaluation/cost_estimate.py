@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.component import Component
-from evonav.decision.vlm.ledger import Ledger, Usage
+from evonav.decision.vlm.account import Ledger, Usage
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import Progress, RunConfig, agent_seed
 from evonav.statistics import student_quantile

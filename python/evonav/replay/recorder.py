@@ -176,7 +176,7 @@ class Recorder:
         parts: list[tuple[str, str | bytes]] = []
         for turn in with_notice(entry.question.prompt(), tells_of_change=self._tells_of_change).turns:
             for part in turn.parts:
-                shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
+                shown = self._shown(part.pixels) if isinstance(part, Picture) else part
                 parts.append((turn.role, shown))
         answer = entry.text
         while answer.startswith(f"{entry.outcome}: "):  # the message of a fault begins with its name

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.decision.vlm.ledger import LEDGER_NAME
+from evonav.decision.vlm.account import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_decision

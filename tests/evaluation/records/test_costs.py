@@ -5,11 +5,9 @@ import pytest
 from evonav.agents.agent import SensorConfig
 from evonav.agents.hosting import wire
 from evonav.component import Component
-from evonav.decision.metered import Metered
 from evonav.decision.noisy import NoiseRates, Noisy
-from evonav.decision.question import DecisionModel, Reply
-from evonav.decision.vlm.account import Account, Price
-from evonav.decision.vlm.ledger import Usage
+from evonav.decision.question import DecisionModel, Metered, Reply
+from evonav.decision.vlm.account import Account, Price, Usage
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import AgentFailedError

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from evonav import Goal, NavigateTo, ObjectMap, Observation, OccupancyMap, SensorConfig, Stop, TaskInfo
 from evonav.agents.agent import AgentAction
 from evonav.agents.explanation import Explanation
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
 from evonav.decision.text.matcher import Matcher
@@ -29,8 +29,8 @@ class WhichObject(Question[int]):
         """The instruction, the objects, and how to answer."""
         listed = "\n".join(f"{number}. {label}" for number, label in enumerate(self.labels, start=1))
         return Prompt.of(
-            Text(f"{self.goal.unified_instruction}\nObjects seen so far:\n{listed}"),
-            Text("Which one is meant? Answer with its number alone, or with 0 if none of them is."),
+            f"{self.goal.unified_instruction}\nObjects seen so far:\n{listed}",
+            "Which one is meant? Answer with its number alone, or with 0 if none of them is.",
         )
 
     def parse(self, text: str) -> int:

@@ -27,7 +27,7 @@ from evonav.agents.hosting.requests import read_request
 from evonav.agents.hosting.shared_slots import SharedSlots
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
-from evonav.decision.metered import Metered
+from evonav.decision.question import Metered
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.parallel import profiling
 from evonav.parallel.one_core import OneCore

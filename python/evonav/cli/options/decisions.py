@@ -76,7 +76,7 @@ def print_estimate(
 
     from evonav.cli.display import progress
     from evonav.counted import counted
-    from evonav.decision.vlm.counting import OUTPUT_TOKENS
+    from evonav.decision.backends import OUTPUT_TOKENS
     from evonav.evaluation.cost_estimate import estimate_run, total_usage
 
     options = dict(config.backend.decision.options)
@@ -112,7 +112,7 @@ def _relative(error: float) -> str:
 def print_spending(out: Path) -> None:
     """Print what the models of a run were asked and cost, over all calls of the command."""
     from evonav.counted import counted
-    from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
+    from evonav.decision.vlm.account import LEDGER_NAME, Ledger
 
     path = out / LEDGER_NAME
     if not path.is_file():

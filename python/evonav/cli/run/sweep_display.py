@@ -97,7 +97,7 @@ class SweepProgress:
 
     def costs(self) -> "Mapping[str, float]":
         """Return dollars by cell, read at most every `COST_EVERY_S`."""
-        from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
+        from evonav.decision.vlm.account import LEDGER_NAME, Ledger
 
         now_s = time.monotonic()
         path = self.out / LEDGER_NAME

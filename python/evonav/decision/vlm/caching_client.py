@@ -2,13 +2,12 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Literal, cast
+from typing import Literal
 
 from evonav.decision.prompts import Prompt
 from evonav.decision.vlm.account import Account
-from evonav.decision.vlm.answer import ModelAnswer
-from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
-from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, StoredFailure, key_of
+from evonav.decision.vlm.errors import LASTING, VlmError
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, key_of
 from evonav.errors import InvalidArgumentError
 
 Mode = Literal["live", "record", "replay", "auto"]
@@ -51,11 +50,11 @@ class CachingClient(ABC):
         if self.mode != "live" and store is None:
             raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
 
-    def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
+    def ask(self, prompt: Prompt, attempt: int = 0) -> str:
         """Return the model's answer, or raise as `ask_first` does; another attempt is another request."""
         return self.ask_first((prompt,), attempt)[1]
 
-    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, str]:
         """Return the answer to the first prompt whose outcome is cached; if none is, ask one of them.
 
         Args:
@@ -73,51 +72,42 @@ class CachingClient(ABC):
         """
         requests = [self.cached_request(prompt, attempt) for prompt in prompts]
         keys = [key_of(request) for request in requests]
-        cached = self._first_cached(keys)
-        if cached is not None:
-            index, outcome = cached
-            self.account.replayed()
-        else:
-            index = otherwise
-            if self.mode == "replay":
-                raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {keys[index]}")
-            outcome = self._ask_anew(prompts[index], attempt, requests[index])
-        if isinstance(outcome, StoredFailure):
-            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
-        return index, self._read(outcome, keys[index], is_replayed=cached is not None)
-
-    def _first_cached(self, keys: Sequence[str]) -> tuple[int, JsonObject | StoredFailure] | None:
-        """Return the first outcome that is cached, with the index of its key."""
+        index, outcome = otherwise, None
         if self.store is not None and self.mode in ("replay", "auto"):
-            for index, key in enumerate(keys):
-                if (outcome := self.store.outcome(key)) is not None:
-                    return index, outcome
-        return None
+            outcomes = ((number, self.store.outcome(key)) for number, key in enumerate(keys))
+            index, outcome = next((found for found in outcomes if found[1] is not None), (otherwise, None))
+        if outcome is not None:
+            self.account.replayed()
+        elif self.mode == "replay":
+            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {keys[index]}")
+        else:
+            outcome = self._ask_anew(prompts[index], attempt, requests[index])
+        if isinstance(outcome, VlmError):
+            raise outcome
+        return index, self._read(outcome)
 
-    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | StoredFailure:
+    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | VlmError:
         """Ask the model, and store the outcome if the mode and `keeps_failures` require it."""
-        outcome: JsonObject | StoredFailure
+        outcome: JsonObject | VlmError
         try:
             outcome = self._ask_model(prompt, attempt)
         except VlmError as error:
             if not self.keeps_failures or error.kind in LASTING:
                 raise
-            outcome = StoredFailure(error.kind, error.message)
+            outcome = error
         if self.store is None or self.mode == "live":
             return outcome
+        if (self.mode == "record" or not self.keeps_failures) and self._is_malformed(outcome):
+            return outcome
         pictures = prompt.pictures if self.keeps_images else []
-        if self.mode == "auto" and (self.keeps_failures or not self._is_malformed(outcome)):
-            return self.store.keep_first(cached, pictures, outcome)
-        if self.mode == "record" and not isinstance(outcome, StoredFailure) and not self._is_malformed(outcome):
-            self.store.put(cached, pictures, outcome)
-        return outcome
+        return self.store.store(cached, pictures, outcome, replaces=self.mode == "record")
 
-    def _is_malformed(self, outcome: JsonObject | StoredFailure) -> bool:
+    def _is_malformed(self, outcome: JsonObject | VlmError) -> bool:
         """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
-        if isinstance(outcome, StoredFailure):
+        if isinstance(outcome, VlmError):
             return True
         try:
-            self._read(outcome, "", is_replayed=False)
+            self._read(outcome)
         except VlmError as error:
             return error.kind == "malformed"
         return False
@@ -151,5 +141,5 @@ class CachingClient(ABC):
         """Ask the model itself."""
 
     @abstractmethod
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
+    def _read(self, response: JsonObject) -> str:
         """Return the answer in a response."""

@@ -1,31 +1,30 @@
 """Ask a vision-language model behind any OpenAI-compatible endpoint.
 
     client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache("exchanges.sqlite"))
-    answer = client.ask(Prompt.of(Text("What is this?"), Picture(image)))
+    answer = client.ask(Prompt.of("What is this?", Picture(image)))
 
 Retries of lost connections, of 429 and of 5xx are the SDK's, which honours `Retry-After`; what remains is a `VlmError`.
 Keys come from the caller or the environment, are sent in the header, and appear in no file, record or message.
 """
 
+import json
 import os
 import threading
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from urllib.parse import unquote, urlsplit
 
 from pydantic_core import to_json
 
 from evonav.decision.pictures import Picture
-from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
-from evonav.decision.vlm.answer import ModelAnswer, read_answer, read_response, usage_of
+from evonav.decision.prompts import Prompt, Turn
+from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
 from evonav.decision.vlm.caching_client import CachingClient, Mode
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.decision.vlm.secrets import REMOVED, without_secrets
 from evonav.errors import DecisionError, InvalidArgumentError
@@ -194,9 +193,9 @@ class VlmClient(CachingClient):
     def estimate(self, prompt: Prompt) -> Usage:
         """Estimate the tokens of a question, rather too high than too low."""
         tokens = 0.0
-        for part in (part for turn in prompt.turns for part in turn.parts):
-            if isinstance(part, Text):
-                tokens += 8 + len(part.text) / CHARACTERS_PER_TOKEN
+        for part in prompt.parts:
+            if isinstance(part, str):
+                tokens += 8 + len(part) / CHARACTERS_PER_TOKEN
             else:
                 tokens += image_tokens(part.size_px, self.config.image_detail)
         return Usage(int(tokens) + 1, self.config.max_tokens)
@@ -217,8 +216,8 @@ class VlmClient(CachingClient):
         finally:
             self.account.settle(reserved_usd, usage)
 
-    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> ModelAnswer:
-        return read_answer(response, key, is_replayed=is_replayed)
+    def _read(self, response: JsonObject) -> str:
+        return read_answer(response)
 
     def _post(self, request: JsonObject) -> JsonObject:
         sdk = self._client()
@@ -316,11 +315,61 @@ class _Connections:
 
 def _message(turn: Turn, detail: str, url_of: Callable[[Picture], str]) -> JsonObject:
     if turn.role != "user":
-        return {"role": turn.role, "content": "".join(part.text for part in turn.parts if isinstance(part, Text))}
+        return {"role": turn.role, "content": "".join(part for part in turn.parts if isinstance(part, str))}
     content: list[JsonObject] = []
     for part in turn.parts:
-        if isinstance(part, Text):
-            content.append({"type": "text", "text": part.text})
+        if isinstance(part, str):
+            content.append({"type": "text", "text": part})
         else:
             content.append({"type": "image_url", "image_url": {"url": url_of(part), "detail": detail}})
     return {"role": "user", "content": content}
+
+
+def read_response(text: str) -> JsonObject:
+    """Read the body of a response; `VlmError` if it is no JSON object."""
+    try:
+        response = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise VlmError("malformed", f"not JSON: {error}: {text[:80]!r}") from None
+    if not isinstance(response, dict):
+        raise VlmError("malformed", f"expected an object, got {text[:80]!r}")
+    return response
+
+
+def usage_of(response: JsonObject) -> Usage | None:
+    """Return the tokens that the server counted; `None` if it counts none."""
+    usage = response.get("usage")
+    counts = [usage.get(name) for name in ("prompt_tokens", "completion_tokens")] if isinstance(usage, dict) else []
+    numbers = [count for count in counts if isinstance(count, int) and count >= 0]
+    return Usage(*numbers) if len(numbers) == 2 else None
+
+
+def read_answer(response: JsonObject) -> str:
+    """Return the answer in a response; `VlmError` if there is no complete one."""
+    choices = response.get("choices")
+    choice = choices[0] if isinstance(choices, list) and choices else None
+    message = choice.get("message") if isinstance(choice, dict) else None
+    if not isinstance(choice, dict) or not isinstance(message, dict):
+        raise VlmError("malformed", f"a response without a message: {json.dumps(response)[:200]}")
+    if message.get("refusal"):
+        raise VlmError("refusal", str(message["refusal"])[:200])
+    content = _content(message.get("content"))
+    reason = choice.get("finish_reason")
+    if reason == "content_filter":
+        raise VlmError("refusal", "stopped by the server's filter of contents")
+    if reason == "length":
+        raise VlmError("truncated", f"cut off after {len(content)} characters: {content[:80]!r}")
+    if not content.strip():
+        raise VlmError("empty", f"an empty answer (finish_reason {reason!r})")
+    return content
+
+
+def _content(content: Any) -> str:  # noqa: ANN401
+    """Return a message's text, which is a string, or parts of which some are text."""
+    if content is None:
+        return ""
+    if isinstance(content, str):
+        return content
+    if isinstance(content, Sequence) and all(isinstance(part, dict) for part in content):
+        return "".join(part["text"] for part in content if isinstance(part.get("text"), str))
+    raise VlmError("malformed", f"content: expected text, got {str(content)[:80]!r}")

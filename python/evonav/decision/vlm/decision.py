@@ -11,10 +11,9 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from evonav.decision.goal_input import check_goal_input
-from evonav.decision.options import PromptOptions
-from evonav.decision.prompts import Prompt, Text, Turn, with_notice
+from evonav.decision.options import AskedOptions
+from evonav.decision.prompts import Prompt, Turn, with_notice
 from evonav.decision.question import AnswerError, DecisionModel, Fault, Question, Reply
-from evonav.decision.vlm.answer import ModelAnswer
 from evonav.decision.vlm.caching_client import CachingClient
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.decision.vlm.relay import RelayedClient
@@ -43,13 +42,13 @@ _AS_JSON = "Give the answer as JSON: what belongs on the first line as `answer`,
 _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, in order, the reason as `reason`."
 
 
-_USUAL = PromptOptions()
+_USUAL = AskedOptions()
 
 
 class VlmDecision(DecisionModel):
     """Answers every question by asking a model."""
 
-    def __init__(self, client: CachingClient | RelayedClient, options: PromptOptions = _USUAL) -> None:
+    def __init__(self, client: CachingClient | RelayedClient, options: AskedOptions = _USUAL) -> None:
         """Create a decision model; `InvalidArgumentError` if one without images is to go by a picture."""
         check_goal_input(options.goal_input, sees_images=options.images)
         self.client = client
@@ -84,12 +83,12 @@ class VlmDecision(DecisionModel):
             if fault is None:
                 raise
             raise AnswerError(fault, str(error)) from error
-        if is_json and (self.options.structured == "on" or _fields(answer.text) is not None):
-            return read_json(question, answer.text)
+        if is_json and (self.options.structured == "on" or _fields(answer) is not None):
+            return read_json(question, answer)
         # A server that ignores a schema answers in lines, which are as good.
-        return Reply(question.parse(answer.text), answer.text)
+        return Reply(question.parse(answer), answer)
 
-    def _ask(self, question: Question[A], attempt: int) -> tuple[ModelAnswer, bool]:
+    def _ask(self, question: Question[A], attempt: int) -> tuple[str, bool]:
         """Return the answer, and whether JSON was requested."""
         plain = with_notice(question.prompt(), tells_of_change=self.options.tells_of_change)
         if self.options.structured == "off":
@@ -120,7 +119,7 @@ def with_schema(prompt: Prompt, answer_schema: Mapping[str, Any]) -> Prompt:
     }
     instruction = _LINES_AS_JSON if answer_schema.get("type") == "array" else _AS_JSON
     *turns, last = prompt.turns
-    return Prompt((*turns, Turn(last.role, (*last.parts, Text(instruction)))), schema)
+    return Prompt((*turns, Turn(last.role, (*last.parts, instruction))), schema)
 
 
 def read_json(question: Question[A], text: str) -> Reply[A]:

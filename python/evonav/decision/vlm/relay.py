@@ -11,14 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
 
 from evonav.decision.pictures import Picture
-from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm.answer import ModelAnswer
+from evonav.decision.prompts import Prompt, Role, Turn
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.records import sentence_of
@@ -31,21 +30,11 @@ MAX_MESSAGE_BYTES = 64 << 20
 """Largest message: some ten views with their text."""
 MAX_EDGE_PX = 4096
 
-
 _Edge = Annotated[int, Field(ge=1, le=MAX_EDGE_PX)]
-
-
-@dataclass(frozen=True, slots=True)
-class _Turn:
-    role: Literal["system", "user", "assistant"]
-    parts: list[str | int]
-    """Texts, and numbers of images."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Prompt:
-    turns: Annotated[list[_Turn], Field(min_length=1, max_length=100)]
-    schema: dict[str, Any] | None
+_Turn = tuple[Role, list[str | int]]
+"""A role, and its texts and numbers of images."""
+_Prompt = tuple[Annotated[list[_Turn], Field(min_length=1, max_length=100)], dict[str, Any] | None]
+"""The turns and the schema."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +54,7 @@ class _Request:
 class Response:
     """The outcome of a request, in one of the fields."""
 
-    answer: ModelAnswer | None = None
+    answer: str | None = None
     index: int = 0
     """Index of the prompt that was answered."""
     failure: VlmFailure | None = None
@@ -98,11 +87,11 @@ class RelayedClient:
         """Return nothing: the evaluator counts the costs."""
         return {}
 
-    def ask(self, prompt: Prompt, attempt: int = 0) -> ModelAnswer:
+    def ask(self, prompt: Prompt, attempt: int = 0) -> str:
         """Return the model's answer, or raise as `ask_first` does."""
         return self.ask_first((prompt,), attempt)[1]
 
-    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, ModelAnswer]:
+    def ask_first(self, prompts: Sequence[Prompt], attempt: int = 0, *, otherwise: int = 0) -> tuple[int, str]:
         """Return the answer to the first prompt whose outcome is cached, else to `prompts[otherwise]`, with its index.
 
         Raises:
@@ -135,16 +124,13 @@ def request_bytes(prompts: Sequence[Prompt], attempt: int, otherwise: int) -> by
     files = {key: picture.source for key, picture in shown.items() if isinstance(picture.source, bytes)}
     pixels = {key: np.ascontiguousarray(shown[key].source, np.uint8) for key in shown if key not in files}
     places = {key: index for index, key in enumerate((*pixels, *files))}
-    forms = [
-        _Prompt(
-            [
-                _Turn(turn.role, [part.text if isinstance(part, Text) else places[id(part)] for part in turn.parts])
-                for turn in prompt.turns
-            ],
-            None if prompt.schema is None else dict(prompt.schema),
-        )
-        for prompt in prompts
-    ]
+    forms: list[_Prompt] = []
+    for prompt in prompts:
+        turns: list[_Turn] = [
+            (turn.role, [part if isinstance(part, str) else places[id(part)] for part in turn.parts])
+            for turn in prompt.turns
+        ]
+        forms.append((turns, None if prompt.schema is None else dict(prompt.schema)))
     shapes = [image.shape[:2] for image in pixels.values()]
     request = _Request(forms, attempt, otherwise, shapes, [len(file) for file in files.values()])
     return b"".join((_request().dump_json(request), b"\n", *(image.data for image in pixels.values()), *files.values()))
@@ -197,14 +183,17 @@ def _picture(key: tuple[int, int, bytes], known: Known) -> tuple[tuple[int, int,
 
 
 def _prompt_of(prompt: _Prompt, pictures: Sequence[Picture]) -> Prompt:
-    for part in (part for turn in prompt.turns for part in turn.parts):
+    turns, schema = prompt
+    for part in (part for _, parts in turns for part in parts):
         if isinstance(part, int) and not 0 <= part < len(pictures):
             raise InvalidArgumentError(f"parts: image {part} of {len(pictures)}")
-    turns = (
-        Turn(turn.role, tuple(Text(part) if isinstance(part, str) else pictures[part] for part in turn.parts))
-        for turn in prompt.turns
+    return Prompt(
+        tuple(
+            Turn(role, tuple(part if isinstance(part, str) else pictures[part] for part in parts))
+            for role, parts in turns
+        ),
+        schema,
     )
-    return Prompt(tuple(turns), prompt.schema)
 
 
 def read_message(descriptor: int) -> bytes:

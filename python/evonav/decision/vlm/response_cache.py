@@ -9,8 +9,7 @@ happen again in a replay.
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -19,8 +18,8 @@ import numpy as np
 from PIL import Image, WebPImagePlugin  # noqa: F401 - or Pillow imports all its plug-ins for the first WebP
 
 from evonav.decision.pictures import Picture
+from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.shared_file import SharedFile
-from evonav.errors import StoreError
 
 JsonObject = dict[str, Any]
 
@@ -51,14 +50,6 @@ def key_of(request: JsonObject) -> str:
     return hashlib.sha256(canonical_json(request).encode()).hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
-class StoredFailure:
-    """The outcome of a question without a response."""
-
-    kind: str
-    message: str
-
-
 class ResponseCache(SharedFile):
     """A cache of exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
@@ -77,49 +68,24 @@ class ResponseCache(SharedFile):
         with self._reading():
             return int(self._db.execute("SELECT count(*) FROM failures").fetchone()[0])
 
-    def get(self, key: str) -> JsonObject | None:
-        """Return the response stored for a key; `StoreError` if the file is unreadable or it is no JSON object."""
+    def outcome(self, key: str) -> JsonObject | VlmError | None:
+        """Return the response or failure stored for a key; `StoreError` if the file or the response is damaged."""
         with self._reading():
-            row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
-        if row is None:
-            return None
-        try:
-            response = json.loads(row[0])
-        except ValueError as error:
-            raise StoreError(f"{self.path}: response of {key}: {error}") from error
-        if not isinstance(response, dict):
-            raise StoreError(f"{self.path}: response of {key}: expected an object, got {str(row[0])[:80]!r}")
-        return response
+            return self._outcome(key)
 
-    def outcome(self, key: str) -> JsonObject | StoredFailure | None:
-        """Return the response or failure stored for a key; `StoreError` as for `get`."""
-        response = self.get(key)
-        if response is not None:
-            return response
-        with self._reading():
-            return self._failure(key)
-
-    def put(self, request: JsonObject, pictures: Sequence[Picture], response: JsonObject) -> str:
-        """Store an exchange in place of an older one with the same question, in one transaction; return its key.
+    def store(
+        self,
+        request: JsonObject,
+        pictures: Sequence[Picture],
+        outcome: JsonObject | VlmError,
+        *,
+        replaces: bool = False,
+    ) -> JsonObject | VlmError:
+        """Store an outcome in one transaction, unless another process has stored one of the same question meanwhile.
 
         Args:
             request: The request, with names in place of its images.
-
-        Raises:
-            StoreError: The file cannot be written.
-        """
-        key = key_of(request)
-        files = self._new_files(pictures)
-        with self._writing():
-            self._db.execute("DELETE FROM failures WHERE key = ?", (key,))
-            self._db.execute("DELETE FROM exchanges WHERE key = ?", (key,))
-            self._insert(key, request, files, response)
-        return key
-
-    def keep_first(
-        self, request: JsonObject, pictures: Sequence[Picture], outcome: JsonObject | StoredFailure
-    ) -> JsonObject | StoredFailure:
-        """Store an outcome unless another process has stored one of the same question meanwhile.
+            replaces: Store it in place of an older outcome.
 
         Returns:
             The stored outcome: all who ask the same get the same answer, in this run and in every replay of it.
@@ -130,20 +96,29 @@ class ResponseCache(SharedFile):
         key = key_of(request)
         files = self._new_files(pictures)
         with self._writing():
-            row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
-            there: JsonObject | StoredFailure | None = self._failure(key) if row is None else json.loads(row[0])
-            if there is None:
-                self._insert(key, request, files, outcome)
-        return outcome if there is None else there
+            if replaces:
+                self._db.execute("DELETE FROM failures WHERE key = ?", (key,))
+                self._db.execute("DELETE FROM exchanges WHERE key = ?", (key,))
+            elif (there := self._outcome(key)) is not None:
+                return there
+            self._db.executemany("INSERT OR IGNORE INTO pictures VALUES (?, ?)", files.items())
+            if isinstance(outcome, VlmError):
+                row = (key, canonical_json(request), outcome.kind, outcome.message)
+                self._db.execute("INSERT INTO failures VALUES (?, ?, ?, ?)", row)
+            else:
+                texts = (canonical_json(request), canonical_json(outcome))
+                self._db.execute("INSERT INTO exchanges VALUES (?, ?, ?)", (key, *texts))
+        return outcome
 
-    def forget_failures(self) -> int:
-        """Drop all failures, so that their questions are asked again, and return their number."""
-        with self._writing():
-            return self._db.execute("DELETE FROM failures").rowcount
-
-    def _failure(self, key: str) -> StoredFailure | None:
-        row = self._db.execute("SELECT kind, message FROM failures WHERE key = ?", (key,)).fetchone()
-        return None if row is None else StoredFailure(*row)
+    def _outcome(self, key: str) -> JsonObject | VlmError | None:
+        row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
+        if row is None:
+            failure = self._db.execute("SELECT kind, message FROM failures WHERE key = ?", (key,)).fetchone()
+            return None if failure is None else VlmError(*failure)
+        response = json.loads(row[0])
+        if not isinstance(response, dict):
+            raise ValueError(f"response of {key}: expected an object, got {str(row[0])[:80]!r}")
+        return response
 
     def _new_files(self, pictures: Sequence[Picture]) -> dict[str, bytes]:
         """Return the files of images that are not stored yet, by name."""
@@ -152,22 +127,3 @@ class ResponseCache(SharedFile):
             query = f"SELECT name FROM pictures WHERE name IN ({','.join('?' * len(by_name))})"  # noqa: S608
             stored = {name for (name,) in self._db.execute(query, tuple(by_name))}
         return {name: _file_of(picture) for name, picture in by_name.items() if name not in stored}
-
-    def _insert(
-        self, key: str, request: JsonObject, files: dict[str, bytes], outcome: JsonObject | StoredFailure
-    ) -> None:
-        self._db.executemany("INSERT OR IGNORE INTO pictures VALUES (?, ?)", files.items())
-        if isinstance(outcome, StoredFailure):
-            row = (key, canonical_json(request), outcome.kind, outcome.message)
-            self._db.execute("INSERT INTO failures VALUES (?, ?, ?, ?)", row)
-        else:
-            self._db.execute(
-                "INSERT INTO exchanges VALUES (?, ?, ?)", (key, canonical_json(request), canonical_json(outcome))
-            )
-
-    def requests(self) -> Iterator[JsonObject]:
-        """Yield all requests in order of key, with hashes in place of images."""
-        with self._reading():
-            rows = self._db.execute("SELECT request FROM exchanges ORDER BY key").fetchall()
-        for (text,) in rows:
-            yield json.loads(text)

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 MIN_SECRET_CHARACTERS = 8
@@ -28,34 +28,28 @@ def without_secrets(text: str, secrets: Iterable[str]) -> str:
     """
     for secret in secrets:
         if len(secret) >= MIN_SECRET_CHARACTERS:
-            for form in _forms(secret):
-                text = form.removed(text)
+            for start, others in _forms(secret):
+                text = _without(text, start, others)
     return text
 
 
-class _Form:
-    """A secret in one form of writing."""
-
-    def __init__(self, characters: str) -> None:
-        self._characters = [re.compile(_BREAK + _escaped(one), re.IGNORECASE) for one in characters]
-        start = _BREAK.join(map(_escaped, characters[:MIN_PART_CHARACTERS]))
-        self._start = re.compile(start, re.IGNORECASE)
-
-    def removed(self, text: str) -> str:
-        parts, end = [], 0
-        while found := self._start.search(text, end):
-            parts.append(text[end : found.start()])
-            end = found.end()
-            for character in self._characters[MIN_PART_CHARACTERS:]:
-                following = character.match(text, end)
-                if following is None:
-                    break
-                end = following.end()
-        return REMOVED.join([*parts, text[end:]])
+def _without(text: str, start: re.Pattern[str], others: Sequence[re.Pattern[str]]) -> str:
+    """Return a text without what begins with a pattern, and goes on with as many of the others as follow."""
+    parts, end = [], 0
+    while found := start.search(text, end):
+        parts.append(text[end : found.start()])
+        end = found.end()
+        for other in others:
+            following = other.match(text, end)
+            if following is None:
+                break
+            end = following.end()
+    return REMOVED.join([*parts, text[end:]])
 
 
 @lru_cache(maxsize=64)
-def _forms(secret: str) -> tuple[_Form, ...]:
+def _forms(secret: str) -> list[tuple[re.Pattern[str], list[re.Pattern[str]]]]:
+    """Return patterns of a secret in all forms of writing: of its beginning, and of each character that follows."""
     data = secret.encode()
     texts = {secret, data.hex()}
     for num_before in range(3):  # base64 writes 3 bytes as 4 characters, so it depends on where the secret begins
@@ -63,7 +57,12 @@ def _forms(secret: str) -> tuple[_Form, ...]:
             text = encode(b"\0" * num_before + data).decode().rstrip("=")
             # Its first and last characters depend on what is before and behind.
             texts.add(text[-(-8 * num_before // 6) :][: (8 * len(data) - (-8 * num_before % 6)) // 6])
-    return tuple(_Form(text) for text in sorted(texts, key=len))
+    forms = []
+    for text in sorted(texts, key=len):
+        start = _BREAK.join(map(_escaped, text[:MIN_PART_CHARACTERS]))
+        others = [re.compile(_BREAK + _escaped(one), re.IGNORECASE) for one in text[MIN_PART_CHARACTERS:]]
+        forms.append((re.compile(start, re.IGNORECASE), others))
+    return forms
 
 
 def _escaped(character: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from pydantic import Field, ValidationError
 
-from evonav.decision.vlm.ledger import LEDGER_NAME
+from evonav.decision.vlm.account import LEDGER_NAME
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import IS_SUPPORTED, AgentHosting, Isolation, usual_isolation
 from evonav.evaluation.protocol import ProtocolConfig

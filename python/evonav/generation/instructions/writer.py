@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.decision.pictures import Picture
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
+from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import LASTING, VlmError
-from evonav.decision.vlm.ledger import Usage
 from evonav.errors import TaskError
 from evonav.parallel.folders import put_folder
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
@@ -197,11 +197,11 @@ def write_stage(public: PublicStage, image: NDArray[np.uint8] | None, client: Vl
 
 def _text(client: VlmClient, question: Prompt) -> str:
     """Ask for an instruction, once more if the first answer is unusable."""
-    answer = client.ask(question).text
+    answer = client.ask(question)
     text = cleaned(answer)
     fault = fault_of(text)
     if fault is not None:
-        text = cleaned(client.ask(question.then(answer, repair_request(fault))).text)
+        text = cleaned(client.ask(question.then(answer, repair_request(fault))))
         fault = fault_of(text)
     if fault is not None:
         raise VlmError("unusable", f"an answer that {fault}, twice: {text[:80]!r}")
@@ -290,7 +290,7 @@ def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> 
         image: `(H, W, 3)` RGB reference image.
     """
     inputs = f"Target category: {noun_of(category)}\nBasic instruction: {basic}\nReference image:"
-    return Prompt.of(Text(f"{APPEARANCE_PROMPT}\n\n{inputs}"), Picture(image))
+    return Prompt.of(f"{APPEARANCE_PROMPT}\n\n{inputs}", Picture(image))
 
 
 def unified_question(basic: str, appearance: str, image: NDArray[np.uint8] | None) -> Prompt:
@@ -303,8 +303,8 @@ def unified_question(basic: str, appearance: str, image: NDArray[np.uint8] | Non
     """
     inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}"
     if image is None:
-        return Prompt.of(Text(f"{UNIFIED_TEXT_PROMPT}\n\n{inputs}"))
-    return Prompt.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}\nReference image:"), Picture(image))
+        return Prompt.of(f"{UNIFIED_TEXT_PROMPT}\n\n{inputs}")
+    return Prompt.of(f"{UNIFIED_PROMPT}\n\n{inputs}\nReference image:", Picture(image))
 
 
 def repair_request(fault: str) -> str:

@@ -7,6 +7,9 @@ for agents that go by it. Their product and the number of objects of the type th
 hold give a posterior probability. The agent goes to the likeliest object if that is likely enough against "not seen
 yet": exploring does not tell apart two objects that were both seen. What cannot be seen counts 1: materials, details,
 corners.
+
+Of the goal's picture two distances of colours count: near the object, and in the whole view. The picture shows the goal
+in its middle. Walls and floors tell rooms apart, so that the surroundings say more than the object itself.
 """
 
 import hashlib
@@ -15,18 +18,30 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from evonav.decision.appearance.picture import PictureConfig, goal_layout, picture_ratio
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.goal_input import PictureGoal
 from evonav.decision.home_statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
 from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
-from evonav.memory.colours import Layout
+from evonav.memory.colours import Layout, distance, layouts
 from evonav.tasks.language import COLOURS
 from evonav.tasks.public import Goal
 
 _WALL_THINGS = {"painting", "window", "doorway"}
 """Things on or in walls, which views show less often than what stands on the floor."""
+
+
+@dataclass(frozen=True, slots=True)
+class PictureConfig:
+    """Numbers of the ratio's logarithm, as `scripts/data/calibrate_goal_pictures.py` fits them on the design houses."""
+
+    constant: float = 3.56
+    near: float = -5.39
+    """Weight of the distance near the object."""
+    whole: float = -12.95
+    """Weight of the distance in the whole view."""
+    range: tuple[float, float] = (0.05, 20.0)
+    """Smallest and largest ratio: a few hundred views do not tell of rarer things."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,3 +266,16 @@ class MistakenMatcher(AppearanceMatcher):
             likeliest = shares.index(max(shares))
             return self._best(likeliest, named, shares[likeliest], fits=False)
         return self._best(index, named, shares[index], fits=True)
+
+
+def goal_layout(goal: Goal) -> Layout:
+    """Return the layout of a goal's picture around its middle."""
+    height_px, width_px, _ = goal.reference_image.shape
+    return layouts(goal.reference_image, [(width_px / 2.0, height_px / 2.0)])[0]
+
+
+def picture_ratio(pictured: Layout, seen: Layout, config: PictureConfig) -> float:
+    """Return the probability of what is seen if it is the goal, over that if it is another object of its type."""
+    near, whole = distance(pictured.near, seen.near), distance(pictured.whole, seen.whole)
+    low, high = config.range
+    return min(max(math.exp(config.constant + config.near * near + config.whole * whole), low), high)
