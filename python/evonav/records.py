@@ -1,12 +1,17 @@
 """Define strict records, the parts of files and messages, and say what is wrong in one."""
 
-from typing import Annotated, Any
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from evonav.errors import InvalidArgumentError
 
 MAX_SHOWN = 100
 """Longest wrong value in a sentence, in characters."""
 
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Version = Annotated[int, Field(ge=1, le=1, strict=True)]
 """The version of a file's format, of which there is one so far. `Literal[1]` would take `true` for it."""
 
@@ -15,6 +20,31 @@ class Record(BaseModel):
     """A part of a file: frozen, without coercion, unknown keys, infinity or NaN."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+
+class Options(Record):
+    """Options that people give by name. An unknown one, or a wrong value, is an `InvalidArgumentError`."""
+
+    of: ClassVar[str]
+    """The thing that has the options, for the error."""
+
+    def __init__(self, **options: Any) -> None:  # noqa: ANN401 - as people give them, checked
+        """Check all options; an `InvalidArgumentError` names the first wrong one, and its value."""
+        try:
+            super().__init__(**options)
+        except ValidationError as error:
+            unknown = next((name for name in options if name not in type(self).model_fields), None)
+            if unknown is not None:
+                hint = did_you_mean(unknown, type(self).model_fields)
+                raise InvalidArgumentError(f"{self.of} has no option {unknown!r}; {hint}") from None
+            raise InvalidArgumentError(f"{self.of}: {sentence_of(error)}") from error
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is nearest to a wrong one, as the end of a sentence, or all of them."""
+    names = list(known)
+    near = get_close_matches(name, names, 1)
+    return f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
 
 
 def sentence_of(error: ValidationError, name: str = "") -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from mini_frames import LabelledFrame, frames, house_files
 
 from evonav.perception.detector import DetectorView, Found
-from evonav.perception.mini import MiniDetector
+from evonav.perception.mini import MiniConfig, MiniDetector
 from evonav.statistics import ClusterBootstrap
 
 MIN_AREA_PX = 90
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--min-confidence", type=float, default=0.25)
     parser.add_argument("--min-cells", type=int, default=2)
     args = parser.parse_args()
-    detector = MiniDetector(args.weights, min_confidence=args.min_confidence, min_cells=args.min_cells)
+    detector = MiniDetector(MiniConfig(min_confidence=args.min_confidence, min_cells=args.min_cells), args.weights)
     houses: dict[str, House] = defaultdict(House)
     num_views, spent_s = 0, 0.0
     for frame in frames([t for folder in args.tasks for t in house_files(folder)], args.per_house, args.seed):

@@ -102,7 +102,7 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
             ("--decision", "vlm", "--model", "m", "--set", "decision.temperature=9", "--base-url", "http://x/v1"),
             "temperature",
         ),
-        (("--set", "decision.noise.wrong=2"), "noise wrong"),
+        (("--set", "decision.noise.wrong=2"), "noise: wrong = 2"),
         (("--set", "decision.noise.wrnog=0.1"), "wrnog"),
         (("--set", "decision.noise.wrong=many"), "Input should be a valid number"),
         (("--dry-run",), "--dry-run is for --decision vlm"),

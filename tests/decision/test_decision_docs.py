@@ -1,7 +1,6 @@
 """docs/decision.md says what there is: every question, every option, every fault."""
 
 import inspect
-from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
@@ -37,8 +36,8 @@ def test_every_question_has_a_kind_of_its_own_and_a_row() -> None:
 def test_options_and_noise_are_told_of() -> None:
     for key in setting_keys(("decision.", "prices", "max_cost")):
         assert FLAGS.get(key, key) in TEXT, key
-    for rate in fields(NoiseRates):
-        assert f"{rate.name}=" in TEXT, rate.name
+    for rate in NoiseRates.model_fields:
+        assert f"{rate}=" in TEXT, rate
 
 
 def test_every_failure_of_a_model_has_a_consequence() -> None:

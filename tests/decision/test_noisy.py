@@ -118,17 +118,17 @@ def test_lost_and_refused_questions_reach_no_model_and_delays_are_waited() -> No
 @pytest.mark.parametrize(
     ("rates", "words"),
     [
-        ({"wrong": 1.5}, "wrong: expected a share"),
+        ({"wrong": 1.5}, r"noise: wrong = 1\.5: Input should be less than or equal to 1"),
         ({"wrong": 0.7, "lost": 0.4}, "add up to 1.1"),
-        ({"delay": -1.0}, "delay: expected seconds"),
-        ({"delay": float("nan")}, "delay: expected seconds"),
-        ({"wrng": 0.1}, "noise wrng"),
-        ({"wrong": "much"}, "noise wrong"),
+        ({"delay": -1.0}, "noise: delay = .*: Input should be"),
+        ({"delay": float("nan")}, "noise: delay = .*: Input should be"),
+        ({"wrng": 0.1}, "noise has no option 'wrng'; did you mean wrong?"),
+        ({"wrong": "much"}, "noise: wrong = 'much'"),
     ],
 )
 def test_rates_that_make_no_sense_are_told(rates: dict[str, float], words: str) -> None:
     with pytest.raises(InvalidArgumentError, match=words):
-        NoiseRates.read(rates)
+        NoiseRates(**rates)
 
 
 def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:

@@ -356,12 +356,15 @@ def test_estimates_hold_what_is_used(config: VlmConfig) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[]", "expected an object"),
-        ("{", "no price table"),
-        ('{"gpt-4o": 3}', r"gpt-4o\.input_usd"),
+        ("[]", "should be an object"),
+        ("{", "no price table: Invalid JSON"),
+        ('{"gpt-4o": 3}', r"gpt-4o = 3"),
         ('{"gpt-4o": {"input_usd": 1}}', r"gpt-4o\.output_usd"),
-        ('{"gpt-4o": {"input_usd": -1, "output_usd": 1}}', r"0 or more, got -1"),
-        ('{"gpt-4o": {"input_usd": NaN, "output_usd": 1}}', r"0 or more, got nan"),
+        ('{"gpt-4o": {"input_usd": -1, "output_usd": 1}}', r"gpt-4o\.input_usd = -1: Input should be greater"),
+        (
+            '{"gpt-4o": {"input_usd": NaN, "output_usd": 1}}',
+            r"gpt-4o\.input_usd = nan: Input should be a finite",
+        ),
     ],
 )
 def test_bad_price_tables_are_told(tmp_path: Path, text: str, message: str) -> None:

@@ -131,7 +131,9 @@ def test_a_round_with_3d_mems_stack(folder: Path, yolo) -> None:
     assert frame.rgb is not None
     (boxes,) = yolo.find([frame.rgb], ("bed", "table"), LEAST)
     sixth = float(np.sort(boxes.confidences)[-6])  # a network that is sure of nothing finds 300 things
-    config = StackConfig("bed;table", sixth, detector="yolov8s-worldv2.pt", sam="mobile_sam.pt")
+    config = StackConfig(
+        vocabulary="bed;table", min_confidence=sixth, detector="yolov8s-worldv2.pt", sam="mobile_sam.pt"
+    )
     facts = facts_of("3d-mem", config, str(folder))
     assert set(facts["libraries"]) == {"torch", "open_clip_torch", "ultralytics"}
     assert len(facts["weights"]) == 4

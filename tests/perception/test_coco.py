@@ -19,8 +19,15 @@ from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception import coco
-from evonav.perception.box_masks import masks_of_boxes
-from evonav.perception.coco import COCO_CLASSES, TYPE_OF_CLASS, CocoDetector, find_weights, weights_path
+from evonav.perception.coco import (
+    COCO_CLASSES,
+    TYPE_OF_CLASS,
+    CocoConfig,
+    CocoDetector,
+    find_weights,
+    masks_of_boxes,
+    weights_path,
+)
 from evonav.perception.detector import DetectorView
 from evonav.perception.models.yolov4_tiny import load_yolov4_tiny
 from evonav.perception.predicted import predicted_perception
@@ -67,7 +74,7 @@ def test_it_finds_what_opencv_finds_with_the_same_weights() -> None:
 @needs_weights
 def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_threads() -> None:
     views = [view_of_house(place) for place in (0, 9, 40)]
-    detector = CocoDetector(min_confidence=0.02, side_px=160)
+    detector = CocoDetector(config=CocoConfig(min_confidence=0.02, side_px=160))
     together = detector.detect(views)
     assert sum(map(len, together)) > 0
     with ThreadPoolExecutor(3) as pool:
@@ -130,10 +137,10 @@ def test_a_folder_of_models_comes_before_the_package(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"min_confidence": 2}, "min_confidence is 2, expected 0..1"),
-        ({"side_px": 600}, "side_px is 600, expected a multiple of 32"),
+        ({"min_confidence": 2}, "predicted:coco: min_confidence = 2: Input should be less"),
+        ({"side_px": 600}, "predicted:coco: side_px = 600: Input should be a multiple of 32"),
         ({"device": "cuda"}, "leave device out"),
-        ({"side": 608}, "predicted:coco has no option 'side'; there are min_confidence, side_px"),
+        ({"side": 608}, "predicted:coco has no option 'side'; did you mean side_px?"),
     ],
 )
 def test_bad_options_are_named(options: dict[str, object], message: str) -> None:

@@ -1,7 +1,5 @@
 """Filters of detections: cases worked out by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -82,7 +80,7 @@ def test_a_box_of_equal_size_does_not_replace_and_one_must_beat_all_its_rivals()
 def test_the_distance_of_middles_grows_with_the_image() -> None:
     near = ((20, 20, 40, 40), 0.9, "a"), ((25, 20, 44, 40), 0.8, "b")  # 4.5 px apart
     assert without_doubles(found(*near), CONFIG).labels == ("a", "b")
-    original = replace(CONFIG, reference_px=(SIDE, SIDE))
+    original = FilterConfig(reference_px=(SIDE, SIDE))
     assert without_doubles(found(*near), original).labels == ("a",)
 
 
@@ -95,7 +93,7 @@ def test_specks_and_boxes_over_half_the_image_go() -> None:
         ((0, 0, 5, 5), 0.9, "25"),
     )
     assert without_specks_and_giants(found(*parts), CONFIG).labels == ("half", "1", "24", "25")
-    original = replace(CONFIG, reference_px=(SIDE, SIDE))
+    original = FilterConfig(reference_px=(SIDE, SIDE))
     assert without_specks_and_giants(found(*parts), original).labels == ("half", "25")
 
 

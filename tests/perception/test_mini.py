@@ -19,7 +19,7 @@ from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import mini
 from evonav.perception.detector import DetectorView
-from evonav.perception.mini import MiniDetector
+from evonav.perception.mini import MiniConfig, MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
@@ -110,16 +110,16 @@ def test_bad_input_is_named(frames: list[mini_frames.LabelledFrame], tmp_path: P
         MiniDetector().detect([replace(view_of(frame), depth_m=np.full_like(frame.depth_m, np.nan))])
     with pytest.raises(InvalidArgumentError, match="`horizon_rad` is NaN"):
         MiniDetector().detect([replace(view_of(frame), horizon_rad=np.nan)])
-    with pytest.raises(InvalidArgumentError, match="min_confidence 2"):
-        MiniDetector(min_confidence=2)
+    with pytest.raises(InvalidArgumentError, match="predicted:mini: min_confidence = 2"):
+        MiniConfig(min_confidence=2)
     with pytest.raises(InvalidArgumentError, match=r"weights .*nowhere.* cannot be used"):
-        MiniDetector(tmp_path / "nowhere")
+        MiniDetector(weights=tmp_path / "nowhere")
     data = mini.WEIGHTS.read_bytes()
     broken = tmp_path / "broken"
     for number, bad in enumerate((data[:-3], data + b"0", data[8:], data[:100], data.replace(b'"stem"', b'"stam"'))):
         broken.with_suffix(f".{number}").write_bytes(bad)
         with pytest.raises(InvalidArgumentError, match="cannot be used"):
-            MiniDetector(broken.with_suffix(f".{number}"))
+            MiniDetector(weights=broken.with_suffix(f".{number}"))
 
 
 def test_weights_that_are_not_numbers_are_refused() -> None:

@@ -21,12 +21,11 @@ from evonav.house import bundled_houses
 from evonav.perception.detector import Found, nothing_found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
+from evonav.perception.models.prompted import Boxes, Masks, PromptedDetector
 from evonav.perception.predicted import (
     EVERYTHING,
     JointDetector,
     StackConfig,
-    StackPerception,
-    SwappedColours,
     predicted_perception,
     stack_of,
     weights_of,
@@ -123,8 +122,7 @@ def test_a_mask_that_smaller_ones_cover_goes_and_the_rest_is_renumbered() -> Non
         np.concatenate([whole.confidences, halves.confidences]),
         np.eye(4, dtype=np.float32),
     )
-    config = replace(EVERYTHING, min_share_of_inner=1.0)
-    (percept,) = DetectorPerception(Told(both), config).perceive([frame()])
+    (percept,) = DetectorPerception(Told(both), EVERYTHING).perceive([frame()])
     assert percept.detections.labels == ("Cup", "Pillow", "Book")
     assert percept.detections.features.argmax(axis=1).tolist() == [1, 2, 3]
     assert sorted(np.unique(percept.detections.masks).tolist()) == [-1, 0, 1, 2]
@@ -156,21 +154,26 @@ def test_unigoals_detectors_are_one_and_the_maps_word_stands() -> None:
 
 def test_colours_can_be_swapped_as_3d_mems_code_does() -> None:
     class Looking:
-        def detect(self, views):
-            self.views = views
-            return [nothing_found((SIDE, SIDE))]
+        shown = ()
+
+        def find(self, images, phrases, min_confidence):
+            self.shown += (*images,)
+            return [Boxes(np.zeros((0, 4), np.float32), (), np.zeros(0, np.float32))]
+
+        def outline(self, images, boxes_px):
+            self.shown += (*images,)
+            return [Masks(np.zeros((0, SIDE, SIDE), np.bool_), np.zeros(0, np.float32))]
 
     looking, one = Looking(), frame()
-    DetectorPerception(SwappedColours(looking)).perceive([one])
-    (view,) = looking.views
-    np.testing.assert_array_equal(view.rgb, one.rgb[..., [2, 1, 0]])
-    assert view.depth_m is one.depth_m
-    assert view.horizon_rad == one.pose.horizon_rad
+    DetectorPerception(PromptedDetector(looking, looking, ("bed",), 0.5, swaps_colours=True)).perceive([one])
+    for image in looking.shown:
+        np.testing.assert_array_equal(image, one.rgb[..., [2, 1, 0]])
+    assert len(looking.shown) == 2
     word = parse_perception("predicted:3d-mem,swapped_colours=true")
     assert weights_of("3d-mem", StackConfig(swapped_colours=word.options["swapped_colours"]))
     with pytest.raises(InvalidArgumentError, match="predicted:unigoal: swapped_colours is of 3d-mem"):
         weights_of("unigoal", StackConfig(swapped_colours=True))
-    with pytest.raises(InvalidArgumentError, match="swapped_colours is 'yes', expected true or false"):
+    with pytest.raises(InvalidArgumentError, match="swapped_colours = 'yes': Input should be a valid boolean"):
         StackConfig(swapped_colours="yes")
 
 
@@ -219,9 +222,9 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
     assert weights_of("3d-mem", StackConfig(sam="mobile_sam.pt"))["sam"].name == "mobile_sam.pt"
     assert StackConfig().phrases == (*PROCTHOR_NOUNS, "door", "window")
     assert StackConfig(vocabulary="Sofa; tv ;sofa").phrases == ("sofa", "tv")
-    with pytest.raises(InvalidArgumentError, match="no option 'confidence'; there are vocabulary, min_confidence"):
+    with pytest.raises(InvalidArgumentError, match="no option 'confidence'; did you mean min_confidence"):
         predicted_perception(confidence=0.5)
-    with pytest.raises(InvalidArgumentError, match="min_confidence is 2"):
+    with pytest.raises(InvalidArgumentError, match="min_confidence = 2"):
         predicted_perception(min_confidence=2)
     with pytest.raises(InvalidArgumentError, match="no stack 'yolo'"):
         predicted_perception("yolo")
@@ -233,8 +236,6 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
         weights_of("3d-mem", StackConfig(detector="yolo.pt"))
     with pytest.raises(InvalidArgumentError, match="no vocabulary 'coco'"):
         _ = StackConfig(vocabulary="coco").phrases
-    with pytest.raises(InvalidArgumentError, match="call `begin_stage` first"):
-        StackPerception("auto", StackConfig(), None, "cpu").perceive([frame()])
 
 
 def test_folder_and_device_are_no_part_of_what_makes_runs_the_same() -> None:

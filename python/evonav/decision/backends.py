@@ -63,7 +63,7 @@ def vlm(seed: int, **options: Any) -> DecisionModel:  # noqa: ANN401 - JSON, che
         InvalidArgumentError: An option makes no sense.
         StoreError: The file of exchanges cannot be opened.
     """
-    given = VlmOptions.read(options)
+    given = VlmOptions(**options)
     client: VlmClient | RelayedClient
     client = given.client() if given.relay is None else RelayedClient(given.relay, never_asks=given.mode == "replay")
     return _with_noise(VlmDecision(client, given), given.noise, seed)
@@ -80,7 +80,7 @@ def custom(seed: int, **options: Any) -> DecisionModel:  # noqa: ANN401 - JSON, 
         InvalidArgumentError: It cannot be imported or made, is none such, or answers itself and has options on prompts.
         StoreError: The file of exchanges cannot be opened.
     """
-    given = CustomOptions.read(options)
+    given = CustomOptions(**options)
     path, model = given.path, load_custom_model(given.path, seed)
     if isinstance(model, DecisionModel):
         if given.tells_of_change:
@@ -102,7 +102,7 @@ def custom(seed: int, **options: Any) -> DecisionModel:  # noqa: ANN401 - JSON, 
 
 def counting(seed: int, *, ledger: str, **options: Any) -> DecisionModel:  # noqa: ANN401 - JSON, checked
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `VlmOptions`."""
-    given = VlmOptions.read(options)
+    given = VlmOptions(**options)
     counted = Counting(TextMatch(), VlmClient(given.config), Ledger(ledger), str(seed), given)
     return _with_noise(counted, given.noise, seed)
 
@@ -140,4 +140,4 @@ class Counting(DecisionModel):
 
 
 def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: int) -> DecisionModel:
-    return Noisy(model, NoiseRates.read(noise), seed) if noise else model
+    return Noisy(model, NoiseRates(**noise), seed) if noise else model

@@ -7,16 +7,18 @@ questions of that kind in the episode so far, and the attempt. Time and place of
 """
 
 import hashlib
-import math
 import random
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Annotated, TypeVar
+
+from pydantic import Field, model_validator
 
 from evonav.decision.question import AnswerError, DecisionModel, ModelWrapper, Question, Reply
 from evonav.errors import InvalidArgumentError
+from evonav.records import Options, Share
 
 A = TypeVar("A")
 
@@ -30,46 +32,29 @@ GARBAGE = (
 """Texts in place of an answer; they go through the question's grammar, which may find an answer in one."""
 
 
-@dataclass(frozen=True, slots=True)
-class NoiseRates:
+class NoiseRates(Options):
     """Shares of tries that go wrong; at most one mistake happens in a try."""
 
-    wrong: float = 0.0
+    of = "noise"
+    wrong: Share = 0.0
     """Share of wrong answers: another valid answer, each as likely; a question without another keeps its answer."""
-    unparsable: float = 0.0
+    unparsable: Share = 0.0
     """Share of answers against the grammar."""
-    refusal: float = 0.0
+    refusal: Share = 0.0
     """Share of refusals."""
-    lost: float = 0.0
+    lost: Share = 0.0
     """Share of lost answers."""
-    confused: float = 0.0
+    confused: Share = 0.0
     """Share of answers that take another object of the goal's class for the goal, by the score of the model's rules."""
-    delay: float = 0.0
+    delay: Annotated[float, Field(ge=0.0)] = 0.0
     """Seconds added to every try; they change no answer."""
 
-    def __post_init__(self) -> None:
-        """Check the shares.
-
-        Raises:
-            InvalidArgumentError: One is not within 0 to 1, they add up to more than 1, or the delay is not finite.
-        """
-        shares = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "delay"}
-        for name, share in shares.items():
-            if not 0.0 <= share <= 1.0:
-                raise InvalidArgumentError(f"noise {name}: expected a share from 0 to 1, got {share!r}")
-        if sum(shares.values()) > 1.0 + 1e-9:
-            raise InvalidArgumentError(f"noise: shares add up to {sum(shares.values()):g}, more than 1")
-        if not (math.isfinite(self.delay) and self.delay >= 0.0):
-            raise InvalidArgumentError(f"noise delay: expected seconds, 0 or more, got {self.delay!r}")
-
-    @classmethod
-    def read(cls, options: Mapping[str, Any]) -> "NoiseRates":
-        """Read rates by name from JSON; `InvalidArgumentError` if a name is unknown, or a rate makes no sense."""
-        names = [field.name for field in fields(cls)]
-        for name, value in options.items():
-            if name not in names or isinstance(value, bool) or not isinstance(value, int | float):
-                raise InvalidArgumentError(f"noise {name} = {value!r}: expected numbers for {', '.join(names)}")
-        return cls(**options)
+    @model_validator(mode="after")
+    def _check(self) -> "NoiseRates":
+        total = sum(self.model_dump(exclude={"delay"}).values())
+        if total > 1.0 + 1e-9:
+            raise ValueError(f"shares add up to {total:g}, more than 1")
+        return self
 
 
 class Noisy(ModelWrapper):
@@ -169,7 +154,7 @@ def _mistaken(question: Question[A], answer: A, counter: str) -> Reply[A]:
     return Reply(answer, f"{question.answer_text(answer)}\nA confusion on purpose (noise).", counter)
 
 
-def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:
+def read_rates(text: str, known: Iterable[str]) -> dict[str, float]:
     """Read rates as people write them: `wrong=0.1,lost=0.01`.
 
     Raises:

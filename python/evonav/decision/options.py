@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from evonav.decision.goal_input import GoalInput
 from evonav.decision.vlm.account import Account, Ledger, Price
@@ -12,7 +12,7 @@ from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
-from evonav.records import Record, sentence_of
+from evonav.records import Options
 
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
@@ -28,12 +28,11 @@ Structured = Literal["auto", "on", "off"]
 
 _IDENTITY = {"path", "model", "structured", "images", "tells_of_change", "goal_input", "request", "noise"}
 
-O = TypeVar("O", bound="AskedOptions")  # noqa: E741 - a type of options
 
-
-class AskedOptions(Record):
+class AskedOptions(Options):
     """Options of all models that are asked by prompts. `identity()` decides answers, `host()` how they are reached."""
 
+    of = "decision"
     structured: Structured = "auto"
     images: bool = True
     """The model is shown images."""
@@ -53,14 +52,6 @@ class AskedOptions(Record):
     """File with the spending of all processes of the run."""
     account: str | None = None
     """Name in the ledger; default: the model's."""
-
-    @classmethod
-    def read(cls: type[O], options: Mapping[str, Any]) -> O:
-        """Read options from JSON; an `InvalidArgumentError` names the option and its value."""
-        try:
-            return cls.model_validate(options)
-        except ValidationError as error:
-            raise InvalidArgumentError(f"decision options: {sentence_of(error)}") from error
 
     def identity(self) -> dict[str, Any]:
         """Return the options that decide what is answered, as a run's header states them."""
@@ -119,7 +110,7 @@ class VlmOptions(AskedOptions):
         try:
             return VlmConfig(self.model, **{**SAMPLING, **self.request, **self.server})
         except TypeError as error:
-            raise InvalidArgumentError(f"decision options: {error}") from error
+            raise InvalidArgumentError(f"decision: {error}") from error
 
     def client(self) -> VlmClient:
         """Return the client.

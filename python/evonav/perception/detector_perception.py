@@ -3,7 +3,8 @@
 Only colours and depth go in; instances and the scene's objects are not used.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +12,13 @@ from numpy.typing import NDArray
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
-from evonav.perception.perception import Percept, StageScene
+from evonav.perception.perception import Percept, Perception
 from evonav.perception.vocabulary import TYPE_OF_WORD
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame
 
 
-class DetectorPerception:
+class DetectorPerception(Perception):
     """Perception that returns a detector's detections as percepts; depth and pose are the frame's own."""
 
     needs_rgb = True
@@ -27,22 +28,31 @@ class DetectorPerception:
         detector: Detector,
         filters: FilterConfig | None = None,
         embedder: Embedder | None = None,
+        *,
+        facts_of: Callable[[Sequence[str]], dict[str, Any]] = lambda agents: {},
     ) -> None:
         """Make a perception over models that may be shared.
 
         Args:
             filters: Filters on detections; default: 3D-Mem's values.
             embedder: Computes the features of the remaining detections; default: the detector's own, if it has any.
+            facts_of: See `check`.
         """
         self._detector = detector
         self._filters = filters or FilterConfig()
         self._embedder = embedder
+        self._facts_of = facts_of
 
-    def begin_stage(self, scene: StageScene) -> None:
-        """Do nothing: the scene is not used."""
+    def check(self, agents: Sequence[str]) -> dict[str, Any]:
+        """Return what decides results besides options, such as checksums of weights.
 
-    def change_scene(self, scene: StageScene) -> None:
-        """Do nothing: the scene is not used."""
+        Args:
+            agents: Agents that will use it.
+
+        Raises:
+            PerceptionError: Something that it needs is missing; the message says what to do.
+        """
+        return self._facts_of(agents)
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Perceive the views of a round, as one batch.

@@ -5,57 +5,42 @@ Lengths and areas in pixels are meant for images of the size that the original l
 """
 
 import math
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import Found
+from evonav.records import Options, Share
+
+_Edge = Annotated[int, Field(gt=0)]
 
 
-@dataclass(frozen=True, slots=True)
-class FilterConfig:
+class FilterConfig(Options):
     """3D-Mem's values."""
 
-    reference_px: tuple[int, int] = (1280, 1280)
+    of = "FilterConfig"
+    reference_px: tuple[_Edge, _Edge] = (1280, 1280)
     """Height and width of the images for which the values in pixels are meant."""
     background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "rug", "bath mat")
     """Labels that are no objects. 3D-Mem's list has `door` as well, which its agent drops (`NavigatorConfig`)."""
-    min_area_fraction: float = 0.001
+    min_area_fraction: Share = 0.001
     """Smallest part of the image that a mask covers."""
-    min_confidence: float = 0.4
-    max_mask_iou: float = 0.9
+    min_confidence: Share = 0.4
+    max_mask_iou: Share = 0.9
     """Above it, of two masks the one with less confidence goes."""
-    min_centre_distance_px: float = 20.0
+    min_centre_distance_px: Annotated[float, Field(ge=0.0)] = 20.0
     """Limit for two boxes: of two with centres nearer than this, the smaller is dropped."""
-    min_area_px: float = 25.0
-    max_box_fraction: float = 0.5
+    min_area_px: Annotated[float, Field(ge=0.0)] = 25.0
+    max_box_fraction: Share = 0.5
     """Largest part of the image that a box covers."""
-    max_share_of_outer: float = 0.7
-    min_share_of_inner: float = 0.8
+    max_share_of_outer: Share = 0.7
+    min_share_of_inner: Share = 0.8
     """Smallest share of the inner box that lies in the outer one.
 
     A box that covers less than `max_share_of_outer` of another is a thing on it: the other mask loses it.
     """
-
-    def __post_init__(self) -> None:
-        """Check all values.
-
-        Raises:
-            InvalidArgumentError: A parameter is outside its domain; the message names it.
-        """
-        shares = ("min_area_fraction", "min_confidence", "max_mask_iou", "max_box_fraction")
-        for name in (*shares, "max_share_of_outer", "min_share_of_inner"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
-                raise InvalidArgumentError(f"FilterConfig: {name} is {value}, expected 0..1")
-        for name in ("min_centre_distance_px", "min_area_px"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise InvalidArgumentError(f"FilterConfig: {name} is {value}, expected a number that is not negative")
-        if min(self.reference_px) <= 0:
-            raise InvalidArgumentError(f"FilterConfig: reference_px is {self.reference_px}, expected positive numbers")
 
     def scale_of(self, shape: tuple[int, int]) -> float:
         """Return the length of a pixel of the original in an image of `(H, W)`."""

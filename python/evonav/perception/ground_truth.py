@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav._core import RunImage
 from evonav.errors import InvalidArgumentError
-from evonav.perception.perception import Percept, StageScene
+from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.sensors.observation import Detections
 from evonav.world.run_images import unexpanded
 from evonav.world.simulator import Frame, SceneObject
@@ -19,7 +19,7 @@ DETECTED_KINDS = ("object", "door", "window")
 
 
 @dataclass(slots=True)
-class GroundTruthPerception:
+class GroundTruthPerception(Perception):
     """Masks and labels of the objects in a frame (the paper's ground-truth setting).
 
     3D-Mem's area filters hold here as well. Its limit on a mask's bounding box (half the image) is off by default: it
@@ -38,25 +38,13 @@ class GroundTruthPerception:
     )
     """True for each of the stage's objects that is detected."""
 
-    @property
-    def needs_rgb(self) -> bool:
-        """False: instances are enough."""
-        return False
-
-    def begin_stage(self, scene: StageScene) -> None:
-        """Store the stage's objects."""
-        self.change_scene(scene)
-
     def change_scene(self, scene: StageScene) -> None:
-        """Store the objects of the changed house."""
+        """Store the objects of the house."""
         self._objects, self._is_detected = scene.objects, _are_detected(scene.objects)
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return each frame as it is."""
         return [Percept(self.detect(frame, self._objects), frame.depth_m, frame.pose) for frame in frames]
-
-    def text_feature(self, text: str) -> None:
-        """Return `None`: ground truth has no features."""
 
     def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
         """Return the objects, doors and windows in a frame; walls, floors and ceilings are background.

@@ -8,15 +8,17 @@ import hashlib
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import DetectorView, Found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
+from evonav.records import Options, Share
 
 WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
 """Shipped weights, made by `scripts/mini_detector/train_mini.py` and `scripts/mini_detector/export_mini.py`."""
@@ -34,52 +36,40 @@ def _network(weights: Path) -> _core.MiniNetwork:
         ) from error
 
 
-class MiniPerception(DetectorPerception):
-    """Perception `predicted:mini`. Its masks do not overlap, so only specks and doubtful ones are filtered."""
+class MiniConfig(Options):
+    """Limits of the mini detector."""
 
-    def __init__(self, *, min_confidence: float = 0.3, min_cells: int = 2) -> None:
-        """Make a perception with the shipped weights.
+    of = "predicted:mini"
+    min_confidence: Share = 0.3
+    """Least mean probability of an object's type over its cells."""
+    min_cells: Annotated[int, Field(ge=0)] = 2
+    """Fewest cells of an object, each of 4 by 4 pixels in a view of 300 by 300."""
 
-        Args:
-            min_confidence: Least confidence of a detection, 0 to 1.
-            min_cells: Fewest cells of an object, see `MiniDetector`.
 
-        Raises:
-            InvalidArgumentError: A parameter is outside its domain, or the weights are broken.
-        """
-        filters = FilterConfig(min_confidence=min_confidence, max_box_fraction=1.0, min_centre_distance_px=0.0)
-        super().__init__(MiniDetector(min_confidence=min_confidence, min_cells=min_cells), filters)
+def mini_perception(config: MiniConfig) -> DetectorPerception:
+    """Make `predicted:mini` with the shipped weights; masks do not overlap, so only specks and doubts are filtered."""
+    filters = FilterConfig(min_confidence=config.min_confidence, max_box_fraction=1.0, min_centre_distance_px=0.0)
+    return DetectorPerception(MiniDetector(config), filters, facts_of=_facts_of)
 
-    def check(self, agents: Sequence[str]) -> dict[str, Any]:
-        """Return what decides results besides options: the checksum of the weights.
 
-        Args:
-            agents: Agents that will use it; they all see the same.
-        """
-        return {"mini": {WEIGHTS.name: hashlib.sha256(WEIGHTS.read_bytes()).hexdigest()}}
+def _facts_of(agents: Sequence[str]) -> dict[str, Any]:
+    return {"mini": {WEIGHTS.name: hashlib.sha256(WEIGHTS.read_bytes()).hexdigest()}}
 
 
 class MiniDetector:
     """Objects of the types in `classes`, from colours and depth together. Shared by all episodes of a process."""
 
-    def __init__(self, weights: Path | None = None, *, min_cells: int = 2, min_confidence: float = 0.25) -> None:
+    def __init__(self, config: MiniConfig | None = None, weights: Path = WEIGHTS) -> None:
         """Make a detector.
 
         Args:
             weights: A file of `scripts/mini_detector/export_mini.py`; default: what ships.
-            min_cells: Fewest cells of an object, each of 4 by 4 pixels in a view of 300 by 300.
-            min_confidence: Least mean probability of an object's type over its cells.
 
         Raises:
-            InvalidArgumentError: The file is missing or broken, or a parameter is outside its domain.
+            InvalidArgumentError: The file is missing or broken.
         """
-        if min_cells < 0 or not 0.0 <= min_confidence <= 1.0:
-            raise InvalidArgumentError(
-                f"mini: min_cells is {min_cells}, expected 0 or more; min_confidence {min_confidence}, expected 0..1"
-            )
-        self._network = _network(weights or WEIGHTS)
-        self._min_cells = min_cells
-        self._min_confidence = min_confidence
+        self._network = _network(weights)
+        self._config = config or MiniConfig()
         self.classes = tuple(self._network.classes)
         """ProcTHOR's types that it tells apart."""
 
@@ -102,8 +92,8 @@ class MiniDetector:
             np.ascontiguousarray(view.rgb),
             np.ascontiguousarray(view.depth_m),
             view.horizon_rad,
-            min_cells=self._min_cells,
-            min_confidence=self._min_confidence,
+            min_cells=self._config.min_cells,
+            min_confidence=self._config.min_confidence,
         )
         extents = _core.mask_extents(numbers, num_masks=len(classes))
         seen = np.flatnonzero(extents[:, 0] > 0)

@@ -1,5 +1,6 @@
 """Define a perception: frames in; detections out, with the depth and the pose that the agent is to believe."""
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -41,24 +42,28 @@ class Percept:
 
 
 class Perception(Protocol):
-    """Turns rendered frames into percepts. One serves one episode; models behind it are loaded once a process."""
+    """Turns rendered frames into percepts. One serves one episode; models behind it are loaded once a process.
+
+    Only `perceive` has no default.
+    """
 
     @property
     def needs_rgb(self) -> bool:
         """Whether frames must have colours, which cost more than the rest of them."""
-        ...
+        return False
 
     def begin_stage(self, scene: StageScene) -> None:
         """Begin a stage of the episode; stages come in order, each once."""
-        ...
+        self.change_scene(scene)
 
     def change_scene(self, scene: StageScene) -> None:
         """Take in that the house changes during the stage: `scene` has other objects, and rounds go on.
 
         Only tasks with changes during stages need it (docs/extensions.md).
         """
-        ...
+        return
 
+    @abstractmethod
     def perceive(self, frames: Sequence[Frame]) -> Sequence[Percept]:
         """Perceive the views of one round, as one batch.
 
@@ -68,8 +73,7 @@ class Perception(Protocol):
         Returns:
             One percept a frame. Detections hold no ids, and neither numbers nor order tell which instance one is.
         """
-        ...
 
     def text_feature(self, text: str) -> NDArray[np.float32] | None:
         """`(D,)` unit feature of a text, comparable with those of detections; `None` if they have none."""
-        ...
+        return None

@@ -4,12 +4,11 @@ A stack is put together from models, filters and the words that they look for.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal, get_args
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field
 
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import Detector, DetectorView, Embedder, Found
@@ -18,10 +17,10 @@ from evonav.perception.filters import FilterConfig, filtered, joined
 from evonav.perception.models import libraries
 from evonav.perception.models.prompted import PromptedDetector
 from evonav.perception.models.torchvision_models import MaskRcnn
-from evonav.perception.perception import Percept, Perception, StageScene
+from evonav.perception.perception import Perception, StageScene
 from evonav.perception.vocabulary import COCO_UNIGOAL, DINO_UNIGOAL, VOCABULARIES
 from evonav.perception.weights import Weights, check_folder, fingerprint, known, located, models_folder
-from evonav.world.simulator import Frame
+from evonav.records import Options, Share
 
 StackName = Literal["3d-mem", "unigoal", "transformers"]
 STACKS: tuple[StackName, ...] = get_args(StackName)
@@ -37,7 +36,7 @@ EVERYTHING = FilterConfig(
     min_share_of_inner=1.0,
 )
 """Filters that drop empty masks alone."""
-UNIGOAL_GRAPH = replace(EVERYTHING, reference_px=(480, 640), min_area_px=25.0, max_box_fraction=0.5)
+UNIGOAL_GRAPH = EVERYTHING.model_copy(update={"reference_px": (480, 640), "min_area_px": 25.0, "max_box_fraction": 0.5})
 """UniGoal's, of its scene graph; it looks at 640x480."""
 _SAME_IOU = 0.5
 """UniGoal's two detectors: masks that overlap by more are one object, and the map's detector names it."""
@@ -47,55 +46,25 @@ _COCO = {{"plant": "potted plant"}.get(word, word): word for word in COCO_UNIGOA
 """UniGoal's word by COCO's category."""
 
 
-@dataclass(frozen=True, slots=True)
-class StackConfig:
+_Words = Annotated[str, Field(pattern=r"\S")]
+
+
+class StackConfig(Options):
     """Options of the stacks; each takes those that it has models for, and `None` is the published value."""
 
-    vocabulary: str | None = None
+    of = "predicted perception"
+    vocabulary: _Words | None = None
     """`procthor` (default), `scannet200`, or words with semicolons between them; unigoal has its own."""
-    min_confidence: float | None = None
+    min_confidence: Share | None = None
     """Least confidence of detections; 3d-mem 0.4, transformers 0.3, unigoal 0.5 (Mask R-CNN), 0.3 (Grounding DINO)."""
-    detector: str | None = None
+    detector: _Words | None = None
     """Weights of the detector: 3d-mem yolov8x-world.pt, transformers google/owlv2-base-patch16-ensemble."""
-    sam: str | None = None
+    sam: _Words | None = None
     """Weights of SAM: 3d-mem sam_l.pt, transformers facebook/sam-vit-large, unigoal facebook/sam-vit-huge."""
-    min_mask_score: float | None = None
+    min_mask_score: Share | None = None
     """Least score of SAM's masks; unigoal 0.95, the others accept all."""
     swapped_colours: bool = False
     """3d-mem: show detector and SAM red as blue and blue as red, as 3D-Mem's released code does."""
-
-    def __post_init__(self) -> None:
-        """Check all options.
-
-        Raises:
-            InvalidArgumentError: An option is outside its domain; the message names it.
-        """
-        for name in ("min_confidence", "min_mask_score"):
-            value = getattr(self, name)
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if value is not None and not (is_number and 0.0 <= value <= 1.0):
-                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected 0..1")
-        if not isinstance(self.swapped_colours, bool):
-            raise InvalidArgumentError(
-                f"predicted perception: swapped_colours is {self.swapped_colours!r}, expected true or false"
-            )
-        for name in ("vocabulary", "detector", "sam"):
-            value = getattr(self, name)
-            if value is not None and not (isinstance(value, str) and value.strip()):
-                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected words")
-
-    @classmethod
-    def from_options(cls, options: Mapping[str, Any]) -> "StackConfig":
-        """Return the configuration with some options.
-
-        Raises:
-            InvalidArgumentError: There is no such option, or it is outside its domain.
-        """
-        names = [field.name for field in fields(cls)]
-        for name in options:
-            if name not in names:
-                raise InvalidArgumentError(f"predicted perception has no option {name!r}; there are {', '.join(names)}")
-        return cls(**options)
 
     @property
     def phrases(self) -> tuple[str, ...]:
@@ -130,17 +99,6 @@ class JointDetector:
             joined(filtered(first, EVERYTHING), filtered(second, self.graph_filters), _SAME_IOU)
             for first, second in zip(firsts, seconds, strict=True)
         ]
-
-
-@dataclass(frozen=True, slots=True)
-class SwappedColours:
-    """A detector that is shown red as blue and blue as red."""
-
-    detector: Detector
-
-    def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
-        """Detect objects in the swapped colours."""
-        return self.detector.detect([replace(view, rgb=view.rgb[..., ::-1]) for view in views])
 
 
 def stack_of(agent: str) -> StackName:
@@ -211,7 +169,9 @@ def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[
     return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}
 
 
-def load_stack(stack: StackName, config: StackConfig, models: str | None, device: str) -> DetectorPerception:
+def load_stack(
+    stack: StackName, config: StackConfig, models: str | None, device: str
+) -> tuple[Detector, FilterConfig, Embedder | None]:
     """Load a stack's models; a model that this process has loaded before is not loaded again.
 
     Args:
@@ -236,11 +196,10 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
             phrases,
             min_confidence,
             _either(min_score, -math.inf),
+            swaps_colours=config.swapped_colours,
         )
-        if config.swapped_colours:
-            detector = SwappedColours(detector)
         embedder: Embedder = open_clip_models.load_open_clip("ViT-B-32", paths["clip"], on)
-        return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+        return detector, FilterConfig(min_confidence=min_confidence), embedder
     from evonav.perception.models import transformers_models
 
     masker = transformers_models.Sam.load(paths["sam"], on)
@@ -254,7 +213,7 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
             _either(min_score, -math.inf),
         )
         embedder = transformers_models.Clip.load(paths["clip"], on)
-        return DetectorPerception(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+        return detector, FilterConfig(min_confidence=min_confidence), embedder
     from evonav.perception.models.torchvision_models import load_mask_rcnn
 
     grounded = PromptedDetector(
@@ -266,23 +225,19 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
     )
     least = _either(config.min_confidence, 0.5)
     network = load_mask_rcnn(paths["network"], on, min(least, 0.05))
-    return DetectorPerception(JointDetector(network, least, grounded), EVERYTHING)
+    return JointDetector(network, least, grounded), EVERYTHING, None
 
 
 def _either(given: float | None, published: float) -> float:
     return published if given is None else given
 
 
-@dataclass(slots=True)
-class StackPerception:
+class StackPerception(DetectorPerception):
     """A stack by its name; its models are loaded at the first stage, once a process."""
 
-    stack: str
-    config: StackConfig
-    models: str | None
-    device: str
-    needs_rgb: bool = field(default=True, init=False)
-    _perception: DetectorPerception | None = field(default=None, init=False, repr=False)
+    def __init__(self, stack: str, config: StackConfig, models: str | None, device: str) -> None:
+        """Store the options; for them see `predicted_perception`."""
+        self._stack, self._config, self._models, self._device = stack, config, models, device
 
     def check(self, agents: Sequence[str]) -> dict[str, Any]:
         """Check that everything needed is there, without loading it; missing files are fetched.
@@ -298,32 +253,16 @@ class StackPerception:
             InvalidArgumentError: An option makes no sense.
         """
         stacks = sorted({self._stack_for(agent) for agent in agents})
-        facts: dict[str, Any] = {stack: facts_of(stack, self.config, self.models) for stack in stacks}
-        libraries.device_of(self.device)
+        facts: dict[str, Any] = {stack: facts_of(stack, self._config, self._models) for stack in stacks}
+        libraries.device_of(self._device)
         return facts
 
     def begin_stage(self, scene: StageScene) -> None:
         """Load the models of the agent's stack; of the scene, only the agent's name is used."""
-        self._perception = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
-
-    def change_scene(self, scene: StageScene) -> None:
-        """Do nothing: of a scene, only the agent's name is used."""
-
-    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """Perceive the views of a round, as one batch."""
-        return self._begun().perceive(frames)
-
-    def text_feature(self, text: str) -> NDArray[np.float32] | None:
-        """Return the feature of the stack's CLIP, if it has one."""
-        return self._begun().text_feature(text)
-
-    def _begun(self) -> DetectorPerception:
-        if self._perception is None:
-            raise InvalidArgumentError("a stack of models has no stage yet: call `begin_stage` first")
-        return self._perception
+        super().__init__(*load_stack(self._stack_for(scene.agent), self._config, self._models, self._device))
 
     def _stack_for(self, agent: str) -> StackName:
-        return next((name for name in STACKS if name == self.stack), None) or stack_of(agent)
+        return next((name for name in STACKS if name == self._stack), None) or stack_of(agent)
 
 
 def predicted_perception(
@@ -339,30 +278,21 @@ def predicted_perception(
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
         options: See `StackConfig`; of `mini`, which needs neither models nor a device,
-            `evonav.perception.mini.MiniPerception`, and of `coco` `evonav.perception.coco.CocoPerception`.
+            `evonav.perception.mini.MiniConfig`, and of `coco` `evonav.perception.coco.CocoConfig`.
 
     Raises:
         InvalidArgumentError: There is no such stack or option.
     """
     if stack == "mini":
-        from evonav.perception.mini import MiniPerception
+        from evonav.perception.mini import MiniConfig, mini_perception
 
-        _check_names("mini", options, ("min_confidence", "min_cells"))
-        return MiniPerception(**options)
+        return mini_perception(MiniConfig(**options))
     if stack == "coco":
-        from evonav.perception.coco import CocoPerception
+        from evonav.perception.coco import CocoConfig, coco_perception
 
         if device not in ("auto", "cpu"):
             raise InvalidArgumentError(f"predicted:coco computes on the processor, not on {device!r}: leave device out")
-        _check_names("coco", options, ("min_confidence", "side_px"))
-        return CocoPerception(models, **options)
+        return coco_perception(models, CocoConfig(**options))
     if stack != "auto" and stack not in STACKS:
         raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}, mini, coco")
-    return StackPerception(stack, StackConfig.from_options(options), models, device)
-
-
-def _check_names(stack: str, options: Mapping[str, Any], names: tuple[str, ...]) -> None:
-    """Raise `InvalidArgumentError` if a stack has no option of a name."""
-    for name in options:
-        if name not in names:
-            raise InvalidArgumentError(f"predicted:{stack} has no option {name!r}; there are {', '.join(names)}")
+    return StackPerception(stack, StackConfig(**options), models, device)

@@ -8,11 +8,11 @@ MODULE:FUNCTION[,KEY=VALUE...]   a perception of your own
 
 import json
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
+from evonav.records import did_you_mean
 
 if TYPE_CHECKING:
     from evonav.perception import Perception
@@ -51,13 +51,11 @@ def parse_perception(word: str, options: Mapping[str, Any] | None = None) -> "Co
         return Component(NOISY, {"preset": variant, **given} if variant else given)
     if kind == "predicted":
         if variant and variant not in STACKS:
-            raise InvalidArgumentError(f"perception {word!r}: {_unknown('stack', variant, STACKS)}")
+            raise InvalidArgumentError(f"perception {word!r}: no stack {variant!r}; {did_you_mean(variant, STACKS)}")
         host = {key: given.pop(key) for key in _HOST_OPTIONS if key in given}
         return Component(PREDICTED, {"stack": variant or "auto", **given}, host)
     if not colon:
-        near = get_close_matches(kind, NAMES, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise InvalidArgumentError(f"perception {word!r}: expected {GRAMMAR}{hint}")
+        raise InvalidArgumentError(f"perception {word!r}: expected {GRAMMAR}; {did_you_mean(kind, NAMES)}")
     return Component(f"{kind}:{variant}", given)
 
 
@@ -82,9 +80,3 @@ def _keywords(word: str, parts: list[str]) -> dict[str, Any]:
         except ValueError:
             keywords[key] = text
     return keywords
-
-
-def _unknown(what: str, name: str, known: tuple[str, ...]) -> str:
-    near = get_close_matches(name, known, 1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    return f"no {what} {name!r}; there are {', '.join(known)}{hint}"

@@ -18,7 +18,7 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise.config import NoiseConfig
 from evonav.perception.noise.confusion import Confusion, read_confusion
 from evonav.perception.noise.pose_drift import PoseDrift
-from evonav.perception.perception import Percept, StageScene
+from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, text_feature
 from evonav.sensors.observation import Detections
 from evonav.world.run_images import unexpanded
@@ -63,7 +63,7 @@ class _Found:
 
 
 @dataclass(slots=True)
-class NoisyPerception:
+class NoisyPerception(Perception):
     """Ground truth through an error model. One serves one episode."""
 
     config: NoiseConfig = field(default_factory=NoiseConfig)
@@ -82,11 +82,6 @@ class NoisyPerception:
         """
         self._confusion = read_confusion(self.config.confusion)
         self._drift = PoseDrift(self.config)
-
-    @property
-    def needs_rgb(self) -> bool:
-        """False: everything is made from instances and depth."""
-        return False
 
     def begin_stage(self, scene: StageScene) -> None:
         """Store the stage's objects; drift goes on."""
@@ -179,10 +174,12 @@ class NoisyPerception:
         draws = self._draws(view, [body.id for body in bodies])
         shares = _shares(draws)
         visible = 1.0 - outlines[:, 1] / np.maximum(outlines[:, 0], 1.0)
+        half_m = config.half_distance_m
+        distances = outlines[:, 2] / half_m if half_m else np.zeros(len(bodies))
         quality = (
-            _rising(areas, config.half_area_fraction, config.area_slope)
-            * _falling(outlines[:, 2], config.half_distance_m, config.distance_slope)
-            * _rising(visible, config.half_visible, config.visible_slope)
+            _falling(config.half_area_fraction / np.maximum(areas, 1e-9), config.area_slope)
+            * _falling(distances, config.distance_slope)
+            * _falling(config.half_visible / np.maximum(visible, 1e-9), config.visible_slope)
         )
         is_found = shares[:, _MISS] < (1.0 - config.miss_rate) * quality
         is_confused = shares[:, _CONFUSED] < config.confusion_rate
@@ -346,18 +343,9 @@ def _shares(normals: F64) -> F64:
     return np.array(flat).reshape(normals.shape)
 
 
-def _rising(values: F64, half: float, slope: float) -> F64:
-    """Return values near 1 where `values` are large, and 0.5 at `half`; 1 everywhere if `half` is 0."""
-    if half == 0.0:
-        return np.ones(len(values))
-    return 1.0 / (1.0 + (half / np.maximum(values, 1e-9)) ** slope)
-
-
-def _falling(values: F64, half: float, slope: float) -> F64:
-    """Return values near 1 where `values` are small, and 0.5 at `half`; 1 everywhere if `half` is 0."""
-    if half == 0.0:
-        return np.ones(len(values))
-    return 1.0 / (1.0 + (values / half) ** slope)
+def _falling(ratios: F64, slope: float) -> F64:
+    """Return 1 where `ratios` are 0, 0.5 where they are 1, and less where they are larger."""
+    return 1.0 / (1.0 + ratios**slope)
 
 
 def _confidences(medians: F64, quality: F64, normals: F64, config: NoiseConfig) -> F64:

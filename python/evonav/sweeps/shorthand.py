@@ -65,7 +65,7 @@ def _decision(word: str, place: str) -> tuple[str, dict[str, Any]]:
         return rest, {"kind": "vlm", "model": rest}
     if kind in ("text", "looks") and colon:
         try:
-            return word, {"kind": kind, "noise": read_rates(rest, list(NoiseRates.__dataclass_fields__))}
+            return word, {"kind": kind, "noise": read_rates(rest, NoiseRates.model_fields)}
         except InvalidArgumentError as error:
             raise InvalidArgumentError(f"{place}: {word!r}: {error}") from None
     return word, {"kind": word}

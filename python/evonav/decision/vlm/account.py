@@ -5,15 +5,18 @@ before a question is asked, so that no number of processes passes the limit. A p
 leaves its reservation: the server may have counted the question.
 """
 
-import json
 import math
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
 
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.shared_file import SharedFile
 from evonav.errors import InvalidArgumentError
+from evonav.records import sentence_of
 
 CHARACTERS_PER_TOKEN = 3.0
 """Smallest average number of characters a token in English (about 4): estimates are rather too high."""
@@ -43,12 +46,13 @@ class Usage:
         return Usage(self.input_tokens + other.input_tokens, self.output_tokens + other.output_tokens)
 
 
+@with_config(ConfigDict(strict=True, allow_inf_nan=False))
 @dataclass(frozen=True, slots=True)
 class Price:
     """A model's price in US dollars a million tokens."""
 
-    input_usd: float
-    output_usd: float
+    input_usd: Annotated[float, Field(ge=0.0)]
+    output_usd: Annotated[float, Field(ge=0.0)]
 
     def of(self, usage: Usage) -> float:
         """Return the cost in US dollars."""
@@ -62,21 +66,11 @@ def read_prices(path: Path | str) -> dict[str, Price]:
         InvalidArgumentError: The table is invalid; the message has file, field and value.
     """
     try:
-        table = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return TypeAdapter(dict[str, Price]).validate_json(Path(path).read_bytes())
+    except OSError as error:
         raise InvalidArgumentError(f"{path}: no price table: {error}") from error
-    if not isinstance(table, dict):
-        raise InvalidArgumentError(f"{path}: expected an object of models, got {type(table).__name__}")
-    prices = {}
-    for model, entry in table.items():
-        values = []
-        for field in ("input_usd", "output_usd"):
-            value = entry.get(field) if isinstance(entry, dict) else None
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < math.inf:
-                raise InvalidArgumentError(f"{path}: {model}.{field}: expected dollars, 0 or more, got {value!r}")
-            values.append(float(value))
-        prices[model] = Price(*values)
-    return prices
+    except ValidationError as error:
+        raise InvalidArgumentError(f"{path}: no price table: {sentence_of(error)}") from error
 
 
 def image_tokens(size_px: tuple[int, int], detail: str) -> int:

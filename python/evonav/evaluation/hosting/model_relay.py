@@ -65,7 +65,7 @@ class ModelRelay:
         """
         from evonav.decision.options import VlmOptions
 
-        self._client = VlmOptions.read(decision.keywords).client()
+        self._client = VlmOptions(**decision.keywords).client()
         if self._thread is None:
             self._thread = threading.Thread(target=self._serve, daemon=True)
             self._thread.start()

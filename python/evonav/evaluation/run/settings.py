@@ -201,7 +201,7 @@ class DecisionSettings(Settings):
         """
         from evonav.decision.noisy import NoiseRates
 
-        if NoiseRates.read(self.noise).confused and not self.asks_rules:
+        if NoiseRates(**self.noise).confused and not self.asks_rules:
             raise SettingError(type(self), "noise", "confused needs the scores of rules: decision text or looks")
         if self.goal_input != "text" and (self.kind == "text" or not self.images):
             raise SettingError(type(self), "goal_input", f"{self.goal_input}: needs looks, or vlm with images")

@@ -58,10 +58,12 @@ class PromptedDetector:
     """Boxes below it get no mask."""
     min_mask_score: float = 0.0
     """Masks below it are dropped."""
+    swaps_colours: bool = False
+    """Both models are shown red as blue and blue as red."""
 
     def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """Boxes and masks of all views as one batch; depth is not looked at."""
-        images = [view.rgb for view in views]
+        images = [view.rgb[..., ::-1] if self.swaps_colours else view.rgb for view in views]
         boxes = self.finder.find(images, self.phrases, self.min_confidence)
         masks = self.masker.outline(images, [one.boxes_px for one in boxes])
         return [

@@ -1,16 +1,17 @@
 """Describe which labels are mistaken for which, and which are seen where nothing is."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
+from evonav.records import Record, sentence_of
 from evonav.toml import read_toml
 
 
@@ -49,6 +50,17 @@ def _pick(labels: Sequence[str], weights: NDArray[np.float64], share: float) -> 
     return labels[min(int(np.searchsorted(ends, share * ends[-1], side="right")), len(labels) - 1)]
 
 
+_Weights = dict[str, Annotated[float, Field(ge=0.0)]]
+
+
+class _ConfusionFile(Record):
+    """Frequencies of categories, groups of similar ones, and how often one is mistaken for another."""
+
+    frequencies: Annotated[_Weights, Field(min_length=1)]
+    groups: dict[str, list[str]] = Field(default_factory=dict)
+    pairs: dict[str, _Weights] = Field(default_factory=dict)
+
+
 @cache
 def read_confusion(path: str = "") -> Confusion:
     """Read a file of frequencies, groups and pairs (`confusion.toml` shows the form).
@@ -57,47 +69,27 @@ def read_confusion(path: str = "") -> Confusion:
         InvalidArgumentError: It cannot be read, or a part of it is malformed.
     """
     name = path or "confusion.toml"
-    raw = read_toml(Path(path) if path else Path(__file__).with_name(name))
-    if set(raw) - {"frequencies", "groups", "pairs"}:
-        raise InvalidArgumentError(f"{name}: expected frequencies, groups and pairs, and nothing else")
-    groups = raw.get("groups", {})
-    if not isinstance(groups, dict) or not all(
-        isinstance(group, list) and all(isinstance(label, str) for label in group) for group in groups.values()
-    ):
-        raise InvalidArgumentError(f"{name}: groups: expected lists of categories by name")
-    frequencies = _weights(raw.get("frequencies"), f"{name}: frequencies")
-    if not frequencies:
-        raise InvalidArgumentError(f"{name}: frequencies: expected at least one category")
+    try:
+        file = _ConfusionFile(**read_toml(Path(path) if path else Path(__file__).with_name(name)))
+    except ValidationError as error:
+        raise InvalidArgumentError(f"{name}: {sentence_of(error)}") from None
     rows: dict[str, dict[str, float]] = {}
-    for group in groups.values():
+    for group in file.groups.values():
         for label in group:
             row = rows.setdefault(label, {})
             for other in group:
                 if other != label:
                     row[other] = row.get(other, 0.0) + 1.0
-    pairs = raw.get("pairs", {})
-    if not isinstance(pairs, dict):
-        raise InvalidArgumentError(f"{name}: pairs: expected a table of weights by category")
-    for label, others in pairs.items():
-        rows[label] = {**rows.get(label, {}), **_weights(others, f"{name}: pairs.{label}")}
-    shares = np.array(list(frequencies.values()))
+    for label, others in file.pairs.items():
+        rows[label] = {**rows.get(label, {}), **others}
+    shares = np.array(list(file.frequencies.values()))
     return Confusion(
-        categories=tuple(frequencies),
+        categories=tuple(file.frequencies),
         frequencies=shares / shares.sum(),
         similar={
             label: (tuple(row), np.array(list(row.values())) / sum(row.values()))
             for label, row in rows.items()
             if sum(row.values()) > 0.0
         },
-        group_of={label: n for n, group in reversed(list(enumerate(groups.values()))) for label in group},
+        group_of={label: n for n, group in reversed(list(enumerate(file.groups.values()))) for label in group},
     )
-
-
-def _weights(table: Any, place: str) -> dict[str, float]:  # noqa: ANN401 - as read
-    if not isinstance(table, dict):
-        raise InvalidArgumentError(f"{place}: expected a table of weights by category")
-    for label, weight in table.items():
-        is_number = isinstance(weight, int | float) and not isinstance(weight, bool)
-        if not isinstance(label, str) or not is_number or not math.isfinite(weight) or weight < 0:
-            raise InvalidArgumentError(f"{place}.{label} = {weight!r}: expected a weight, 0 or more")
-    return {label: float(weight) for label, weight in table.items()}
