@@ -127,7 +127,7 @@ MISTAKES = {
         "decisions.a.exchanges is of no use with mode live",
     ),
     "unknown noise": (SMALL + 'decisions = ["text:wrnog=0.1"]', "decisions: 'text:wrnog=0.1': wrnog=0.1: expected"),
-    "noise out of range": (SMALL + "[decisions.a]\nnoise = {wrong = 2.0}", "decisions.a: noise wrong"),
+    "noise out of range": (SMALL + "[decisions.a]\nnoise = {wrong = 2.0}", "decisions.a: noise: wrong"),
     "thor setting for embedded": (SMALL + '[simulators.a]\nexecutable = "x"', "simulators.a.executable is for"),
     "bad simulator": (SMALL + 'simulators = "habitat"', "simulators.habitat.kind = 'habitat'"),
     "bad perception": (
