@@ -10,9 +10,8 @@ from toy_episode import START, rounds_of, run
 from toy_house import CHAIR_AWAY, moved_table_stages, stage_case
 
 from evonav.agents.explorer import Explorer
-from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig, StageReset, StageResetConfig
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
-from evonav.agents.frontier_update.stage_reset import StageReset, StageResetConfig
 from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.evaluation.protocol import ProtocolConfig

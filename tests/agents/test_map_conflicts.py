@@ -47,7 +47,7 @@ def test_conflicts_are_cells_that_contradict_the_map(config, contradicting, is_r
     second = view_of(contradicting) if is_freed else view_of(blocked=contradicting)
     assert not explorer.observe(saw(first))
     assert explorer.observe(saw(second, second)) == is_rebuilt
-    assert explorer.num_conflicts == is_rebuilt
+    assert explorer.counters["conflicts"] == is_rebuilt
     assert (explorer.map.cells[30, 30] == 0) == is_rebuilt  # the whole map goes, not the contradicting cells alone
     row, col = contradicting[0]
     assert explorer.map.cells[row, col] == (1 if is_freed else 2)  # the last observation wins either way

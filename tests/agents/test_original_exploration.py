@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from evonav_studies.variants import MsgNavPlus, ThreeDMemPlus
+from evonav_studies.variants import msgnav_plus, three_d_mem_plus
 from scripted_model import Scripted
 from toy_episode import START, run
 from toy_house import stage_case
@@ -30,7 +30,7 @@ def explored(make: Callable[..., Agent]) -> StageRecord:
     return record
 
 
-@pytest.mark.parametrize(("released", "plus"), [(ThreeDMem, ThreeDMemPlus), (MsgNav, MsgNavPlus)])
+@pytest.mark.parametrize(("released", "plus"), [(ThreeDMem, three_d_mem_plus), (MsgNav, msgnav_plus)])
 def test_the_fallback_finds_frontiers_where_no_region_is_left(released: type, plus: type) -> None:
     original, ours = explored(released), explored(plus)
     assert original.trace[-1].num_frontiers == 0

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from evonav_studies.variants import ProactiveBlind
+from evonav_studies.variants import proactive_blind
 from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
@@ -263,5 +263,5 @@ def test_it_goes_back_to_the_best_entry_before_the_rounds_run_out():
 
 
 def test_equal_seeds_give_equal_paths():
-    first, second = (run(ProactiveBlind(), *moved_table_stages()) for _ in range(2))
+    first, second = (run(proactive_blind(), *moved_table_stages()) for _ in range(2))
     assert [r.trace for r in first] == [r.trace for r in second]

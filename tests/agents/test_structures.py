@@ -75,14 +75,14 @@ def after(name: str, look: tuple[Observation, TaskInfo]) -> tuple[Agent, list[Qu
     return agent, asked
 
 
-@pytest.mark.parametrize("name", ["fu", "stage-reset", "ftu", "3d-mem", "evonav_studies.variants:ThreeDMemPlus"])
+@pytest.mark.parametrize("name", ["fu", "stage-reset", "ftu", "3d-mem", "evonav_studies.variants:three_d_mem_plus"])
 def test_agents_with_3d_mems_background_remember_windows_and_no_doors(name: str, look) -> None:
     labels = {entry.label for entry in after(name, look)[0].explain().entries()}
     assert labels >= WINDOWS
     assert not DOORS & labels
 
 
-@pytest.mark.parametrize("name", ["msgnav", "evonav_studies.variants:MsgNavPlus"])
+@pytest.mark.parametrize("name", ["msgnav", "evonav_studies.variants:msgnav_plus"])
 def test_msgnav_remembers_doors_and_windows(name: str, look) -> None:
     agent, _ = after(name, look)
     labels = {entry.label for entry in agent.explain().entries()}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import toy_episode
-from evonav_studies.variants import UniGoalAsPublished
+from evonav_studies.variants import unigoal_as_published
 from scripted_model import scripted
 from toy_episode import START, belief_of
 from toy_house import OBJECTS, stage_case
@@ -110,7 +110,7 @@ def test_with_nothing_left_to_explore_it_goes_to_random_explored_places(in_vain)
 
 
 def test_as_released_six_categories_are_known_as_published_all_that_are_mapped():
-    for kind, category in ((UniGoal, "chair"), (UniGoalAsPublished, "refrigerator")):
+    for kind, category in ((UniGoal, "chair"), (unigoal_as_published, "refrigerator")):
         agent = kind()
         run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_actions=1))
         assert agent.explain().details["category"] == category
@@ -227,7 +227,7 @@ def test_a_wrong_number_of_relation_lines_drops_the_edges():
 
 def test_a_group_score_that_is_no_number_is_zero():
     model = scripted(group_score="quite likely")
-    (record,) = run(UniGoalAsPublished(decision=model), stage_case(1, "GarbageCan|1"))
+    (record,) = run(unigoal_as_published(decision=model), stage_case(1, "GarbageCan|1"))
     assert any(isinstance(question, GroupScoreQuestion) for question in model.questions)
     assert all(entry.details.get("mid_term_m") is None for entry in record.trace)
 
@@ -242,7 +242,7 @@ def test_as_released_the_score_is_nothing_or_a_half():
 
 def test_as_published_a_node_found_whole_is_walked_to():
     text = "Please navigate to the dresser."
-    agent = UniGoalAsPublished(decision=scripted(goal_objects="[cabinet]"))
+    agent = unigoal_as_published(decision=scripted(goal_objects="[cabinet]"))
     (record,) = run(agent, stage_case(1, "Dresser|1", instruction=text), protocol=ProtocolConfig())
     assert record.state is EndState.SUCCESS
     assert record.trace[-1].chosen_entry is not None

@@ -1,8 +1,7 @@
 """Agents that rank what they remember by meaning."""
 
-from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig, StageReset, StageResetConfig
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.frontier_update.stage_reset import StageReset, StageResetConfig
 
 
 def fu(decision=None):

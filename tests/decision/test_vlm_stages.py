@@ -277,7 +277,7 @@ def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("agent", ["3d-mem", "msgnav", "unigoal", "evonav_studies.variants:UniGoalAsPublished"])
+@pytest.mark.parametrize("agent", ["3d-mem", "msgnav", "unigoal", "evonav_studies.variants:unigoal_as_published"])
 def test_every_agent_asks_what_the_api_takes_and_goes_on_after_bad_answers(run: Run, agent: str) -> None:
     """With rules that follow every grammar nothing is invalid; with a bad model all is counted, and replayed."""
     run.max_rounds, run.max_actions, run.num_stages = 2, 40, 2

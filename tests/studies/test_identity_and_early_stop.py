@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evonav_studies.early_stop import EARLY_STOP_M, FailThenUpdateEarlyStop
+from evonav_studies.early_stop import EarlyStopConfig, FailThenUpdateEarlyStop
 from scripted_model import Scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
-from evonav.agents.frontier_update.identity import RESERVE_ROUNDS, FailThenUpdateIdentity
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateIdentity, IdentityConfig
 from evonav.agents.frontier_update.questions import IdentityQuestion
 from evonav.decision.appearance import AppearanceMatcher
 from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
@@ -37,7 +36,7 @@ def test_an_object_that_contradicts_the_goal_is_set_aside_and_stays_in_memory():
     assert set(aside[1]) & remembered
     assert by_stage[1][-1].counters["rejected_entries"] == 0
     gone = {1: set(), 2: set()}
-    offered_again, reserve = set(), RESERVE_ROUNDS
+    offered_again, reserve = set(), IdentityConfig().reserve_rounds
     for question in model.questions:
         stage = question.goal.stage
         if question.kind == "identity":
@@ -124,7 +123,7 @@ def test_an_early_stop_is_nearer_than_its_distance_and_saves_a_part_of_the_way()
         if looks > before:
             centre_m = record.trace[-1].chosen_entry.centre_m
             end = record.trace[-1].pose
-            assert math.dist((end.x_m, end.z_m), centre_m[::2]) < EARLY_STOP_M
+            assert math.dist((end.x_m, end.z_m), centre_m[::2]) < EarlyStopConfig().stop_within_m
 
 
 def test_an_early_stop_needs_a_detection_of_its_target():

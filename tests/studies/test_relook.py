@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evonav_studies.relook import FailThenUpdateRelook, RelookConfig, place_from_another_side
+from evonav_studies.relook import FailThenUpdateRelook, RelookConfig, place_from_another_side, places_around
 from hypothesis import given
 from hypothesis import strategies as st
 from scripted_model import Scripted
@@ -14,7 +14,6 @@ from toy_house import moved_table_stages, stage_case
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate
 from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
-from evonav.agents.viewpoint import places_around
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
@@ -226,7 +225,7 @@ def test_an_entry_may_be_looked_at_again_in_the_next_stage():
 
 @pytest.mark.parametrize("config", [RelookConfig(max_way_m=0.3), RelookConfig(min_turn_deg=180.0)])
 def test_without_a_place_from_which_to_look_the_first_look_counts(config):
-    agent = FailThenUpdateRelook(relook=config)
+    agent = FailThenUpdateRelook(config)
     poses = hide_arrivals(agent, 3, 9)
     last = run(agent, *moved_table_stages())[2]
     assert len(poses) == 1

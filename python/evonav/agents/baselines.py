@@ -97,5 +97,5 @@ class NearestFrontier:
         return Explanation(
             choice=self._choice,
             num_frontiers=len(explorer.frontiers),
-            counters={"conflicts": explorer.num_conflicts, "cells_cleared": explorer.num_cells_cleared},
+            counters={name: explorer.counters[name] for name in ("conflicts", "cells_cleared")},
         )

@@ -1,6 +1,7 @@
 """Mapping and exploration, shared by all agents but UniGoal."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,9 +51,8 @@ class Explorer:
         self.config = config or ExplorerConfig()
         self._map_frame = map_frame
         self.map = self._new_map()
-        self.num_conflicts = 0
-        self.num_cells_cleared = 0
-        self.num_frontiers_reset = 0
+        self.counters = Counter(conflicts=0, cells_cleared=0, frontiers_reset=0)
+        """Number of times that the map was outdated, and of the cells and frontiers that were cleared then."""
         self._is_blank = True
         self._given_up: set[int] = set()
         self._last: Frontier | None = None
@@ -81,9 +81,8 @@ class Explorer:
         """
         is_outdated = self._is_contradicted(observation)
         if is_outdated:
-            self.num_conflicts += 1
-            self.num_cells_cleared += int((self.map.cells != UNKNOWN).sum())
-            self.num_frontiers_reset += len(self.frontiers)
+            num_cleared = int((self.map.cells != UNKNOWN).sum())
+            self.counters.update(conflicts=1, cells_cleared=num_cleared, frontiers_reset=len(self.frontiers))
             self.clear()
         here = (observation.pose.x_m, observation.pose.z_m)
         if self._is_blank:

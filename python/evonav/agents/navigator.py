@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from evonav.agents.explorer import Explorer, ExplorerConfig
+from evonav.agents.explorer import AS_THREE_D_MEM_PLUS, Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import FrontierCandidate, ObjectAppearance, ObjectCandidate
 from evonav.decision.pictures import Picture, crop_of, picture_of
@@ -44,6 +44,10 @@ class NavigatorConfig:
     """Longest edge of an image in a prompt."""
     background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "door", "rug", "bath mat")
     """Nouns of what is not remembered: 3D-Mem's list, which has doors and not windows."""
+
+
+WITH_FALLBACK = NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)
+"""Of agents whose map takes the last observation of a cell, and that explore as long as anything is unknown."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,12 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, SensorConfig, Stop
 from evonav.agents.explanation import Explanation, entry_belief
 from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
-from evonav.decision.candidates import FrontierCandidate
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.goal_input import goal_as_given
 from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.query import QuerySession
@@ -24,6 +24,8 @@ from evonav.tasks.public import Goal, TaskInfo
 class NavigatorAgent(ABC):
     """An agent with a map, object entries, stored views and a decision model."""
 
+    _counted: ClassVar[tuple[str, ...]] = ()
+    """Names of the agent's own counters, which begin at 0 with a task."""
     _rereads_detections = True
     """Whether the agent reads the detections of stored views even if its decision model does not look."""
 
@@ -49,7 +51,6 @@ class NavigatorAgent(ABC):
         self._goal_input = model.goal_input
         self._navigator_config = config
         self._queries = QuerySession(model, num_tries=num_tries)
-        self._counters: Counter[str] = Counter()
         self._candidates: tuple[int, ...] = ()
         """Ids of the entries that the last question offered."""
         self._round = Explanation()
@@ -66,7 +67,7 @@ class NavigatorAgent(ABC):
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
         self._task = task
-        self._counters.clear()
+        self._counters = Counter(dict.fromkeys(self._counted, 0))
         self._queries.counters.clear()
         self._navigator = self._new_navigator()
 
@@ -97,6 +98,10 @@ class NavigatorAgent(ABC):
         """Return the heading view of the last round for a prompt, if the model looks at images."""
         view = self._navigator.round_views[-1]
         return picture_of(view, self._navigator.config.image_px) if self._shows_images else None
+
+    def _shown(self, candidate: ObjectCandidate) -> ObjectCandidate:
+        """Return a candidate with its images, if the model looks at images."""
+        return self._navigator.with_images(candidate) if self._shows_images else candidate
 
     def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them, with images if the model looks at them."""
@@ -132,9 +137,9 @@ class NavigatorAgent(ABC):
             details=dict(self._round_details(reason)),
         )
 
-    @abstractmethod
     def _round_counters(self) -> Mapping[str, int]:
         """Return the cumulative counts for the records of a round."""
+        return {**self._queries.counters, **self._counters}
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         """Return further values for the records of a round."""

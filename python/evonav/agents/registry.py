@@ -23,7 +23,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "Frontier-Update: rebuilds its map when it is contradicted",
     ),
     "stage-reset": (
-        "evonav.agents.frontier_update.stage_reset:StageReset",
+        "evonav.agents.frontier_update.agent:StageReset",
         "Frontier-Update that forgets everything at each stage",
     ),
     "ftu": (
@@ -35,27 +35,27 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "Belief-Weighted Search: goes where most of its posterior is found a metre",
     ),
     "evolving": (
-        "evonav.agents.evolving.agent:Evolving",
+        "evonav.agents.rivals.evolving:Evolving",
         "rival: EvolvingNav's belief over sites, with soft negative evidence",
     ),
     "dynamem": (
-        "evonav.agents.dynamem.agent:DynaMem",
+        "evonav.agents.rivals.dynamem:DynaMem",
         "rival: DynaMem deletes points that depth sees through, and looks again at what it saw long ago",
     ),
     "dualmap": (
-        "evonav.agents.dualmap.agent:DualMap",
+        "evonav.agents.rivals.dualmap:DualMap",
         "rival: DualMap remembers furniture, and what lay on it, and looks there again",
     ),
     "khronos-fu": (
-        "evonav.agents.khronos.agent:KhronosFrontierUpdate",
+        "evonav.agents.rivals.khronos:KhronosFrontierUpdate",
         "rival: Frontier-Update with Khronos' votes of rays before and after each object",
     ),
     "vlfm": (
-        "evonav.agents.value_maps.vlfm:Vlfm",
+        "evonav.agents.rivals.vlfm:Vlfm",
         "rival: VLFM explores frontiers by a value map that each goal begins again",
     ),
     "onemap": (
-        "evonav.agents.value_maps.onemap:OneMap",
+        "evonav.agents.rivals.onemap:OneMap",
         "rival: OneMap keeps one map over goals, and checks likely places again for each",
     ),
     "3d-mem": (

@@ -1,7 +1,6 @@
 """Find where to stand to look at a remembered object (3D-Mem's observation point)."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ def observation_point(
     Returns:
         `(x, z)` of a cell's middle, or `None` if no cell within `distance_m` is known to be free.
     """
-    window, offset = _window(is_free, frame, object_m, distance_m + 2 * frame.cell_m)
+    window, offset = window_around(is_free, frame, object_m, distance_m + 2 * frame.cell_m)
     cells = np.argwhere(window)
     if len(cells) == 0:
         return None
@@ -47,54 +46,7 @@ def observation_point(
     return (float(x_m[best]), float(z_m[best]))
 
 
-def places_around(
-    is_free: NDArray[np.bool_],
-    frame: MapFrame,
-    object_m: Point2,
-    first_m: Point2,
-    *,
-    distance_m: float,
-    min_turn_rad: float,
-    num_directions: int = 24,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return free places around an object on other sides of it than a first place.
-
-    Args:
-        is_free: `(R, C)`, cells known to be free.
-        distance_m: Wanted distance from the object. Places may be up to two cells farther away.
-        min_turn_rad: Smallest angle at the object between the first place and another.
-        num_directions: Number of directions around the object. For each on another side, the free cell nearest to the
-            point at `distance_m` counts.
-
-    Returns:
-        `(N, 2)` middles of cells, `(x, z)`, without repetitions, by row and column; `(N,)` angles at the object between
-        them and the first place, radians, 0 to pi.
-    """
-    max_distance_m = distance_m + 2 * frame.cell_m
-    window, offset = _window(is_free, frame, object_m, max_distance_m)
-    x_m, z_m = (frame.centres_m(np.argwhere(window) + offset) - object_m).T
-    min_turn_rad -= 1e-9  # the least angle itself counts, however it is rounded
-    first_rad = math.atan2(first_m[0] - object_m[0], first_m[1] - object_m[1])
-    turns_rad = _angles_between(np.arctan2(x_m, z_m), first_rad)
-    is_on_other_side = (turns_rad >= min_turn_rad) & (np.hypot(x_m, z_m) <= max_distance_m)
-    x_m, z_m, turns_rad = x_m[is_on_other_side], z_m[is_on_other_side], turns_rad[is_on_other_side]
-    if len(x_m) == 0:
-        return np.empty((0, 2)), np.empty(0)
-    bearings_rad = np.arange(num_directions) * (math.tau / num_directions)
-    bearings_rad = bearings_rad[_angles_between(bearings_rad, first_rad) >= min_turn_rad]
-    wanted_x_m, wanted_z_m = distance_m * np.sin(bearings_rad), distance_m * np.cos(bearings_rad)
-    gaps_m = np.hypot(x_m[:, None] - wanted_x_m, z_m[:, None] - wanted_z_m)
-    chosen = np.flatnonzero(np.bincount(gaps_m.argmin(axis=0)))  # `np.unique` imports 15 ms of masked arrays
-    return np.stack([x_m[chosen] + object_m[0], z_m[chosen] + object_m[1]], axis=1), turns_rad[chosen]
-
-
-def _angles_between(bearings_rad: NDArray[np.floating[Any]], other_rad: float) -> NDArray[np.float64]:
-    """Return the angles between bearings and another one, 0 to pi."""
-    angles_rad: NDArray[np.float64] = np.abs((bearings_rad - other_rad + math.pi) % math.tau - math.pi)
-    return angles_rad
-
-
-def _window(
+def window_around(
     is_free: NDArray[np.bool_], frame: MapFrame, centre_m: Point2, reach_m: float
 ) -> tuple[NDArray[np.bool_], tuple[int, int]]:
     """Return the part of the map around a point, and the row and column where it begins."""

@@ -1,16 +1,24 @@
-"""Frontier-Update (paper, Sec. C.4): object entries and a map over all stages; the map is rebuilt when contradicted."""
+"""Frontier-Update and Stage-Reset (paper, Sec. C.4).
+
+Frontier-Update keeps object entries and a map over all stages, and rebuilds the map when it is contradicted.
+Stage-Reset searches from scratch in every stage.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from evonav.agents.agent import AgentAction
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.agent import AgentAction, NavigateTo
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import NavigationTarget, NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
+from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import is_structure
@@ -18,9 +26,10 @@ from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.memory.objects import ObjectEntry
-from evonav.points import Point2
+from evonav.memory.occupancy import FREE
+from evonav.records import Point2
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import TaskInfo
+from evonav.tasks.public import Goal, TaskInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +52,15 @@ class FrontierUpdateConfig:
 class FrontierUpdate(NavigatorAgent):
     """Walks to what it remembers, explores when it remembers nothing that fits, and believes its entries."""
 
+    config: FrontierUpdateConfig = FrontierUpdateConfig()
+    """The parameters; a subclass states its own default."""
+    _counted: ClassVar[tuple[str, ...]] = ("unsupported_choices",)
     _rereads_detections = False
+    _stops_at_sight_of_place = True
+    """Whether arriving at an entry's place ends the stage without another look."""
 
     def __init__(self, config: FrontierUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
-        self.config = config or FrontierUpdateConfig()
+        self.config = config or self.config
         if self.config.ranking == "text":
             encoder()  # reports a missing extra before the episode
         super().__init__(self.config.navigator, decision, num_tries=self.config.num_tries)
@@ -65,7 +79,7 @@ class FrontierUpdate(NavigatorAgent):
         self._candidates = ()
         navigator = self._navigator
         reached = navigator.reached(observation)
-        if reached is not None and self._stops_at_sight_of_place():
+        if reached is not None and self._stops_at_sight_of_place:
             return self._stop("arrived", reached.entry_id)
         navigator.observe(observation)
         self._after_look(observation)
@@ -79,10 +93,6 @@ class FrontierUpdate(NavigatorAgent):
             navigator.aim()
             return self._approach(navigator.target)
         return self._decide(observation)
-
-    def _stops_at_sight_of_place(self) -> bool:
-        """Return whether arriving at an entry's place ends the stage without another look."""
-        return True
 
     def _after_look(self, observation: Observation) -> None:
         """Revise further beliefs by a look that map and object entries have taken in; here there are none."""
@@ -109,7 +119,6 @@ class FrontierUpdate(NavigatorAgent):
         self, ranked: Sequence[ObjectCandidate], remembered: Sequence[ObjectCandidate], observation: Observation
     ) -> AgentAction:
         """Ask about the first of the objects, the best first, and the places to explore, and do what is answered."""
-        navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)
         ranked = ranked[: self.config.num_candidates]
         places = self._places_to_explore(observation)
@@ -118,7 +127,7 @@ class FrontierUpdate(NavigatorAgent):
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
-            objects=[navigator.with_images(entry) for entry in ranked] if self._shows_images else ranked,
+            objects=[self._shown(entry) for entry in ranked],
             frontiers=places,
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,
@@ -150,7 +159,7 @@ class FrontierUpdate(NavigatorAgent):
     ) -> list[ObjectCandidate]:
         """Return the best entries that may be candidates, the best first: by image features, by words or by meaning."""
         here = (observation.pose.x_m, observation.pose.z_m)
-        feature = observation.goal_feature if self._goal_input != "image" else None  # it is of the sentence
+        feature = self._goal_feature(observation)
         if feature is not None:
             order = rank_by_feature(feature, [entry.feature for entry in entries], [entry.id for entry in entries])
         elif self.config.ranking == "text":
@@ -159,6 +168,10 @@ class FrontierUpdate(NavigatorAgent):
             order = rank_entries(self._matcher, self._goal, remembered, here)
         offered = (remembered[index] for index in order if self._is_offered(entries[index]))
         return list(islice(offered, self.config.num_candidates))
+
+    def _goal_feature(self, observation: Observation) -> NDArray[np.float32] | None:
+        """Return the feature of the goal's sentence, if there is one and the agent goes by it."""
+        return observation.goal_feature if self._goal_input != "image" else None
 
     def _is_offered(self, entry: ObjectEntry) -> bool:
         """Return whether an entry may be a candidate: a window never is."""
@@ -181,15 +194,42 @@ class FrontierUpdate(NavigatorAgent):
         return self._approach(NavigationTarget(chosen.entry_id, goal_m, chosen.ground_m), self._queries.reason)
 
     def _round_counters(self) -> Mapping[str, int]:
-        explorer = self._navigator.explorer
-        return {
-            **self._queries.counters,
-            "conflicts": explorer.num_conflicts,
-            "cells_cleared": explorer.num_cells_cleared,
-            "frontiers_reset": explorer.num_frontiers_reset,
-            "unsupported_choices": 0,
-            **self._counters,
-        }
+        return {**self._queries.counters, **self._navigator.explorer.counters, **self._counters}
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         return {**super()._round_details(reason), **self._details}
+
+
+@dataclass(frozen=True, slots=True)
+class StageResetConfig(FrontierUpdateConfig):
+    """Values that the paper leaves open about a search from scratch."""
+
+    on_nothing_found: Literal["widest_direction", "end"] = "widest_direction"
+    """The action if a stage's first look finds neither objects nor frontiers: go where most floor is free, or end."""
+
+
+class StageReset(FrontierUpdate):
+    """Gains nothing from earlier stages, and loses nothing to stale entries."""
+
+    config: StageResetConfig = StageResetConfig()
+
+    def begin_stage(self, goal: Goal) -> None:
+        """Forget entries, map, frontiers, views and ids; counters count over the whole task."""
+        counters = self._navigator.explorer.counters
+        self._navigator = self._new_navigator()
+        self._navigator.explorer.counters = counters
+        super().begin_stage(goal)
+
+    def _without_candidates(self, observation: Observation) -> AgentAction:
+        """Go where most floor is free if the stage's first look found nothing, as one into a corner does."""
+        navigator = self._navigator
+        if navigator.round == 0 and self.config.on_nothing_found == "widest_direction":
+            here, travel_m = (observation.pose.x_m, observation.pose.z_m), self.sensors.max_travel_m
+            occupancy = navigator.explorer.map
+            bearing_rad = widest_direction_rad(occupancy.cells == FREE, occupancy.map_frame, here, travel_m)
+            if bearing_rad is not None:
+                self._record_round("widest direction", "neither objects nor frontiers in sight")
+                return NavigateTo(
+                    (here[0] + travel_m * math.sin(bearing_rad), here[1] + travel_m * math.cos(bearing_rad))
+                )
+        return super()._without_candidates(observation)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from evonav.agents.navigator import Navigator
 from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
@@ -13,7 +12,6 @@ from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion,
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate
-from evonav.memory.objects import ObjectEntry
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.points import Point2
 from evonav.tasks.public import Goal
@@ -199,26 +197,3 @@ class IdentityQuestion(YesNoQuestion):
         context = matcher.context_ratios(goal, named, self.surroundings)[index]
         reason = f"appearance {appearance:.2g} and surroundings {context:.2g} times as likely for the goal"
         return appearance * context >= 1.0, reason
-
-
-def identity_question(
-    goal: Goal,
-    entry: ObjectEntry,
-    navigator: Navigator,
-    *,
-    with_images: bool,
-    remembered: Sequence[ObjectCandidate] | None = None,
-) -> IdentityQuestion:
-    """Ask about an entry of the object memory, among everything remembered.
-
-    Args:
-        navigator: The agent's memory.
-        with_images: Whether the question shows images.
-        remembered: Everything in this memory, if it was described already: with the looks of the goal's namesakes.
-    """
-    candidate = navigator.candidate(entry)
-    return IdentityQuestion(
-        goal=goal,
-        entry=navigator.with_images(candidate) if with_images else candidate,
-        surroundings=remembered or [navigator.candidate(one) for one in navigator.objects.entries],
-    )

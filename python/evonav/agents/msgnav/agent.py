@@ -290,7 +290,7 @@ class MsgNav(NavigatorAgent):
         return super()._go_to_frontier(frontier, reason)
 
     def _round_counters(self) -> Mapping[str, int]:
-        return {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
+        return {**super()._round_counters(), "edges": len(self._memory.graph)}
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, PlaceBelief, Stop
 from evonav.agents.explanation import Explanation
 from evonav.agents.explorer import nearest_frontier
-from evonav.agents.frontier_update.questions import identity_question
+from evonav.agents.frontier_update.questions import IdentityQuestion
 from evonav.agents.navigator import Navigator
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.proactive.belief import TargetBelief
@@ -52,6 +52,8 @@ SAME_SPOT_M = 0.5
 
 class Proactive(NavigatorAgent):
     """Keeps the belief in everything remembered, and searches with it."""
+
+    _counted: ClassVar[tuple[str, ...]] = ("identity_checks", "identities_denied", "maps_forgotten")
 
     def __init__(self, config: ProactiveConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or ProactiveConfig()
@@ -246,10 +248,8 @@ class Proactive(NavigatorAgent):
         if not self.config.checks_identity:
             return True
         self._counters["identity_checks"] += 1
-        question = identity_question(
-            self._goal, entry, self._navigator, with_images=self._shows_images, remembered=around.remembered
-        )
-        answer = self._queries.ask(question)
+        candidate = self._shown(self._navigator.candidate(entry))
+        answer = self._queries.ask(IdentityQuestion(self._goal, candidate, around.remembered))
         if answer is False:
             self._counters["identities_denied"] += 1
             self._belief.factors[entry.id] = self.config.unfit
@@ -390,10 +390,6 @@ class Proactive(NavigatorAgent):
         """Return the object memory, with the probability that each object is still there."""
         p_present = self._belief.presence.p_present
         return [replace(entry, p_present=p_present(entry.entry_id)) for entry in super()._entry_beliefs()]
-
-    def _round_counters(self) -> Mapping[str, int]:
-        own = {"identity_checks": 0, "identities_denied": 0, "maps_forgotten": 0}
-        return {**self._queries.counters, **own, **self._counters}
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         return {**super()._round_details(reason), **self._summary}

@@ -138,13 +138,8 @@ class ThreeDMem(NavigatorAgent):
         return self._approach(NavigationTarget(chosen.entry_id, goal_m, chosen.ground_m), reason)
 
     def _round_counters(self) -> Mapping[str, int]:
-        explorer = self._navigator.explorer
-        return {
-            **self._queries.counters,
-            **self._counters,
-            "conflicts": explorer.num_conflicts,
-            "cells_cleared": explorer.num_cells_cleared,
-        }
+        counters = self._navigator.explorer.counters
+        return {**super()._round_counters(), **{name: counters[name] for name in ("conflicts", "cells_cleared")}}
 
     def _round_details(self, reason: str) -> Mapping[str, Any]:
         return {

@@ -11,8 +11,7 @@ from toy_episode import rounds_of
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.agent import Stop
-from evonav.agents.dynamem.agent import DynaMem
-from evonav.agents.dynamem.exploration import NEVER, LastSeen, SeenConfig, _grown
+from evonav.agents.rivals.dynamem import DynaMem, DynaMemConfig, LastSeen, _grown
 from evonav.memory import OccupancyMap
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, VisibleOccupancy
@@ -51,7 +50,7 @@ def test_a_stored_point_that_the_depth_sees_through_is_deleted_and_the_agent_doe
 
 
 def test_what_was_never_seen_comes_first_and_then_what_was_seen_long_ago():
-    seen = LastSeen(FRAME)
+    seen = LastSeen(FRAME, DynaMemConfig())
     seen.see(a_view(DEPTH, free=[(0, 0), (0, 1)]))
     for _ in range(30):
         seen.see(a_view(DEPTH, free=[(0, 1)]))
@@ -62,7 +61,7 @@ def test_what_was_never_seen_comes_first_and_then_what_was_seen_long_ago():
 
 
 def test_a_place_seen_ten_views_ago_is_worth_one_half():
-    seen = LastSeen(FRAME)
+    seen = LastSeen(FRAME, DynaMemConfig())
     seen.see(a_view(DEPTH, free=[(3, 3)]))
     for _ in range(10):
         seen.see(a_view(DEPTH))
@@ -71,37 +70,36 @@ def test_a_place_seen_ten_views_ago_is_worth_one_half():
 
 def test_it_goes_to_the_nearest_edge_of_the_floor_that_it_never_saw():
     occupancy, free, walls = room()
-    seen = LastSeen(FRAME)
+    seen = LastSeen(FRAME, DynaMemConfig())
     seen.see(a_view(DEPTH, free=free, blocked=walls))
-    stand_m, face_m, value = seen.best_edge(occupancy, (1.0, 1.0))
-    assert value == 1.0
-    assert face_m == pytest.approx((1.55, 0.95)) or face_m == pytest.approx((1.55, 1.05))
-    assert stand_m[0] == pytest.approx(1.45)
+    found = seen.best_edge(occupancy, (1.0, 1.0))
+    assert found.value == 1.0
+    assert found.face_m == pytest.approx((1.55, 0.95)) or found.face_m == pytest.approx((1.55, 1.05))
+    assert found.position_m[0] == pytest.approx(1.45)
 
 
 def test_unseen_cells_by_a_wall_are_taken_for_a_part_of_it():
     occupancy, free, walls = room(right=4)  # two free columns: all unseen cells are within two cells of the walls' ends
-    seen = LastSeen(FRAME, SeenConfig(padding_cells=20))
+    seen = LastSeen(FRAME, DynaMemConfig(padding_cells=20))
     seen.see(a_view(DEPTH, free=free, blocked=walls))
-    _, _, value = seen.best_edge(occupancy, (0.25, 1.0))
-    assert value < 0.5
+    assert seen.best_edge(occupancy, (0.25, 1.0)).value < 0.5
 
 
 def test_where_all_is_seen_it_looks_again_at_what_it_saw_longest_ago():
     occupancy, free, walls = room()
     end = all_cells(range(2, 18), (15,))
     occupancy.integrate(VisibleOccupancy(np.empty((0, 2), np.int32), end), (1.0, 1.0))
-    seen = LastSeen(FRAME)
+    seen = LastSeen(FRAME, DynaMemConfig())
     seen.see(a_view(DEPTH, free=free, blocked=np.concatenate([walls, end])))
     for _ in range(5):
         seen.see(a_view(DEPTH, free=free, blocked=walls))  # the end of the room is not looked at any more
-    _, face_m, value = seen.best_edge(occupancy, (0.4, 1.0))
-    assert face_m[0] == pytest.approx(1.55)
-    assert value < 0.5
+    found = seen.best_edge(occupancy, (0.4, 1.0))
+    assert found.face_m[0] == pytest.approx(1.55)
+    assert found.value < 0.5
 
 
 def test_a_place_that_was_gone_to_in_vain_counts_as_seen():
-    seen = LastSeen(FRAME)
+    seen = LastSeen(FRAME, DynaMemConfig())
     seen.see(a_view(DEPTH))
     seen.give_up((1.55, 0.95))
     assert seen.values()[9, 15] < 1.0
@@ -119,7 +117,7 @@ def test_the_best_edge_is_that_of_the_definition(seed):
     occupancy = OccupancyMap(frame)
     free, blocked = (np.ascontiguousarray(np.argwhere(states == one).astype(np.int32)) for one in (FREE, BLOCKED))
     occupancy.integrate(VisibleOccupancy(free, blocked), (0.0, 0.0))
-    seen = LastSeen(frame, SeenConfig(padding_cells=0))
+    seen = LastSeen(frame, DynaMemConfig(padding_cells=0))
     seen.see(a_view(DEPTH, free=free, blocked=blocked))
     for _ in range(3):
         seen.see(a_view(DEPTH, free=np.argwhere(draws.random((9, 11)) < 0.5)))
@@ -140,13 +138,12 @@ def test_the_best_edge_is_that_of_the_definition(seed):
     found = seen.best_edge(occupancy, here_m)
     assert (found is None) == (best is None)
     if found is not None and best is not None:
-        assert found[2] == best[0]
-        assert math.dist(found[1], here_m) == pytest.approx(-best[1] * 0.1, abs=1e-6)
-        assert math.dist(found[0], found[1]) < 0.15  # it stands beside it
+        assert found.value == best[0]
+        assert math.dist(found.face_m, here_m) == pytest.approx(-best[1] * 0.1, abs=1e-6)
+        assert math.dist(found.position_m, found.face_m) < 0.15  # it stands beside it
 
 
 def test_growth_is_by_one_cell_in_eight_directions():
     cells = np.zeros((5, 5), bool)
     cells[2, 2] = True
     assert _grown(cells).sum() == 9
-    assert NEVER < 0

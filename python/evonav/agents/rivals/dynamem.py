@@ -1,23 +1,29 @@
-"""DynaMem's exploration: the edges of the reachable floor, valued by how long ago they were seen."""
+"""DynaMem (Liu et al., ICRA 2025): deletes every point that depth sees through, and explores what it saw long ago."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.agent import AgentAction
+from evonav.agents.frontier_update.agent import FrontierUpdateConfig
+from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
+from evonav.agents.rivals.exploration import OwnExploration, Place
 from evonav.memory.occupancy import BLOCKED, FREE, OccupancyMap
-from evonav.points import Point2
-from evonav.sensors.observation import MapFrame, View
+from evonav.records import Point2
+from evonav.sensors.observation import MapFrame, Observation, View
+from evonav.tasks.public import Goal
 
 NEVER = -1
 _AROUND = tuple((row, col) for row in (-1, 0, 1) for col in (-1, 0, 1) if (row, col) != (0, 0))
 
 
 @dataclass(frozen=True, slots=True)
-class SeenConfig:
-    """DynaMem's constants."""
+class DynaMemConfig(FrontierUpdateConfig):
+    """DynaMem's constants; those of its deletion are the rule `see-through`'s."""
 
+    navigator: NavigatorConfig = field(default_factory=lambda: replace(WITH_FALLBACK, forgetting="see-through"))
     steepness: float = 0.1
     """Change of the value's logarithmic odds with each view of age."""
     half_age: float = 10.0
@@ -33,8 +39,8 @@ class SeenConfig:
 class LastSeen:
     """The view in which each cell of the map was last seen."""
 
-    def __init__(self, frame: MapFrame, config: SeenConfig | None = None) -> None:
-        self.config = config or SeenConfig()
+    def __init__(self, frame: MapFrame, config: DynaMemConfig) -> None:
+        self.config = config
         self._frame = frame
         self._at = np.full((frame.rows, frame.cols), NEVER, np.int64)
         self._num_views = 0
@@ -64,12 +70,12 @@ class LastSeen:
         values = 1.0 / (1.0 + np.exp(-config.steepness * (age - config.half_age)))
         return np.where(self._at == NEVER, 1.0, np.ceil(values * config.steps) / config.steps)
 
-    def best_edge(self, occupancy: OccupancyMap, here_m: Point2) -> tuple[Point2, Point2, float] | None:
+    def best_edge(self, occupancy: OccupancyMap, here_m: Point2) -> Place | None:
         """Return the cell beside the reachable floor with the largest value.
 
         Returns:
-            Middle of the floor's cell beside it, its own middle, and its value; of equal values the nearest, then the
-            first. `None` if no floor can be reached.
+            The floor's cell beside it, to stand in, with its own middle and its value; of equal values the nearest,
+            then the first. `None` if no floor can be reached.
         """
         is_free = occupancy.cells == FREE
         rows, cols = np.nonzero(is_free)
@@ -94,7 +100,7 @@ class LastSeen:
         beside = [(row + r, col + c) for r, c in _AROUND if padded[1 + row + r, 1 + col + c]]
         row, col = min(beside, key=lambda one: math.dist(one, (row, col)))
         face_m = places_m[best].tolist()
-        return self._frame.centre_m(row, col), (face_m[0], face_m[1]), float(values[best])
+        return Place(self._frame.centre_m(row, col), (face_m[0], face_m[1]), float(values[best]))
 
 
 def _grown(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -104,3 +110,39 @@ def _grown(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     shifts = (padded[1 + r : 1 + r + rows, 1 + c : 1 + c + cols] for r, c in _AROUND)
     found: NDArray[np.bool_] = np.logical_or.reduce([cells, *shifts])
     return found
+
+
+class DynaMem(OwnExploration):
+    """Goes to a remembered object as long as its points are there; else to what it has not seen for long."""
+
+    config: DynaMemConfig = DynaMemConfig()
+    _stops_at_sight_of_place = False
+
+    def _new_navigator(self) -> Navigator:
+        navigator = super()._new_navigator()
+        self._seen = LastSeen(self._task.map_frame, self.config)
+        navigator.observers.append(lambda _, view, __: self._seen.see(view))
+        return navigator
+
+    def begin_stage(self, goal: Goal) -> None:
+        """Take a new goal; points and times stay."""
+        super().begin_stage(goal)
+        self._explored: Place | None = None
+
+    def _after_look(self, observation: Observation) -> None:
+        self._seen.be_at((observation.pose.x_m, observation.pose.z_m))
+        if self._explored is not None and (observation.has_arrived or not observation.is_action_success):
+            self._seen.give_up(self._explored.face_m)
+            self._explored = None
+
+    def _act_at_place(self, entry_id: int, observation: Observation) -> AgentAction | None:
+        """Stop if the look on arrival left the entry's points there; else decide again."""
+        if self._navigator.objects.entry(entry_id) is None:
+            return None
+        return self._stop("verified", entry_id)
+
+    def _place_to_explore(self, observation: Observation) -> Place | None:
+        return self._seen.best_edge(self._navigator.explorer.map, (observation.pose.x_m, observation.pose.z_m))
+
+    def _goes_to(self, place: Place, here: Point2) -> None:
+        self._explored = place

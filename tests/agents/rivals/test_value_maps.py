@@ -11,13 +11,10 @@ from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import stage_case
 
-from evonav.agents.frontier_update.own_exploration import Place
-from evonav.agents.relatedness import ROOM_WORTH, Relatedness
-from evonav.agents.value_maps.cone_map import ConeMap, largest_within
-from evonav.agents.value_maps.label_map import LabelMap, LabelMapConfig, clusters_of, pixel_weights
-from evonav.agents.value_maps.onemap import OneMap
-from evonav.agents.value_maps.pursuit import Pursuit
-from evonav.agents.value_maps.vlfm import Vlfm
+from evonav.agents.rivals.exploration import Place, Pursuit
+from evonav.agents.rivals.onemap import LabelMap, OneMap, OneMapConfig, clusters_of, pixel_weights
+from evonav.agents.rivals.relatedness import ROOM_WORTH, Relatedness
+from evonav.agents.rivals.vlfm import ConeMap, Vlfm, VlfmConfig, largest_within
 from evonav.decision.text.language import parse_goal
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import MapFrame
@@ -37,7 +34,7 @@ def ahead(yaw_rad=0.0, cells=((40, 40), (40, 48), (40, 20))):
 
 
 def test_a_view_gives_its_value_with_more_confidence_on_its_axis_than_at_its_edges():
-    cones = ConeMap(FRAME)
+    cones = ConeMap(FRAME, VlfmConfig())
     cones.see(ahead(), 0.8)
     assert cones.confidences[40, 40] == pytest.approx(1.0)
     assert 0.25 < cones.confidences[40, 48] < 1.0
@@ -46,13 +43,13 @@ def test_a_view_gives_its_value_with_more_confidence_on_its_axis_than_at_its_edg
 
 
 def test_what_is_outside_of_the_cone_is_not_valued():
-    cones = ConeMap(FRAME)
+    cones = ConeMap(FRAME, VlfmConfig())
     cones.see(ahead(yaw_rad=math.pi), 0.8)
     assert not cones.confidences.any()
 
 
 def test_values_are_averaged_by_confidence_and_surer_views_count_more():
-    cones = ConeMap(FRAME)
+    cones = ConeMap(FRAME, VlfmConfig())
     cones.see(ahead(), 1.0)
     first = cones.confidences[40, 48]
     cones.see(ahead(yaw_rad=math.radians(11)), 0.0)
@@ -65,11 +62,11 @@ def test_values_are_averaged_by_confidence_and_surer_views_count_more():
 
 
 def test_an_unsure_look_does_not_change_what_a_surer_one_said():
-    cones = ConeMap(FRAME)
+    cones = ConeMap(FRAME, VlfmConfig())
     cones.see(ahead(), 1.0)
     cones.see(ahead(yaw_rad=math.radians(44)), 0.0)  # straight ahead is at the edge of it
     assert cones.values[40, 40] == 1.0
-    cones = ConeMap(FRAME)
+    cones = ConeMap(FRAME, VlfmConfig())
     cones.see(ahead(yaw_rad=math.radians(44)), 0.7)  # unless nothing was known
     assert cones.values[40, 40] == pytest.approx(0.7)
 
@@ -172,7 +169,7 @@ def test_a_detection_ends_the_search():
 
 
 def test_near_surfaces_that_face_the_camera_are_the_surest():
-    config = LabelMapConfig()
+    config = OneMapConfig()
     flat = {depth: pixel_weights(np.full((4, 4), depth, np.float32), INTRINSICS, config)[1, 1] for depth in (1, 3, 5)}
     assert flat[1] == 1.0 > flat[3] > flat[5] > 0.0
     assert flat[3] == pytest.approx(math.exp(-((2.0 / 1.5) ** 2) / 3))
@@ -184,7 +181,7 @@ def test_near_surfaces_that_face_the_camera_are_the_surest():
 
 
 def test_cells_know_what_they_show_for_every_later_goal_and_are_checked_anew():
-    labels = LabelMap(FRAME)
+    labels = LabelMap(FRAME, OneMapConfig())
     for _ in range(12):
         labels.see(a_cup("Fridge"))
     assert (labels.explored == labels.checked).all()
@@ -201,7 +198,7 @@ def test_cells_know_what_they_show_for_every_later_goal_and_are_checked_anew():
 
 
 def test_a_cell_is_the_mean_of_what_it_showed():
-    labels = LabelMap(FRAME)
+    labels = LabelMap(FRAME, OneMapConfig())
     labels.see(a_cup("Fridge"))
     seen = labels.similarity(related("Find the fridge."))
     cell = np.unravel_index(seen.argmax(), seen.shape)
@@ -214,7 +211,7 @@ def test_a_cell_is_the_mean_of_what_it_showed():
 
 
 def test_one_view_may_show_more_labels_than_there_was_room_for():
-    one, many = LabelMap(FRAME), LabelMap(FRAME)
+    one, many = LabelMap(FRAME, OneMapConfig()), LabelMap(FRAME, OneMapConfig())
     view = a_cup("Fridge")
     names = (*(f"Thing{number}" for number in range(40)), "Fridge")
     one.see(view)
@@ -224,7 +221,7 @@ def test_one_view_may_show_more_labels_than_there_was_room_for():
 
 
 def test_a_cell_is_explored_after_some_sure_looks_and_not_after_one():
-    labels = LabelMap(FRAME)
+    labels = LabelMap(FRAME, OneMapConfig())
     labels.see(a_cup())
     assert not labels.explored.any()
     for _ in range(11):
@@ -235,7 +232,7 @@ def test_a_cell_is_explored_after_some_sure_looks_and_not_after_one():
 def test_with_features_a_cell_is_as_similar_as_its_objects_look():
     unit = np.eye(2, dtype=np.float32)
     view = a_cup("Box")
-    labels = LabelMap(FRAME)
+    labels = LabelMap(FRAME, OneMapConfig())
     labels.see(a_view(view.depth_m, view.detections.masks, ("Box",), features=unit[:1]))
     alike, other = (labels.similarity(related("Find the egg.", one)) for one in unit)
     assert alike.max() > 0.9

@@ -1,4 +1,4 @@
-"""OneMap's map: what each cell shows, weighted by how certain that is, and two counts of how well it was seen."""
+"""OneMap (Busch et al., ICRA 2025): one map of what all cells show, kept over goals, and looked at again by each."""
 
 import math
 from dataclasses import dataclass
@@ -6,9 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.agents.agent import AgentAction
+from evonav.agents.frontier_update.agent import FrontierUpdateConfig
 from evonav.agents.grid import numbered
-from evonav.agents.relatedness import Feature, Relatedness
-from evonav.sensors.observation import MapFrame, View
+from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
+from evonav.agents.rivals.exploration import SAME_M, OwnExploration, Place, Pursuit
+from evonav.agents.rivals.relatedness import Feature, Relatedness
+from evonav.memory import Frontier
+from evonav.records import Point2
+from evonav.sensors.observation import MapFrame, Observation, View
+from evonav.tasks.public import Goal
 from evonav.world.camera import thinned, unproject
 from evonav.world.simulator import Intrinsics
 
@@ -17,9 +24,10 @@ BACKGROUND = ""
 
 
 @dataclass(frozen=True, slots=True)
-class LabelMapConfig:
+class OneMapConfig(FrontierUpdateConfig):
     """OneMap's constants."""
 
+    navigator: NavigatorConfig = WITH_FALLBACK
     stride_px: int = 5
     """Every such pixel of every such row counts, if the size of the image allows it; ours."""
     gradient_factor: float = 0.2
@@ -32,6 +40,12 @@ class LabelMapConfig:
     """A pixel with a smaller weight does not count."""
     max_uncertainty: float = 0.2
     """A cell is explored, or checked, when 1 over the sum of its weights is below this."""
+    cluster_share: float = 0.8
+    """Cells of a cluster have at least this share of the largest similarity."""
+    min_cluster_cells: int = 2
+    """Smallest number of cells of a cluster."""
+    frontier_margin_m: float = 0.5
+    """Unexplored cells this near a frontier's region count for its value; ours."""
 
 
 class LabelMap:
@@ -40,8 +54,8 @@ class LabelMap:
     The similarity of a cell to a goal is the weighted mean of what its labels have to do with it.
     """
 
-    def __init__(self, frame: MapFrame, config: LabelMapConfig | None = None) -> None:
-        self.config = config or LabelMapConfig()
+    def __init__(self, frame: MapFrame, config: OneMapConfig) -> None:
+        self.config = config
         self._frame = frame
         self._numbers: dict[str, int] = {BACKGROUND: 0}
         self._sums = np.zeros((8, frame.rows * frame.cols), np.float32)
@@ -114,7 +128,7 @@ class LabelMap:
         return (sums * self.config.max_uncertainty > 1.0).reshape(self._frame.rows, self._frame.cols)
 
 
-def pixel_weights(depth_m: NDArray[np.float32], intrinsics: Intrinsics, config: LabelMapConfig) -> NDArray[np.float64]:
+def pixel_weights(depth_m: NDArray[np.float32], intrinsics: Intrinsics, config: OneMapConfig) -> NDArray[np.float64]:
     """Return how certain the place of each pixel is: 1 at the best depth on a surface that faces the camera.
 
     Args:
@@ -157,3 +171,68 @@ def clusters_of(
         row, col = np.unravel_index(int(inside.argmax()), inside.shape)
         found.append((int(row), int(col), float(inside[row, col])))
     return found
+
+
+class OneMap(OwnExploration):
+    """Explores the frontier or the unchecked place with the largest similarity to the goal."""
+
+    config: OneMapConfig = OneMapConfig()
+
+    def _new_navigator(self) -> Navigator:
+        navigator = super()._new_navigator()
+        self._labels = LabelMap(self._task.map_frame, self.config)
+        navigator.observers.append(lambda _, view, __: self._labels.see(view))
+        return navigator
+
+    def begin_stage(self, goal: Goal) -> None:
+        """Take a new goal: nothing is checked for it yet."""
+        super().begin_stage(goal)
+        self._labels.begin_goal()
+        self._pursuit = Pursuit()
+        self._looked_at: list[Point2] = []
+        """Clusters of this stage that the agent went to see."""
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Look, take in what cells show, and act as Frontier-Update does."""
+        self._related = Relatedness(self._matcher, self._matcher.parsed(self._goal), self._goal_feature(observation))
+        return super().act(observation)
+
+    def _after_look(self, observation: Observation) -> None:
+        place = self._place
+        is_done = observation.has_arrived or not observation.is_action_success
+        if place is not None and place.frontier is None and is_done and self._pursuit.is_going_to(place):
+            self._looked_at.append(place.face_m)
+
+    def _place_to_explore(self, observation: Observation) -> Place | None:
+        self._places = self._all_places()
+        return self._pursuit.choice(self._places, (observation.pose.x_m, observation.pose.z_m))
+
+    def _all_places(self) -> list[Place]:
+        """Return all frontiers, and the clusters of similar cells that were not checked for this goal."""
+        config, labels, frame = self.config, self._labels, self._task.map_frame
+        similarity, explored = labels.similarity(self._related), labels.explored
+        beyond = np.where(explored, 0.0, similarity)
+        places = [
+            Place(one.position_m, one.position_m, self._value_beyond(one, beyond), one)
+            for one in self._navigator.explorer.frontiers
+        ]
+        is_open = explored & ~labels.checked
+        for row, col, value in clusters_of(
+            similarity, is_open, share=config.cluster_share, min_cells=config.min_cluster_cells
+        ):
+            middle_m = frame.centre_m(row, col)
+            stand_m = self._navigator.observation_point(middle_m)
+            if stand_m is not None and all(math.dist(middle_m, one) > SAME_M for one in self._looked_at):
+                places.append(Place(stand_m, middle_m, value))
+        return places
+
+    def _value_beyond(self, frontier: Frontier, beyond: np.ndarray) -> float:
+        """Return the largest similarity of the unexplored cells in and around a frontier's region."""
+        margin = round(self.config.frontier_margin_m / self._task.map_frame.cell_m)
+        lows, highs = frontier.cells.min(axis=0) - margin, frontier.cells.max(axis=0) + margin + 1
+        low_row, low_col = np.maximum(lows, 0).tolist()
+        high_row, high_col = highs.tolist()
+        return float(beyond[low_row:high_row, low_col:high_col].max(initial=0.0))
+
+    def _goes_to(self, place: Place, here: Point2) -> None:
+        self._pursuit.go(place, self._places, here)

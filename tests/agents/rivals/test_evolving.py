@@ -8,40 +8,47 @@ from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
-from evonav.agents.evolving.agent import Evolving, EvolvingConfig, hidden_behind
-from evonav.agents.evolving.belief import MIN_WEIGHT, BeliefConfig, Coverage, SeenSite, belief_of, best_of, p_present
 from evonav.agents.grid import CoarseFrame
+from evonav.agents.rivals.evolving import (
+    MIN_WEIGHT,
+    Coverage,
+    Evolving,
+    EvolvingConfig,
+    best_of,
+    hidden_behind,
+    p_present,
+)
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.memory import OccupancyMap
 from evonav.sensors.observation import MapFrame, VisibleOccupancy
 
-CONFIG = BeliefConfig()
-SEEN = {1: SeenSite(ratio=9.0, num_stages=1)}
+CONFIG = EvolvingConfig()
+SEEN = {1: (9.0, 1)}
 PLACES = {2: 3.0, 3: 1.0}
 
 
 def belief(coverage=None, seen=SEEN, places=PLACES, unknown_share=0.5):
-    return belief_of(seen, places, unknown_share, coverage or Coverage(CONFIG), CONFIG)
+    return (coverage or Coverage(CONFIG)).belief(seen, places, unknown_share)
 
 
 def test_the_place_where_it_was_last_seen_keeps_most_and_loses_some_with_each_stage():
-    new, old, older = (belief(seen={1: SeenSite(9.0, stages)}).sites[1] for stages in (0, 1, 3))
+    new, old, older = (belief(seen={1: (9.0, stages)}).sites[1] for stages in (0, 1, 3))
     assert new == pytest.approx(0.9)
     assert old == pytest.approx(0.9 * 0.8)
     assert older == pytest.approx(0.9 * 0.8**3)
 
 
 def test_of_two_namesakes_the_one_that_fits_the_description_has_the_belief():
-    found = belief(seen={1: SeenSite(5.0, 0), 4: SeenSite(0.05, 0)})
+    found = belief(seen={1: (5.0, 0), 4: (0.05, 0)})
     assert found.sites[1] / found.sites[4] == pytest.approx(100.0)
     assert found.sites[1] == pytest.approx(5.0 / 6.05)  # 1 is the share of one that was never seen
-    alike = belief(seen={1: SeenSite(5.0, 0), 4: SeenSite(5.0, 0)})
+    alike = belief(seen={1: (5.0, 0), 4: (5.0, 0)})
     assert alike.sites[1] == alike.sites[4] == pytest.approx(5.0 / 11.0)
 
 
 def test_an_object_is_believed_present_by_its_stages_and_its_looks():
-    assert [p_present(stages, 1.0, CONFIG) for stages in (0, 1, 2)] == pytest.approx([1.0, 0.8, 0.64])
-    assert p_present(1, 0.1, CONFIG) == pytest.approx(0.08 / 0.28)
+    assert [p_present(stages, 1.0, 0.8) for stages in (0, 1, 2)] == pytest.approx([1.0, 0.8, 0.64])
+    assert p_present(1, 0.1, 0.8) == pytest.approx(0.08 / 0.28)
 
 
 def test_what_moved_may_be_at_any_site_or_at_an_unknown_place():
@@ -73,7 +80,7 @@ def test_nothing_is_excluded_for_good():
     assert belief(coverage).sites[1] == pytest.approx(belief().sites[1])
     only = belief(coverage, seen=SEEN, places={}, unknown_share=0.0)
     coverage.look(1, 1.0)
-    assert only.chance(1, coverage, CONFIG) > 0.0  # inspected, and open while its belief is large
+    assert coverage.chance(1, only.sites[1]) > 0.0  # inspected, and open while its belief is large
 
 
 def test_only_surface_that_is_new_counts_and_only_above_a_twentieth():
@@ -95,13 +102,13 @@ def test_an_inspected_site_is_closed_until_its_belief_is_large():
     coverage.look(3, 0.8)
     found = belief(coverage)
     assert found.sites[3] < CONFIG.reopen
-    assert found.chance(3, coverage, CONFIG) == 0.0
-    assert found.chance(2, coverage, CONFIG) == pytest.approx(0.9 * found.sites[2])
+    assert coverage.chance(3, found.sites[3]) == 0.0
+    assert coverage.chance(2, found.sites[2]) == pytest.approx(0.9 * found.sites[2])
     coverage.fail(1)
     coverage.fail(2)
     reopened = belief(coverage, unknown_share=0.0, places={2: 3.0, 3: 9.0})
     assert reopened.sites[3] > CONFIG.reopen
-    assert reopened.chance(3, coverage, CONFIG) == pytest.approx(0.9 * 0.2 * reopened.sites[3])
+    assert coverage.chance(3, reopened.sites[3]) == pytest.approx(0.9 * 0.2 * reopened.sites[3])
 
 
 @given(
@@ -114,8 +121,8 @@ def test_the_belief_is_a_distribution(ratios, places, unknown_share, looks):
     coverage = Coverage(CONFIG)
     for site, share in looks:
         coverage.look(site, share)
-    seen = {site: SeenSite(*one) for site, one in enumerate(ratios)}
-    found = belief_of(seen, dict(enumerate(places, len(ratios))), unknown_share, coverage, CONFIG)
+    seen = dict(enumerate(ratios))
+    found = coverage.belief(seen, dict(enumerate(places, len(ratios))), unknown_share)
     assert all(p >= 0.0 for p in found.sites.values())
     assert sum(found.sites.values()) + found.unknown == pytest.approx(1.0)
     naive = {site: ratio * 0.8**stages * coverage.weight(site) for site, (ratio, stages) in enumerate(ratios)}
@@ -125,11 +132,11 @@ def test_the_belief_is_a_distribution(ratios, places, unknown_share, looks):
 
 
 def test_the_largest_chance_a_metre_wins():
-    assert best_of([(0, 0.6, 9.0), (1, 0.2, 1.0)], 1.0) == 1
-    assert best_of([(0, 0.6, 2.0), (1, 0.2, 1.0)], 1.0) == 0
-    assert best_of([(0, 0.2, 1.0), (1, 0.2, 1.0)], 1.0) == 0
-    assert best_of([(0, 0.0, 1.0)], 1.0) is None
-    assert best_of([], 1.0) is None
+    assert best_of([0.6, 0.2], [9.0, 1.0], 1.0) == 1
+    assert best_of([0.6, 0.2], [2.0, 1.0], 1.0) == 0
+    assert best_of([0.2, 0.2], [1.0, 1.0], 1.0) == 0
+    assert best_of([0.0], [1.0], 1.0) is None
+    assert best_of([], [], 1.0) is None
 
 
 def test_the_unknown_belongs_to_the_frontier_from_which_it_is_reached_first():

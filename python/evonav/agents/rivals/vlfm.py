@@ -1,4 +1,4 @@
-"""VLFM's value map: each view spreads one value over its cone, with more confidence in the middle than at the edges."""
+"""VLFM (Yokoyama et al., ICRA 2024): explores the frontier with the largest value, and goes to what it detects."""
 
 import math
 from dataclasses import dataclass
@@ -6,25 +6,34 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.points import Point2
-from evonav.sensors.observation import MapFrame, View
+from evonav.agents.agent import AgentAction
+from evonav.agents.frontier_update.agent import FrontierUpdateConfig
+from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
+from evonav.agents.rivals.exploration import OwnExploration, Place, Pursuit
+from evonav.agents.rivals.relatedness import Relatedness
+from evonav.records import Point2
+from evonav.sensors.observation import MapFrame, Observation, View
+from evonav.tasks.public import Goal
 
 
 @dataclass(frozen=True, slots=True)
-class ConeMapConfig:
+class VlfmConfig(FrontierUpdateConfig):
     """VLFM's constants."""
 
+    navigator: NavigatorConfig = WITH_FALLBACK
     min_confidence: float = 0.25
     """Confidence at the edges of the field of view; it is 1 on the axis."""
     ignored_below: float = 0.35
     """A new confidence below this does not count where it is also below the old one."""
+    value_radius_m: float = 0.5
+    """A frontier has the largest value within this distance."""
 
 
 class ConeMap:
     """Values of the cells that views have shown, and the confidence in them."""
 
-    def __init__(self, frame: MapFrame, config: ConeMapConfig | None = None) -> None:
-        self.config = config or ConeMapConfig()
+    def __init__(self, frame: MapFrame, config: VlfmConfig) -> None:
+        self.config = config
         self._frame = frame
         self.values = np.zeros((frame.rows, frame.cols))
         self.confidences = np.zeros((frame.rows, frame.cols))
@@ -61,3 +70,43 @@ def largest_within(values: NDArray[np.float64], frame: MapFrame, place_m: Point2
     cols = np.arange(window.shape[1]) + lows[1] + 0.5 - at[1]
     is_near = np.hypot(rows[:, None], cols[None, :]) * frame.cell_m <= radius_m
     return float(window[is_near].max()) if is_near.any() else 0.0
+
+
+class Vlfm(OwnExploration):
+    """Values are of one goal, so each stage begins with a map without values; floor and objects are kept."""
+
+    config: VlfmConfig = VlfmConfig()
+
+    def _new_navigator(self) -> Navigator:
+        navigator = super()._new_navigator()
+        navigator.observers.append(lambda _, view, __: self._cones.see(view, self._related.of_view(view.detections)))
+        return navigator
+
+    def begin_stage(self, goal: Goal) -> None:
+        """Take a new goal; all values are unknown."""
+        super().begin_stage(goal)
+        self._cones = ConeMap(self._task.map_frame, self.config)
+        self._pursuit = Pursuit()
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Look, value what is seen, and act as Frontier-Update does."""
+        self._related = Relatedness(self._matcher, self._matcher.parsed(self._goal), self._goal_feature(observation))
+        return super().act(observation)
+
+    def _places(self) -> list[Place]:
+        values, radius_m = self._cones.values, self.config.value_radius_m
+        return [
+            Place(
+                one.position_m,
+                one.position_m,
+                largest_within(values, self._task.map_frame, one.position_m, radius_m),
+                one,
+            )
+            for one in self._navigator.explorer.frontiers
+        ]
+
+    def _place_to_explore(self, observation: Observation) -> Place | None:
+        return self._pursuit.choice(self._places(), (observation.pose.x_m, observation.pose.z_m))
+
+    def _goes_to(self, place: Place, here: Point2) -> None:
+        self._pursuit.go(place, self._places(), here)

@@ -7,18 +7,17 @@ from hypothesis import strategies as st
 from toy_episode import rounds_of, run
 from toy_house import CHAIR_AWAY, stage_case
 
-from evonav.agents.khronos.agent import KhronosFrontierUpdate
-from evonav.agents.khronos.votes import KhronosVotes, PresenceChange, VotesConfig, change_of, rays_of
+from evonav.agents.rivals.khronos import KhronosConfig, KhronosFrontierUpdate, KhronosVotes, change_of, rays_of
 from evonav.memory import ObjectMap
 
-CONFIG = VotesConfig()
+CONFIG = KhronosConfig()
 
 
 class Watched:
     """A map with votes, a view a round."""
 
     def __init__(self, *views):
-        self.map, self.votes = ObjectMap(), KhronosVotes()
+        self.map, self.votes = ObjectMap(), KhronosVotes(CONFIG)
         for view in views:
             self.see(view)
 
@@ -61,13 +60,11 @@ def test_rays_of_the_rounds_in_which_it_is_detected_do_not_count():
 
 def test_the_first_window_with_most_votes_for_absence_is_the_change():
     bins = {3: (90, 10), 4: (80, 20), 9: (10, 90), 10: (0, 100)}
-    assert change_of(bins, CONFIG, forward=True) == PresenceChange(absent=9, present=4)
-    assert change_of(bins, CONFIG, forward=False) == PresenceChange(absent=10, present=None)
+    assert change_of(bins, CONFIG, forward=True) == 9
+    assert change_of(bins, CONFIG, forward=False) == 10
     one_bad_look = {3: (10, 40), 4: (90, 0), 5: (90, 0)}
-    assert change_of(one_bad_look, CONFIG, forward=True) == PresenceChange(
-        None, 5
-    )  # the window of five rounds outvotes it
-    assert change_of({}, CONFIG, forward=True) == PresenceChange()
+    assert change_of(one_bad_look, CONFIG, forward=True) is None  # the window of five rounds outvotes it
+    assert change_of({}, CONFIG, forward=True) is None
 
 
 @given(
@@ -76,18 +73,14 @@ def test_the_first_window_with_most_votes_for_absence_is_the_change():
     forward=st.booleans(),
 )
 def test_a_change_is_that_of_the_definition(bins, window, forward):
-    config = VotesConfig(window=window)
-    is_absent, is_present = {}, {}
+    config = KhronosConfig(window=window)
+    is_absent = {}
     for start in bins:
         present = sum(bins.get(start + step, (0, 0))[0] for step in range(window))
         absent = sum(bins.get(start + step, (0, 0))[1] for step in range(window))
         is_absent[start] = absent > 0.6 * (present + absent)
-        is_present[start] = present > 0.5 * (present + absent)
     order = sorted(bins, reverse=not forward)
-    first = next((index for index, one in enumerate(order) if is_absent[one]), None)
-    proofs = [one for one in order[:first] if is_present[one]]
-    found = change_of(bins, config, forward=forward)
-    assert found == PresenceChange(None if first is None else order[first], proofs[-1] if proofs else None)
+    assert change_of(bins, config, forward=forward) == next((one for one in order if is_absent[one]), None)
 
 
 def test_a_thinned_view_has_the_same_rays():

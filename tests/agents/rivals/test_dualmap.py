@@ -10,8 +10,7 @@ from scripted_model import scripted
 from toy_episode import run
 from toy_house import OBJECTS, stage_case
 
-from evonav.agents.dualmap.agent import DualMap
-from evonav.agents.dualmap.anchors import AbstractMap, main_plane_m
+from evonav.agents.rivals.dualmap import AbstractMap, DualMap, DualMapConfig, main_plane_m
 from evonav.decision.home_statistics import is_furniture
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import TaskInfo
@@ -33,7 +32,7 @@ def mug(entry_id=2, x_m=0.3, bottom_m=0.72):
 
 
 def map_with_table():
-    abstract = AbstractMap()
+    abstract = AbstractMap(DualMapConfig())
     abstract.add(table(), TABLE_TOP)
     return abstract
 
@@ -169,7 +168,7 @@ def test_a_failed_anchor_is_ignored_for_this_goal_and_open_again_for_the_next():
 def test_after_a_failure_only_anchors_that_are_as_good_or_of_the_same_kind_are_left():
     agent = DualMap()
     run(agent, stage_case(1, "Fridge|1"))
-    abstract = agent._abstract = AbstractMap()
+    abstract = agent._abstract = AbstractMap(DualMapConfig())
     for number, (label, x_m) in enumerate([("DiningTable", 0), ("DiningTable", 3), ("Desk", 6), ("Desk", 9)], 1):
         abstract.add(table(number, float(x_m), label), TABLE_TOP)
     abstract.put(entry(20, "Fridge", (0.3, 0.8, 0.1), (0.1, 0.1, 0.1)))

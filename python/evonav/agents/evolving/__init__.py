@@ -1,1 +1,0 @@
-"""EvolvingNav's filter: a posterior over sites and the unknown, with soft negative evidence."""

@@ -1,1 +1,0 @@
-"""Khronos' votes of rays before and after each object, on Frontier-Update."""

@@ -1,1 +1,0 @@
-"""VLFM and OneMap: maps of values, and the agents that explore where the value is largest."""
