@@ -3,7 +3,7 @@
     evonav tasks generate --houses houses-train.jsonl.gz --limit 60 --out out/tasks/train
     python scripts/data/fit_priors.py out/tasks/train --houses houses-train.jsonl.gz
 
-prints the constants of `evonav.agents.proactive.priors` and `evonav.decision.home_statistics`. Give it training houses
+prints the constants of `evonav.agents.proactive.config` and `evonav.decision.home_statistics`. Give it training houses
 only.
 """
 

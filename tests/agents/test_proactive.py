@@ -6,19 +6,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from evonav_studies.variants import proactive_blind
+from evonav_studies.variants import BLIND, ORACLE_THETA, proactive_blind
 from scripted_model import scripted
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
-from evonav.agents.grid import CoarseFrame
+from evonav.agents.grid import NO_GROUP, CoarseFrame
 from evonav.agents.proactive.agent import Proactive
-from evonav.agents.proactive.config import PRIORS, ProactiveConfig
-from evonav.agents.proactive.places import visible_range_m
+from evonav.agents.proactive.config import FITTED, ProactiveConfig
+from evonav.agents.proactive.maps import SearchedCells, rooms_of, shown_from, walls_of
+from evonav.agents.proactive.posterior import visible_range_m
 from evonav.agents.proactive.presence import PresenceBelief, _Entry
-from evonav.agents.proactive.rooms import NO_ROOM, rooms_of
-from evonav.agents.proactive.search import Option, best_option, shown_from, walls_of
-from evonav.agents.proactive.searched import SearchedCells
+from evonav.agents.proactive.search import Option, best_option
 from evonav.decision.candidates import ObjectCandidate
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.memory.occupancy import BLOCKED, FREE
@@ -39,9 +38,9 @@ def test_rooms_are_cut_at_doorways_and_not_at_wide_openings():
     cut = rooms_of(two_rooms(door_cells=10), FRAME, [])
     assert set(np.unique(cut[:, :40])) == {0}
     assert set(np.unique(cut[:, 60:])) == {1}
-    assert (cut[:30, 49:51] == NO_ROOM).all()  # a wall is in no room
+    assert (cut[:30, 49:51] == NO_GROUP).all()  # a wall is in no room
     open_ = rooms_of(two_rooms(door_cells=30), FRAME, [])
-    assert open_[10, 10] == open_[10, 90] != NO_ROOM
+    assert open_[10, 10] == open_[10, 90] != NO_GROUP
 
 
 def test_furniture_does_not_divide_a_room_but_a_shelf_on_the_wall_is_none():
@@ -59,7 +58,7 @@ def belief(rooms, evidence, **config):
     """A belief in entries of rooms, after a transition, with evidence for and against some: id -> sign."""
     presence = PresenceBelief(ProactiveConfig(**config))
     presence._entries = {entry_id: _Entry(0.99, 1, present=0.99) for entry_id in rooms}
-    presence.begin_stage(2, rooms, frozenset(), NO_ROOM)
+    presence.begin_stage(2, rooms, frozenset(), NO_GROUP)
     for entry_id, sign in evidence.items():
         presence._entries[entry_id].evidence = 3.0 * sign
     presence.update()
@@ -101,10 +100,10 @@ def test_the_room_of_the_agent_does_not_change():
 
 
 def test_priors_are_probabilities():
-    for prior in PRIORS.values():
+    for prior in (FITTED, BLIND, ORACLE_THETA):
         assert sum(prior.modes) == pytest.approx(1.0)
         assert 0.0 < prior.mean_moved < 1.0
-    assert not PRIORS["blind"].knows_rooms
+    assert not BLIND.knows_rooms
 
 
 def test_the_rule_is_gain_a_metre_and_a_choice_is_kept_unless_another_is_clearly_better():
@@ -157,7 +156,7 @@ def test_what_was_searched_in_vain_counts_less():
 
 
 def test_small_things_are_missed_from_afar(monkeypatch):
-    monkeypatch.setattr("evonav.agents.proactive.searched.seen_cells", lambda *_: (np.array([4]), np.array([7])))
+    monkeypatch.setattr("evonav.agents.proactive.maps.seen_cells", lambda *_: (np.array([4]), np.array([7])))
     searched = SearchedCells(FRAME, ProactiveConfig())
     edge_m = searched.coarse.frame.cell_m
     searched.see(SimpleNamespace(pose=SimpleNamespace(x_m=7.5 * edge_m + 2.2, z_m=4.5 * edge_m)))
@@ -169,7 +168,7 @@ def test_small_things_are_missed_from_afar(monkeypatch):
 
 def test_looks_from_one_side_count_once_a_stage(monkeypatch):
     seen = (np.array([4]), np.array([7]))
-    monkeypatch.setattr("evonav.agents.proactive.searched.seen_cells", lambda *_: seen)
+    monkeypatch.setattr("evonav.agents.proactive.maps.seen_cells", lambda *_: seen)
 
     class At:
         def __init__(self, x_m, z_m):

@@ -13,28 +13,25 @@ from evonav.agents.navigator import Navigator
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.proactive.belief import TargetBelief
 from evonav.agents.proactive.config import ProactiveConfig
-from evonav.agents.proactive.places import visible_range_m
-from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings, place_belief
+from evonav.agents.proactive.maps import shown_from
+from evonav.agents.proactive.posterior import NAMED, Posterior, Surroundings, place_belief, visible_range_m
 from evonav.agents.proactive.search import (
+    ALIKE,
     SAME_PLACE_M,
     Option,
-    best_option,
-    frontier_gains,
-    is_same,
-    places_to_search,
-    shown_from,
-    with_ways,
-)
-from evonav.agents.proactive.sightings import FarSighting
-from evonav.agents.proactive.standing import (
-    ALIKE,
     Placed,
     best_entry,
+    best_option,
     covered,
+    frontier_gains,
+    is_same,
     likeliest_places,
     place_by,
     places_before,
+    places_to_search,
+    with_ways,
 )
+from evonav.agents.proactive.sightings import FarSighting
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import similarity
 from evonav.decision.text.matcher import Matcher
@@ -91,9 +88,8 @@ class Proactive(NavigatorAgent):
         navigator, here = self._navigator, (observation.pose.x_m, observation.pose.z_m)
         self._queries.begin_round()
         self._candidates = ()
-        self._belief.begin_round()
+        self._belief.begin_round(here)
         navigator.observe(observation)
-        self._belief.note_place(here)
         around = self._belief.surroundings()
         # Where the way of the last round has ended, there may be an entry, a place that is now searched, or a sighting.
         ended = self._last if observation.has_arrived or not observation.is_action_success else None
@@ -134,7 +130,7 @@ class Proactive(NavigatorAgent):
 
     def _give_up(self, place: Option, around: Surroundings) -> None:
         """Take a place that the agent went to for searched, with all that it shows."""
-        shown = shown_from(place.position_m, self._belief.searched.coarse, around.walls, self._radius_m)
+        shown = shown_from(place.position_m, around.coarse, around.walls, self._radius_m)
         self._belief.searched.give_up(*shown, self.config.searched)
         self._searched_from.append(place.position_m)
         self._last = None
@@ -240,7 +236,7 @@ class Proactive(NavigatorAgent):
 
     def _place_by(self, centre_m: Point2, placed: Placed, around: Surroundings, here: Point2) -> Point2 | None:
         """Return where to stand by an entry; `None` if no known floor leads there."""
-        places = places_before(centre_m, self._belief.searched.coarse, around, self.config.stand_within_m)
+        places = places_before(centre_m, around, self.config.stand_within_m)
         return place_by(places, placed, self._navigator.explorer.map, here)
 
     def _may_be_goal(self, entry: ObjectEntry, around: Surroundings) -> bool:
@@ -262,12 +258,10 @@ class Proactive(NavigatorAgent):
         entries = [self._entry_option(entry_id, posterior.entries[entry_id]) for entry_id in likely]
         frontiers = around.frontiers
         gains = frontier_gains(posterior, around)
-        options = [Option("frontier", one.id, one.position_m, one.position_m, gains[one.id], 0.0) for one in frontiers]
-        places = places_to_search(
-            posterior.moved + posterior.unseen, self._belief.searched.coarse, around, self._radius_m, config
-        )
+        options = [Option("frontier", one.id, one.position_m, one.position_m, gains[one.id]) for one in frontiers]
+        places = places_to_search(posterior.moved + posterior.unseen, around, self._radius_m, config)
         options += [
-            Option("place", number, eye, face, gain, 0.0)
+            Option("place", number, eye, face, gain)
             for number, eye, face, gain in places
             if all(math.dist(eye, other) > SAME_PLACE_M for other in self._searched_from)
         ]
@@ -310,7 +304,7 @@ class Proactive(NavigatorAgent):
         """Return where to be when the rounds run out: by the largest part of the posterior that is within reach."""
         here = (observation.pose.x_m, observation.pose.z_m)
         placed = self._entry_places(posterior) + [(one.ground_m, weight) for one, weight in posterior.sightings]
-        places = likeliest_places(posterior, placed, self._belief.searched.coarse, around)
+        places = likeliest_places(posterior, placed, around)
         max_way_m = (observation.num_rounds_left - 1) * self.sensors.max_travel_m
         ways = with_ways(self._navigator.explorer.map, here, places)
         near = [one for one in ways if one.is_reached and one.way_m <= max_way_m]
@@ -320,15 +314,13 @@ class Proactive(NavigatorAgent):
         entry = self._navigator.objects.entry(entry_id)
         assert entry is not None, "the posterior has present entries only"
         centre_m = (entry.centre_m[0], entry.centre_m[2])
-        return Option(
-            "object", entry_id, self._navigator.observation_point(centre_m) or centre_m, centre_m, weight, 0.0
-        )
+        return Option("object", entry_id, self._navigator.observation_point(centre_m) or centre_m, centre_m, weight)
 
     def _sighting_option(self, number: int, one: FarSighting, weight: float, around: Surroundings) -> Option:
         """Return the place nearest to a sighting that no known wall hides from it, or the sighting's own."""
-        places = places_before(one.ground_m, self._belief.searched.coarse, around, self.config.stand_within_m)
+        places = places_before(one.ground_m, around, self.config.stand_within_m)
         place = min(places, key=lambda place: (math.dist(place, one.ground_m), place), default=one.ground_m)
-        return Option("sighting", number, place, one.ground_m, weight, 0.0)
+        return Option("sighting", number, place, one.ground_m, weight)
 
     def _related(self, around: Surroundings, here: Point2) -> Option | None:
         """Return the nearest thing that the goal should be on or near."""
@@ -380,7 +372,7 @@ class Proactive(NavigatorAgent):
     def _places(self) -> PlaceBelief | None:
         """Return where the target is believed to be, as of the last round."""
         now = self._posterior_now
-        return None if now is None else place_belief(*now, self._belief.searched.coarse)
+        return None if now is None else place_belief(*now, self._belief.searched.coarse.frame)
 
     def explain(self) -> Explanation:
         """Return the choice, and how to describe the memory and the belief of where the target is."""

@@ -1,28 +1,31 @@
-"""The posterior over where the target is now: at a remembered place, moved from one, or never seen."""
+"""Parts of the posterior over where the target is now: at a remembered place, moved from one, or never seen."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav import _core
 from evonav.agents.agent import PlaceBelief
-from evonav.agents.grid import NO_GROUP, CoarseFrame, box_distance_m
-from evonav.agents.proactive.config import PRIORS, ProactiveConfig
-from evonav.agents.proactive.places import prior_of, visible_range_m
-from evonav.agents.proactive.presence import PresenceBelief
-from evonav.agents.proactive.rooms import NO_ROOM
-from evonav.agents.proactive.searched import SearchedCells
+from evonav.agents.grid import NO_GROUP, CoarseFrame, box_distance_m, box_slices
+from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.sightings import FarSighting
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.home_statistics import room_ratios
-from evonav.decision.text.language import ParsedGoal, canonical, similarity
+from evonav.decision.home_statistics import PER_100_M2, UNKNOWN_PER_100_M2, room_ratios
+from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
-from evonav.points import Point2
+from evonav.records import Point2
+from evonav.sensors.observation import MapFrame
 
+MIN_MASK_SHARE = 0.001
+"""Smallest share of an image that a mask covers if it counts as a detection: 3D-Mem's filter, which the paper keeps."""
+LOOK_DOWN_RAD, DROP_M = math.radians(30.0), 0.8
+"""Angle under which a small thing is seen, and its usual distance below the camera."""
 AT_DOOR_M = 0.75
 """Largest distance between a frontier and the box of a door that leads to what is behind it."""
 SQUARE_CELLS = 3
@@ -45,8 +48,6 @@ class Posterior:
     """`(R, C)` weight of each coarse cell as the present place of a remembered object that is no longer at its own."""
     unseen: NDArray[np.float64]
     """`(R, C)` weight of each coarse cell as the place of an object that was never seen."""
-    unknown: NDArray[np.bool_]
-    """`(R, C)` coarse cells that the map does not know."""
     total: float
 
     def share(self, entry_id: int) -> float:
@@ -68,15 +69,16 @@ class Posterior:
         return float(self.moved.sum() + self.unseen.sum()) + math.fsum(weight for _, weight in self.sightings)
 
 
-def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], coarse: CoarseFrame) -> PlaceBelief:
+def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], frame: MapFrame) -> PlaceBelief:
     """Return the posterior as probabilities of squares of `SQUARE_CELLS` coarse cells, for records and pictures.
 
     Args:
         placed: Middles of the entries and sightings, and their weights.
+        frame: Frame of the coarse cells.
     """
     weights = posterior.moved + posterior.unseen
     for place_m, weight in placed:
-        weights[coarse.frame.cell_at(place_m)] += weight
+        weights[frame.cell_at(place_m)] += weight
     rows, cols = (-(-size // SQUARE_CELLS) for size in weights.shape)
     padded = np.zeros((rows * SQUARE_CELLS, cols * SQUARE_CELLS))
     padded[: weights.shape[0], : weights.shape[1]] = weights
@@ -85,10 +87,8 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
     half = 0.5 * (SQUARE_CELLS - 1)
     likely = np.argwhere(shares > 0.0).tolist()
     return PlaceBelief(
-        cell_m=coarse.frame.cell_m * SQUARE_CELLS,
-        centres_m=tuple(
-            coarse.frame.centre_m(row * SQUARE_CELLS + half, col * SQUARE_CELLS + half) for row, col in likely
-        ),
+        cell_m=frame.cell_m * SQUARE_CELLS,
+        centres_m=tuple(frame.centre_m(row * SQUARE_CELLS + half, col * SQUARE_CELLS + half) for row, col in likely),
         probabilities=tuple(float(shares[row, col]) for row, col in likely),
     )
 
@@ -97,8 +97,7 @@ def place_belief(posterior: Posterior, placed: Sequence[tuple[Point2, float]], c
 class Surroundings:
     """The memory of the agent, for one decision."""
 
-    cells: NDArray[np.uint8]
-    """`(R, C)` of its map."""
+    coarse: CoarseFrame
     rooms: NDArray[np.int32]
     """`(R, C)` room of each cell of its map."""
     remembered: Sequence[ObjectCandidate]
@@ -115,63 +114,7 @@ class Surroundings:
     """`(R, C)` index of the frontier behind which each coarse cell lies; `NO_GROUP` elsewhere."""
 
 
-def posterior_of(
-    goal: ParsedGoal,
-    matcher: Matcher,
-    around: Surroundings,
-    presence: PresenceBelief,
-    searched: SearchedCells,
-    sightings: Sequence[FarSighting],
-    factors: Mapping[int, float],
-    replaced: frozenset[int],
-    config: ProactiveConfig,
-) -> Posterior:
-    """Return where the target may be.
-
-    Args:
-        sightings: Everything that was detected and is no entry.
-        searched: Probabilities that the views of this stage, and of all stages, missed the target.
-        factors: Further factors of entries, such as of those whose identity was denied; 1 if not given.
-        replaced: Entries whose objects were found at other places.
-    """
-    named = [one for one in around.remembered if matcher.names_goal(goal, one)]
-    appearances = matcher.appearance_ratios(goal, named) if config.uses_text else [1.0] * len(named)
-    fits = matcher.context_ratios(goal, named, around.remembered) if config.uses_text else [1.0] * len(named)
-    range_m = visible_range_m(goal.noun)
-    coarse = searched.coarse
-    unknown = around.unknown
-    rooms = np.asarray(coarse.taken(around.rooms, NO_ROOM).max(axis=0), np.int32)
-    prior, leads = prior_of(goal, around.remembered, sightings, coarse, unknown, config)
-
-    entries: dict[int, float] = {}
-    by_room: dict[int, float] = {}
-    for one, appearance, fit in zip(named, appearances, fits, strict=True):
-        p_present = presence.p_present(one.entry_id)
-        entries[one.entry_id] = appearance * fit * p_present * factors.get(one.entry_id, 1.0)
-        if one.entry_id not in replaced:
-            room = around.room_of.get(one.entry_id, NO_ROOM)
-            by_room[room] = by_room.get(room, 0.0) + appearance * (1.0 - p_present)
-    moved = _moved(by_room, rooms, ~unknown, prior, config) * searched.missed(range_m)
-
-    room_factors = _room_factors(goal, matcher, around, rooms, unknown, config)
-    rated = [
-        (one, SIGHTED * coarse.value_at(room_factors, one.ground_m))
-        for one in sightings
-        if similarity(goal.noun, one.label) >= NAMED
-    ]
-    rated += [(one, share * coarse.value_at(room_factors, one.ground_m)) for one, share in leads]
-    unseen = np.zeros_like(prior)
-    if around.frontiers or not unknown.all():
-        unseen = prior * room_factors * searched.ever_missed(range_m)
-        unseen[unknown & (around.owners == NO_GROUP)] *= config.far_beyond
-        if not around.frontiers:
-            unseen[unknown] = 0.0  # nothing leads there
-    total = math.fsum(entries.values()) + float(moved.sum()) + float(unseen.sum())
-    total += math.fsum(weight for _, weight in rated)
-    return Posterior(entries, rated, moved, unseen, unknown, total)
-
-
-def _moved(
+def spread_moved(
     by_room: Mapping[int, float],
     rooms: NDArray[np.int32],
     known: NDArray[np.bool_],
@@ -185,7 +128,7 @@ def _moved(
     for room, weight in by_room.items():
         inside = anywhere * (rooms == room)
         sum_inside = float(inside.sum())
-        stay = PRIORS[config.prior].same_room if config.searches_rooms and room != NO_ROOM and sum_inside > 0.0 else 0.0
+        stay = config.prior.same_room if config.searches_rooms and room != NO_GROUP and sum_inside > 0.0 else 0.0
         if stay:
             moved += weight * stay / sum_inside * inside
         if sum_anywhere > 0.0:
@@ -193,24 +136,23 @@ def _moved(
     return moved
 
 
-def _room_factors(
-    goal: ParsedGoal,
-    matcher: Matcher,
-    around: Surroundings,
-    rooms: NDArray[np.int32],
-    unknown: NDArray[np.bool_],
-    config: ProactiveConfig,
+def room_factors(
+    goal: ParsedGoal, matcher: Matcher, around: Surroundings, rooms: NDArray[np.int32], config: ProactiveConfig
 ) -> NDArray[np.float64]:
-    """Return `(R, C)`: how much likelier the target is in a cell by the type of its room; 1 where that is unknown."""
+    """Return `(R, C)`: how much likelier the target is in a cell by the type of its room; 1 where that is unknown.
+
+    Args:
+        rooms: `(R, C)` room of each coarse cell.
+    """
     factors = np.ones(rooms.shape)
     if not config.weighs_rooms:
         return factors
-    ratios = room_ratios(goal.noun) if PRIORS[config.prior].knows_rooms else {}
+    ratios = room_ratios(goal.noun) if config.prior.knows_rooms else {}
     signs: dict[int, list[str]] = {}
     for one in around.remembered:
         kind = matcher.sign_of(one.label)
-        room = around.room_of.get(one.entry_id, NO_ROOM)
-        if kind is not None and room != NO_ROOM:
+        room = around.room_of.get(one.entry_id, NO_GROUP)
+        if kind is not None and room != NO_GROUP:
             signs.setdefault(room, []).append(kind)
     by_room: dict[int, float] = {}
     for room, kinds in signs.items():
@@ -224,9 +166,77 @@ def _room_factors(
     doors = [one for one in around.remembered if canonical(one.label) == "doorway"]
     for index, frontier in enumerate(around.frontiers):
         numbers = around.rooms[frontier.cells[:, 0], frontier.cells[:, 1]]
-        numbers = numbers[numbers != NO_ROOM]
-        room = int(np.bincount(numbers).argmax()) if numbers.size else NO_ROOM
+        numbers = numbers[numbers != NO_GROUP]
+        room = int(np.bincount(numbers).argmax()) if numbers.size else NO_GROUP
         is_at_door = any(box_distance_m(door, frontier.position_m) <= AT_DOOR_M for door in doors)
         share = config.same_room_beyond_door if is_at_door else config.same_room_beyond
-        factors[(around.owners == index) & unknown] = share * by_room.get(room, 1.0) + 1.0 - share
+        factors[(around.owners == index) & around.unknown] = share * by_room.get(room, 1.0) + 1.0 - share
     return factors
+
+
+@cache
+def visible_range_m(noun: str) -> float:
+    """Return the distance on the ground plane up to which a usual object of a type is large enough to be detected.
+
+    Returns:
+        Metres, for a camera with a field of view of 90 degrees; `inf` for a type without a known size.
+    """
+    sizes_m = np.array([size_m for _, category, size_m in _core.assets() if canonical(category) == noun])
+    if len(sizes_m) == 0:
+        return math.inf
+    width_m, height_m, depth_m = np.median(sizes_m, axis=0).tolist()
+    side_m2 = 0.5 * (width_m + depth_m) * height_m
+    shown_m2 = side_m2 * math.cos(LOOK_DOWN_RAD) + width_m * depth_m * math.sin(LOOK_DOWN_RAD)
+    range_m = math.sqrt(shown_m2 / (4.0 * MIN_MASK_SHARE))
+    return math.sqrt(max(range_m**2 - DROP_M**2, 0.0))
+
+
+def density_of(noun: str) -> float:
+    """Return the usual number of objects of a type on a square metre."""
+    return PER_100_M2.get(noun, UNKNOWN_PER_100_M2) / 100.0
+
+
+def prior_of(
+    goal: ParsedGoal, around: Surroundings, sightings: Sequence[FarSighting], config: ProactiveConfig
+) -> tuple[NDArray[np.float64], list[tuple[FarSighting, float]]]:
+    """Return how many objects of the goal's type are to be expected at each place, weighted by how they fit the text.
+
+    Args:
+        sightings: Everything that was detected and is no entry.
+
+    Returns:
+        `(R, C)` expected numbers. Without a support in the text, they are the same in all cells. With one, most of
+        their sum is shared equally by all supports of that type: those that are remembered or were seen from afar,
+        and those that the unknown area should hold. And the supports that were seen from afar, each with its share.
+    """
+    frame, remembered, unknown = around.coarse.frame, around.remembered, around.unknown
+    cell_m2 = frame.cell_m**2
+    expected = np.full((frame.rows, frame.cols), density_of(goal.noun) * cell_m2)
+    leads: list[tuple[FarSighting, float]] = []
+    relations = [one for one in goal.relations if one.kind != "in" and not is_structure(one.noun)]
+    if not config.uses_anchors:
+        return expected, leads
+    supports = [one.noun for one in relations if one.kind == "on"][:1]
+    for noun in supports:
+        known = [one for one in remembered if similarity(noun, one.label) >= 1.0]
+        afar = [one for one in sightings if similarity(noun, one.label) >= 1.0]
+        unseen_per_cell = density_of(noun) * cell_m2
+        number = len(known) + len(afar) + unseen_per_cell * float(unknown.sum())
+        share = config.on_support * float(expected.sum()) / max(number, config.min_supports)
+        expected *= 1.0 - config.on_support
+        expected[unknown] += share * unseen_per_cell
+        for one in known:
+            box = box_slices(one, frame, 0.0)
+            expected[box] += share / max(1, expected[box].size)
+        leads = [(one, share) for one in afar]
+    for relation in relations:
+        if relation.noun in supports:
+            continue
+        near = np.zeros(expected.shape, np.bool_)
+        for one in remembered:
+            if similarity(relation.noun, one.label) >= 1.0:
+                near[box_slices(one, frame, config.anchor_m)] = True
+        total = float(expected.sum())
+        expected[near] *= config.anchor_ratio
+        expected *= total / float(expected.sum())
+    return expected, leads

@@ -5,8 +5,8 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from evonav.agents.proactive.config import PRIORS, ProactiveConfig
-from evonav.agents.proactive.rooms import NO_ROOM
+from evonav.agents.grid import NO_GROUP
+from evonav.agents.proactive.config import ProactiveConfig
 from evonav.memory.forgetting.rule import expected_px, look_at_places
 from evonav.memory.objects import ObjectMap, ObjectUpdate
 from evonav.memory.presence import DepthEvidence, EvidenceConfig, Presence, judge_presence
@@ -53,7 +53,7 @@ class PresenceBelief:
 
     def __init__(self, config: ProactiveConfig) -> None:
         self._config = config
-        self._prior = PRIORS[config.prior]
+        self._prior = config.prior
         self._entries: dict[int, _Entry] = {}
         self._change_prior: dict[int, float] = {}
         self.changed: dict[int, float] = {}
@@ -66,20 +66,20 @@ class PresenceBelief:
         Args:
             room_of: Room of each entry; rooms are renumbered at each stage.
             visited: Rooms in which the agent was in the last stage.
-            here: The agent's room, which does not change; `NO_ROOM` if it is in none.
+            here: The agent's room, which does not change; `NO_GROUP` if it is in none.
         """
         self._stage = stage
         seemed_changed: dict[int, list[float]] = defaultdict(list)
         for entry_id, entry in self._entries.items():
-            seemed_changed[room_of.get(entry_id, NO_ROOM)].append(self.changed.get(_or_none(entry.room), 0.0))
+            seemed_changed[room_of.get(entry_id, NO_GROUP)].append(self.changed.get(_or_none(entry.room), 0.0))
             entry.before, entry.evidence = entry.present, 0.0
-            entry.room = room_of.get(entry_id, NO_ROOM)
+            entry.room = room_of.get(entry_id, NO_GROUP)
             entry.sectors = {True: set(), False: set()}
         prior, weights = self._prior, {}
         for room, before in seemed_changed.items():
             weight = prior.visited_weight if room in visited else 1.0
             repeated = prior.repeated_weight if max(before) > 0.5 else 1.0
-            weights[room] = 0.0 if room == here and room != NO_ROOM else weight * repeated
+            weights[room] = 0.0 if room == here and room != NO_GROUP else weight * repeated
         total = math.fsum(weights.values())
         expected = prior.change if self._config.expects_change else 0.0
         self._change_prior = {room: expected * weight / total if total else 0.0 for room, weight in weights.items()}
@@ -196,4 +196,4 @@ def sector_of(dx_m: float, dz_m: float) -> int:
 
 
 def _or_none(room: int | None) -> int:
-    return NO_ROOM - 1 if room is None else room
+    return NO_GROUP - 1 if room is None else room

@@ -1,31 +1,30 @@
 """Choose the next place: where most of the posterior is found a metre."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.grid import NO_GROUP, CoarseFrame, box_slices
+from evonav.agents.grid import NO_GROUP
 from evonav.agents.proactive.config import ProactiveConfig
+from evonav.agents.proactive.maps import shown_from
 from evonav.agents.proactive.posterior import Posterior, Surroundings
-from evonav.decision.candidates import ObjectCandidate
-from evonav.memory.occupancy import BLOCKED, UNKNOWN, OccupancyMap
-from evonav.points import Point2
-from evonav.sensors.observation import MapFrame
+from evonav.memory.occupancy import OccupancyMap
+from evonav.records import Point2
 
-FULL_KNOWN_SHARE = 0.5
-"""Share of a coarse cell's map cells that must be unknown for it to count as unknown."""
 SAME_PLACE_M = 0.75
 """Two rounds' options of one kind are the same if their places are this near: frontiers change with what is seen."""
-NUM_SIGHT_SAMPLES = 8
-"""Number of places on a line of sight that must not be in a wall."""
-BESIDE_M = 0.25
-"""Distance from an object's box within which blocked cells are its own: the agent fits nowhere there."""
 UNREACHED = 1.5
 """Factor of the straight line to what no known floor leads to."""
+Placed = Sequence[tuple[Point2, float]]
+"""Places and their weights."""
+ALIKE = 0.8
+"""Share of the largest weight from which another one is as good."""
+STOP_REACH_M, NUM_LIKELIEST = 1.8, 16
+"""Distance within which an agent that stops has found the target, and number of places that are compared by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,23 +39,9 @@ class Option:
     face_m: Point2
     gain: float
     """Weight of the posterior that is found there."""
-    way_m: float
+    way_m: float = 0.0
     is_reached: bool = True
     """Whether known floor leads there."""
-
-
-def unknown_cells(
-    coarse: CoarseFrame, blocks: NDArray[np.generic], remembered: Sequence[ObjectCandidate]
-) -> NDArray[np.bool_]:
-    """Return the `(R, C)` coarse cells that are unknown in most of their area and under nothing remembered.
-
-    Args:
-        blocks: The map's cells, as `CoarseFrame.taken` returns them.
-    """
-    unknown: NDArray[np.bool_] = (blocks == UNKNOWN).mean(axis=0) > FULL_KNOWN_SHARE
-    for one in remembered:
-        unknown[box_slices(one, coarse.frame, 0.0)] = False
-    return unknown
 
 
 def frontier_gains(posterior: Posterior, around: Surroundings) -> dict[int, float]:
@@ -67,7 +52,7 @@ def frontier_gains(posterior: Posterior, around: Surroundings) -> dict[int, floa
 
 
 def places_to_search(
-    weights: NDArray[np.float64], coarse: CoarseFrame, around: Surroundings, radius_m: float, config: ProactiveConfig
+    weights: NDArray[np.float64], around: Surroundings, radius_m: float, config: ProactiveConfig
 ) -> list[tuple[int, Point2, Point2, float]]:
     """Return the places on the floor from which most can be searched.
 
@@ -78,14 +63,10 @@ def places_to_search(
     Returns:
         Number of the coarse cell, place to stand, middle of what is found there, and its weight.
     """
+    coarse = around.coarse
     sums = np.where(around.free, window_sums(weights, max(1, round(0.8 * radius_m / coarse.frame.cell_m))), 0.0)
-    spacing = max(1, round(SAME_PLACE_M / coarse.frame.cell_m) - 1)
     found = []
-    for _ in range(config.num_places):
-        row, col = (int(one) for one in np.unravel_index(int(sums.argmax()), sums.shape))
-        if sums[row, col] <= 0.0:
-            break
-        sums[max(0, row - spacing) : row + spacing + 1, max(0, col - spacing) : col + spacing + 1] = 0.0
+    for row, col, _ in _peaks(sums, config.num_places, max(1, round(SAME_PLACE_M / coarse.frame.cell_m) - 1)):
         eye = coarse.frame.centre_m(row, col)
         rows, cols = shown_from(eye, coarse, around.walls, radius_m)
         gains = weights[rows, cols]
@@ -94,6 +75,17 @@ def places_to_search(
             x_m, z_m = coarse.frame.centre_m(float(gains @ rows) / gain, float(gains @ cols) / gain)
             found.append((row * coarse.frame.cols + col, eye, (x_m, z_m), gain))
     return found
+
+
+def _peaks(sums: NDArray[np.float64], max_num: int, half: int) -> Iterator[tuple[int, int, float]]:
+    """Yield row, column and value of the largest positive sums, none of them within `half` cells of one before."""
+    for _ in range(max_num):
+        row, col = divmod(int(sums.argmax()), sums.shape[1])
+        largest = float(sums[row, col])
+        if largest <= 0.0:
+            return
+        sums[max(0, row - half) : row + half + 1, max(0, col - half) : col + half + 1] = 0.0
+        yield row, col, largest
 
 
 def window_sums(weights: NDArray[np.float64], half: int) -> NDArray[np.float64]:
@@ -106,39 +98,6 @@ def window_sums(weights: NDArray[np.float64], half: int) -> NDArray[np.float64]:
     return sums
 
 
-def shown_from(
-    place_m: Point2, coarse: CoarseFrame, walls: NDArray[np.bool_], radius_m: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return rows and columns of the coarse cells within a distance of a place that no wall hides from it.
-
-    Args:
-        walls: `(R, C)` cells of the agent's map that are blocked, and by nothing remembered.
-    """
-    frame = coarse.frame
-    reach = math.ceil(radius_m / frame.cell_m)
-    at_row, at_col = ((place_m[axis] - frame.corner_m[axis]) / frame.cell_m - 0.5 for axis in (1, 0))
-    low_row, low_col = max(0, round(at_row) - reach), max(0, round(at_col) - reach)
-    dy = np.arange(low_row, min(frame.rows, round(at_row) + reach + 1)) - at_row
-    dx = np.arange(low_col, min(frame.cols, round(at_col) + reach + 1)) - at_col
-    rows, cols = np.nonzero(dy[:, None] ** 2 + dx**2 <= (radius_m / frame.cell_m) ** 2)
-    rows, cols = rows + low_row, cols + low_col
-    along = np.linspace(0.15, 0.85, NUM_SIGHT_SAMPLES)[:, None]
-    fine_rows = ((at_row + along * (rows - at_row) + 0.5) * coarse.step).astype(np.int64)
-    fine_cols = ((at_col + along * (cols - at_col) + 0.5) * coarse.step).astype(np.int64)
-    np.clip(fine_rows, 0, walls.shape[0] - 1, out=fine_rows)
-    np.clip(fine_cols, 0, walls.shape[1] - 1, out=fine_cols)
-    is_clear = ~walls.ravel().take(fine_rows * walls.shape[1] + fine_cols).any(axis=0)
-    return rows[is_clear], cols[is_clear]
-
-
-def walls_of(cells: NDArray[np.uint8], frame: MapFrame, remembered: Sequence[ObjectCandidate]) -> NDArray[np.bool_]:
-    """Return the `(R, C)` blocked cells of the map that are not under or beside anything remembered."""
-    walls: NDArray[np.bool_] = cells == BLOCKED
-    for one in remembered:
-        walls[box_slices(one, frame, BESIDE_M)] = False
-    return walls
-
-
 def with_ways(occupancy: OccupancyMap, here_m: Point2, options: Sequence[Option]) -> list[Option]:
     """Return options with the lengths of their ways over known floor."""
     if not options:
@@ -148,7 +107,7 @@ def with_ways(occupancy: OccupancyMap, here_m: Point2, options: Sequence[Option]
     for one, way_m in zip(options, ways_m, strict=True):
         is_reached = math.isfinite(way_m)
         length_m = way_m if is_reached else UNREACHED * math.dist(here_m, one.position_m)
-        found.append(Option(one.kind, one.key, one.position_m, one.face_m, one.gain, length_m, is_reached))
+        found.append(replace(one, way_m=length_m, is_reached=is_reached))
     return found
 
 
@@ -172,3 +131,57 @@ def best_option(
 def is_same(one: Option, last: Option | None) -> bool:
     """Return whether two rounds' options are the same place."""
     return last is not None and one.kind == last.kind and math.dist(one.position_m, last.position_m) <= SAME_PLACE_M
+
+
+def places_before(centre_m: Point2, around: Surroundings, within_m: float) -> list[Point2]:
+    """Return the free places within a distance of another that no wall hides from it."""
+    rows, cols = shown_from(centre_m, around.coarse, around.walls, within_m)
+    is_free = around.free[rows, cols]
+    return [around.coarse.frame.centre_m(row, col) for row, col in zip(rows[is_free], cols[is_free], strict=True)]
+
+
+def place_by(places: Sequence[Point2], placed: Placed, occupancy: OccupancyMap, here_m: Point2) -> Point2 | None:
+    """Return the place with most of the posterior within reach, and of those about as good the nearest.
+
+    Args:
+        placed: Middles of the entries with the goal's name, and their weights.
+
+    Returns:
+        `(x, z)`; `None` if no known floor leads there.
+    """
+    if not places:
+        return None
+    shares = [covered(placed, place) for place in places]
+    good = [place for place, share in zip(places, shares, strict=True) if share >= ALIKE * max(shares)]
+    way_m, place = min(zip(occupancy.distances_m(here_m, np.array(good)).tolist(), good, strict=True))
+    return place if math.isfinite(way_m) else None
+
+
+def likeliest_places(posterior: Posterior, placed: Placed, around: Surroundings) -> list[Option]:
+    """Return the places on the floor within whose reach most of the posterior is.
+
+    Args:
+        placed: Middles of entries and sightings, and their weights.
+    """
+    frame, weights = around.coarse.frame, posterior.moved + posterior.unseen
+    for place_m, weight in placed:
+        weights[frame.cell_at(place_m)] += weight
+    half = max(1, round(STOP_REACH_M / math.sqrt(2.0) / frame.cell_m))
+    sums = np.where(around.free, window_sums(weights, half), 0.0)
+    found = []
+    for row, col, gain in _peaks(sums, NUM_LIKELIEST, half):
+        place = frame.centre_m(row, col)
+        found.append(Option("place", row * frame.cols + col, place, place, gain))
+    return found
+
+
+def covered(placed: Placed, place_m: Point2) -> float:
+    """Return the weight of what is within the reach of an agent that stops at a place."""
+    return math.fsum(weight for centre_m, weight in placed if math.dist(centre_m, place_m) < STOP_REACH_M)
+
+
+def best_entry(entries: Sequence[Option]) -> Option | None:
+    """Return the nearest of the entries with about the largest weight."""
+    top = max((one.gain for one in entries), default=0.0)
+    good = [one for one in entries if one.gain >= ALIKE * top and one.gain > 0.0]
+    return min(good, key=lambda one: (one.way_m, one.key), default=None)
