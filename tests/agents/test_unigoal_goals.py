@@ -7,7 +7,7 @@ import pytest
 from toy_house import ToySimulator, house_json
 
 from evonav.agents.unigoal.bev import BevMap
-from evonav.agents.unigoal.goals import Glimpse, GoalConfig, GoalWatch, largest_detection
+from evonav.agents.unigoal.goals import Glimpse, GoalWatch, largest_detection
 from evonav.agents.unigoal.planner import UniGoalPlanner
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.vocabulary import MAP_CATEGORIES
@@ -39,7 +39,7 @@ def watching(*ways_m):
     planner.begin_stage()
     told = list(ways_m)
     planner.distance_m = lambda pose, cells: told.pop(0)
-    return GoalWatch(bev, planner, GoalConfig()), bev
+    return GoalWatch(bev, planner), bev
 
 
 def holding(*ways_m):

@@ -6,7 +6,7 @@ from toy_house import stage_case
 
 from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
 from evonav.agents.unigoal.graphs import GraphConfig, GraphReasoner
-from evonav.agents.unigoal.object_graph import SceneNode
+from evonav.agents.unigoal.object_graph import Node, name_of
 from evonav.agents.unigoal.questions import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
 from evonav.agents.unigoal.scene_questions import CorrectionQuestion, LayoutQuestion
 from evonav.decision.query import QuerySession
@@ -29,7 +29,7 @@ def reasoner(model, target="Chair|1", instruction=CHAIR_TEXT, *, nodes=(), relat
 
 
 def node(node_id, caption, x, z):
-    return SceneNode(node_id, caption, (x, 0.4, z), (0.5, 0.8, 0.5), 5)
+    return Node(node_id, caption, (x, 0.4, z), (0.5, 0.8, 0.5), 5)
 
 
 def test_decomposition_is_given_up_after_ten_tries():
@@ -45,7 +45,7 @@ def test_a_new_stage_drops_the_goal_and_keeps_the_scene():
     assert graphs.goal_graph is not None
     graphs.begin_stage(stage_case(2, "Bed|1").public)
     assert (graphs.goal_graph, graphs.subgraphs, graphs.category) == (None, (), None)
-    assert [one.name for one in graphs.scene.nodes] == ["table_1"]
+    assert [name_of(one) for one in graphs.scene.nodes] == ["table_1"]
 
 
 def test_a_partly_found_goal_is_predicted_by_the_transform_of_two_anchors():
@@ -65,7 +65,7 @@ def test_a_goals_noun_is_compared_as_the_word_that_it_goes_under():
     # The chair next to the dining table.
     nodes = [node(1, "table", 2.0, 1.0), node(2, "chair", 2.0, 2.0)]
     advice = reasoner(scripted(), nodes=nodes, relations=[(2, 1, "next to")]).advise(lambda _: False)
-    assert (advice.stage, advice.score, advice.target.name) == ("perfect", 1.0, "chair_2")
+    assert (advice.stage, advice.score, name_of(advice.target)) == ("perfect", 1.0, "chair_2")
 
 
 def perfect(correction):
@@ -84,24 +84,24 @@ def perfect(correction):
 
 def test_a_goal_found_whole_is_corrected_and_gone_to():
     verdicts = "0: keep\n1: keep\n2: delete\n3: rename to near\n4: keep\n5: delete"
-    model, graphs = perfect(lambda q: verdicts if len(q.edges) == 3 else "")
+    model, graphs = perfect(lambda q: verdicts if len(q.relations) == 3 else "")
     advice = graphs.advise(lambda _: False)
     assert (advice.stage, advice.score) == ("zero", 0.25)  # the relation is not the goal's any more
     (correction,) = [question for question in model.questions if isinstance(question, CorrectionQuestion)]
-    assert [n.name for n in correction.nodes] == ["table_1", "chair_2", "plant_3"]  # the television is too far away
-    assert [n.name for n in graphs.scene.nodes] == ["table_1", "chair_2", "tv_4"]
-    assert [(e.subject_id, e.object_id, e.relation) for e in graphs.scene.edges] == [(2, 1, "near"), (2, 4, "under")]
+    assert [name_of(n) for n in correction.nodes] == ["table_1", "chair_2", "plant_3"]  # the television is too far away
+    assert [name_of(n) for n in graphs.scene.nodes] == ["table_1", "chair_2", "tv_4"]
+    assert graphs.scene.relations == {(2, 1): "near", (2, 4): "under"}
     model, graphs = perfect("\n".join(f"{i}: keep" for i in range(6)))
     advice = graphs.advise(lambda _: False)
-    assert (advice.stage, advice.score, advice.target.name) == ("perfect", 1.0, "chair_2")
+    assert (advice.stage, advice.score, name_of(advice.target)) == ("perfect", 1.0, "chair_2")
     # What was visited in vain does not match.
-    assert graphs.advise(lambda n: n.id == 2).target is None
+    assert graphs.advise(lambda n: n.entry_id == 2).target is None
 
 
 def test_a_corrected_name_is_not_the_goals_any_more():
     _, graphs = perfect("0: keep\n1: rename to stool\n2: keep\n3: keep\n4: keep\n5: keep")
     assert graphs.advise(lambda _: False).stage == "zero"
-    assert graphs.scene.node(2).caption == "stool"
+    assert graphs.scene.node(2).label == "stool"
 
 
 @pytest.mark.parametrize(("goal_input", "kinds"), [("category", set()), ("image", {DescribeQuestion, ObjectsQuestion})])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
-from evonav.agents.unigoal.object_graph import NodeGroup, SceneEdge, SceneNode, Verdict
+from evonav.agents.unigoal.object_graph import Node
 from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
@@ -33,13 +33,13 @@ GRAPH = GoalGraph(
 
 
 def node(node_id, caption, x=0.0, z=0.0, y=0.4, size=(0.6, 0.8, 0.6)):
-    return SceneNode(node_id, caption, (x, y, z), size, 4)
+    return Node(node_id, caption, (x, y, z), size, 4)
 
 
 CHAIR, TABLE, BED = node(1, "chair"), node(2, "table", 1.0, size=(1.2, 0.8, 0.8)), node(3, "bed", 5.0)
 VASE = node(4, "plant", 1.0, y=0.95, size=(0.2, 0.3, 0.2))
 PAIRS = ((CHAIR, TABLE), (CHAIR, BED), (VASE, TABLE), (TABLE, VASE))
-GROUP = NodeGroup((CHAIR, TABLE))
+GROUP = (CHAIR, TABLE)
 ANCHORS = {"chair": CHAIR, "bed": BED}
 
 ASKED = {
@@ -50,9 +50,9 @@ ASKED = {
     "category": CategoryQuestion(GOAL, TEXT, "chair", CODE_CATEGORIES, may_decline=False),
     "lines": RelationLinesQuestion(GOAL, PAIRS),
     "room": RoomQuestion(GOAL, GRAPH, ("bedroom", "kitchen", "other room")),
-    "score": GroupScoreQuestion(GOAL, GRAPH, GROUP, (), (CHAIR, TABLE, BED)),
+    "score": GroupScoreQuestion(GOAL, GRAPH, GROUP, {}, (CHAIR, TABLE, BED)),
     "layout": LayoutQuestion(GOAL, GRAPH, ANCHORS),
-    "correction": CorrectionQuestion(GOAL, GRAPH, (CHAIR, TABLE), (SceneEdge(1, 2, "on"),)),
+    "correction": CorrectionQuestion(GOAL, GRAPH, (CHAIR, TABLE), {(1, 2): "on"}),
 }
 TWO_PARTS = (
     '{"subgraph_1": {"nodes": ["chair", "bed"], "edges": [["chair", "next to", "bed"]]},'
@@ -107,13 +107,13 @@ def test_as_released_a_goal_may_be_of_six_categories(target, released, published
 
 def test_scene_relations_are_judged_by_boxes():
     assert answer("lines") == ("next to", "away from", "on", "under")
-    assert answer("correction") == (Verdict("keep"), Verdict("keep"), Verdict("rename", "next to"))
+    assert answer("correction") == ("keep", "keep", "rename to next to")
 
 
 def test_rooms_and_groups_are_judged_by_words():
     assert answer("room") == "bedroom"
     with_goal = answer("score")
-    without = TextMatch().answer(GroupScoreQuestion(GOAL, GRAPH, NodeGroup((VASE,)), (), (VASE,))).answer
+    without = TextMatch().answer(GroupScoreQuestion(GOAL, GRAPH, (VASE,), {}, (VASE,))).answer
     assert 0.0 <= without < with_goal <= 1.0
 
 
@@ -202,9 +202,5 @@ def test_answers_against_the_grammar_are_none(name, text):
 
 def test_lines_are_read_in_the_order_of_the_pairs():
     assert ASKED["lines"].parse(LINES) == ("next to", "far from", "on", "under")
-    assert ASKED["correction"].parse("0: keep\n1: rename to Desk\n2: delete") == (
-        Verdict("keep"),
-        Verdict("rename", "desk"),
-        Verdict("delete"),
-    )
+    assert ASKED["correction"].parse("0: keep\n1: Rename to Desk.\n2: delete") == ("keep", "rename to desk", "delete")
     assert ASKED["layout"].parse("chair: (0, 0)\nbed: (-1.5, 2)\ndining table: (.5, 1.)")["bed"] == (-1.5, 2.0)

@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from evonav.agents.agent import AgentAction, EntryBelief, Move, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explanation import Explanation, FrontierBelief, MapBelief
 from evonav.agents.unigoal.bev import BevConfig, BevMap, Cells
-from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
+from evonav.agents.unigoal.goals import GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
-from evonav.agents.unigoal.object_graph import SceneNode
+from evonav.agents.unigoal.object_graph import Node
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
 from evonav.decision.goal_input import goal_as_given
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.rules import TextMatch
-from evonav.memory.occupancy import BLOCKED, FREE
-from evonav.points import Point2
+from evonav.records import Point2
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
@@ -43,7 +42,6 @@ class UniGoalConfig:
     graph: GraphConfig = field(default_factory=GraphConfig)
     bev: BevConfig = field(default_factory=BevConfig)
     planner: PlannerConfig = field(default_factory=PlannerConfig)
-    goal: GoalConfig = field(default_factory=GoalConfig)
     num_tries: int = 3
     """Number of tries before a question counts as failed, where UniGoal has no rule of its own."""
 
@@ -111,7 +109,7 @@ class UniGoal:
             self._planner = UniGoalPlanner(self._bev, self._task.seed, self.config.planner)
         if self._watch is None:
             self._planner.begin_stage()
-            self._watch = GoalWatch(self._bev, self._planner, self.config.goal)
+            self._watch = GoalWatch(self._bev, self._planner)
         return self._bev, self._planner, self._watch
 
     def _step(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> PlannedStep:
@@ -140,7 +138,7 @@ class UniGoal:
             self._num_explored = 0
             self._advice = advice = self._graphs.advise(self._is_given_up)
             if advice.target is not None:
-                watch.pursue(advice.target.id, self._cells_of(bev, advice.target))
+                watch.pursue(advice.target.entry_id, self._cells_of(bev, advice.target))
             num_targets = planner.counters["targets"]
             planner.exploration_target(pose, advice.mid_term_m)
             is_new = planner.counters["targets"] > num_targets
@@ -164,13 +162,13 @@ class UniGoal:
                 return place_m
         return None
 
-    def _cells_of(self, bev: BevMap, node: SceneNode) -> Cells:
+    def _cells_of(self, bev: BevMap, node: Node) -> Cells:
         """Return the cells under a node's points."""
-        points_m = self._graphs.scene.objects.points_m(node.id)
+        points_m = self._graphs.scene.objects.points_m(node.entry_id)
         at_m = np.array([node.ground_m]) if points_m is None else points_m[:, [0, 2]].astype(np.float64)
         return np.unique(bev.map_frame.cells_at(at_m).astype(np.int32), axis=0)
 
-    def _is_given_up(self, node: SceneNode) -> bool:
+    def _is_given_up(self, node: Node) -> bool:
         """Return whether all of a node lies where the goal was searched in vain."""
         assert self._bev is not None, "there is a map whenever goals are matched"
         if not self._planner.num_blacklisted:
@@ -198,7 +196,7 @@ class UniGoal:
                 **planner.counters,
                 "given_up": watch.num_given_up,
                 "blacklisted_cells": planner.num_blacklisted,
-                "edges": len(self._graphs.scene.edges),
+                "edges": len(self._graphs.scene.relations),
             },
             details=details,
         )
@@ -222,9 +220,9 @@ class UniGoal:
         cells, frame = _coarser(self._bev.cells, self._bev.map_frame, _BELIEF_STRIDE)
         return MapBelief(cells, frame, [] if target_m is None else [FrontierBelief(0, target_m, 0.0)])
 
-    def _entry(self, node: SceneNode) -> EntryBelief:
-        kind = self._graphs.scene.type_of(node.id)
-        return EntryBelief(node.id, kind, node.centre_m, node.size_m, node.num_detections)
+    def _entry(self, node: Node) -> EntryBelief:
+        kind = self._graphs.scene.type_of(node.entry_id)
+        return EntryBelief(node.entry_id, kind, node.centre_m, node.size_m, node.num_detections)
 
 
 def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[NDArray[np.uint8], MapFrame]:
@@ -236,7 +234,6 @@ def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[ND
     padded = np.zeros((rows * stride, cols * stride), np.uint8)
     part = cells[low[0] : low[0] + rows * stride, low[1] : low[1] + cols * stride]
     padded[: part.shape[0], : part.shape[1]] = part
-    blocks = padded.reshape(rows, stride, cols, stride)
-    coarse = np.where((blocks == BLOCKED).any(axis=(1, 3)), BLOCKED, (blocks == FREE).any(axis=(1, 3)) * FREE)
+    coarse = padded.reshape(rows, stride, cols, stride).max(axis=(1, 3))  # blocked is more than free, free than unknown
     corner_m = (frame.corner_m[0] + int(low[1]) * frame.cell_m, frame.corner_m[1] + int(low[0]) * frame.cell_m)
-    return coarse.astype(np.uint8), MapFrame(rows, cols, frame.cell_m * stride, corner_m)
+    return coarse, MapFrame(rows, cols, frame.cell_m * stride, corner_m)

@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.agents.unigoal.object_graph import SceneEdge, SceneNode
-from evonav.points import Point2
+from evonav.agents.unigoal.object_graph import Node, Relations, name_of
+from evonav.records import Point2
 
 MatchMode = Literal["code", "paper"]
 """The names of scene nodes that are compared with a goal's words.
@@ -62,23 +62,19 @@ def relation_kind(relation: str) -> str:
     return " ".join(tokens)
 
 
-def is_edge_in(goal: GoalEdge, subject_id: int, object_id: int, edges: Mapping[tuple[int, int], str]) -> bool:
+def is_edge_in(goal: GoalEdge, subject_id: int, object_id: int, relations: Relations) -> bool:
     """Return whether the scene relates two nodes as the goal does, in either direction (`on` is `under` mirrored)."""
     wanted = relation_kind(goal.relation)
-    forward = edges.get((subject_id, object_id))
+    forward = relations.get((subject_id, object_id))
     if forward is not None and relation_kind(forward) == wanted:
         return True
-    backward = edges.get((object_id, subject_id))
+    backward = relations.get((object_id, subject_id))
     mirrored = {"on": "under", "under": "on"}.get(wanted, wanted)
     return backward is not None and relation_kind(backward) == mirrored
 
 
 def match_graphs(
-    goal: GoalGraph,
-    nodes: Sequence[SceneNode],
-    edges: Sequence[SceneEdge],
-    mode: MatchMode,
-    spell: Callable[[str], str],
+    goal: GoalGraph, nodes: Sequence[Node], relations: Relations, mode: MatchMode, spell: Callable[[str], str]
 ) -> Match:
     """Score how well the scene graph matches a goal graph.
 
@@ -92,13 +88,12 @@ def match_graphs(
         spell: Returns one spelling for a word, such as `sofa` for "couch".
     """
     spelt = {word: spell(word) for word in goal.nodes}
-    relation_of = {(edge.subject_id, edge.object_id): edge.relation for edge in edges}
-    by_name: dict[str, list[SceneNode]] = {}
+    by_name: dict[str, list[Node]] = {}
     for node in nodes:
-        name = node.name if mode == "code" else spell(node.caption)
+        name = name_of(node) if mode == "code" else spell(node.label)
         by_name.setdefault(name, []).append(node)
-    anchors = _assigned(goal, {word: by_name.get(name, []) for word, name in spelt.items()}, relation_of)
-    found = [edge for edge in goal.edges if _holds(edge, anchors, relation_of)]
+    anchors = _assigned(goal, {word: by_name.get(name, []) for word, name in spelt.items()}, relations)
+    found = [edge for edge in goal.edges if _holds(edge, anchors, relations)]
     edge_similarity = len(found) / len(goal.edges) if goal.edges else 1.0
     agreements = []
     for word in anchors:
@@ -109,34 +104,35 @@ def match_graphs(
     return Match(((share + agreement) / 2.0 + edge_similarity) / 2.0, anchors)
 
 
-def _holds(edge: GoalEdge, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> bool:
+def _holds(edge: GoalEdge, anchors: Mapping[str, int], relations: Relations) -> bool:
     subject, other = anchors.get(edge.subject), anchors.get(edge.object)
     return subject is not None and other is not None and is_edge_in(edge, subject, other, relations)
 
 
-def _assigned(
-    goal: GoalGraph, candidates: Mapping[str, Sequence[SceneNode]], relations: Mapping[tuple[int, int], str]
-) -> dict[str, int]:
+def _assigned(goal: GoalGraph, candidates: Mapping[str, Sequence[Node]], relations: Relations) -> dict[str, int]:
     """Assign scene nodes to goal nodes: around each candidate of the first one, those that satisfy most edges."""
     found = [word for word in goal.nodes if candidates[word]]
     best: tuple[tuple[int, int, int], dict[str, int]] | None = None
     for first in candidates[found[0]] if found else ():
-        anchors = {found[0]: first.id}
+        anchors = {found[0]: first.entry_id}
         for word in found[1:]:
-            free = [node for node in candidates[word] if node.id not in anchors.values()]
+            free = [node for node in candidates[word] if node.entry_id not in anchors.values()]
             costs = [
-                (-_num_matched(goal, {**anchors, word: node.id}, relations), math.dist(node.ground_m, first.ground_m))
-                for node in free
+                (
+                    -_num_matched(goal, {**anchors, word: one.entry_id}, relations),
+                    math.dist(one.ground_m, first.ground_m),
+                )
+                for one in free
             ]
             if free:
-                anchors[word] = free[costs.index(min(costs))].id
-        key = (_num_matched(goal, anchors, relations), first.num_detections, -first.id)
+                anchors[word] = free[costs.index(min(costs))].entry_id
+        key = (_num_matched(goal, anchors, relations), first.num_detections, -first.entry_id)
         if best is None or key > best[0]:
             best = (key, anchors)
     return {} if best is None else best[1]
 
 
-def _num_matched(goal: GoalGraph, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> int:
+def _num_matched(goal: GoalGraph, anchors: Mapping[str, int], relations: Relations) -> int:
     return sum(_holds(edge, anchors, relations) for edge in goal.edges)
 
 

@@ -13,17 +13,12 @@ from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE
 from evonav.world.pose import Pose
 
-
-@dataclass(frozen=True, slots=True)
-class GoalConfig:
-    """UniGoal's constants."""
-
-    confirm_m: float = 0.15
-    """A temporary goal is confirmed when the path to it, grown as the planner does, is shorter than this."""
-    redetect_m: float = 1.0
-    """Nearer than this the goal has to be in view, or its place is abandoned."""
-    same_place_m: float = 0.25
-    """Detections with cells this near each other are of the same object."""
+CONFIRM_M = 0.15
+"""A temporary goal is confirmed when the path to it, grown as the planner does, is shorter than this."""
+REDETECT_M = 1.0
+"""Nearer than this the goal has to be in view, or its place is abandoned."""
+SAME_PLACE_M = 0.25
+"""Detections with cells this near each other are of the same object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +36,7 @@ class Glimpse:
 class GoalWatch:
     """Temporary goal and confirmed goal of one stage; the planner stores the abandoned places."""
 
-    def __init__(self, bev: BevMap, planner: UniGoalPlanner, config: GoalConfig) -> None:
-        self.config = config
+    def __init__(self, bev: BevMap, planner: UniGoalPlanner) -> None:
         self.temporary: Glimpse | None = None
         self.confirmed: Glimpse | None = None
         self.num_given_up = 0
@@ -77,7 +71,7 @@ class GoalWatch:
         present = self.temporary
         if present is None or present.source == "graph" or not self._has_way:
             return True
-        around = self._bev.core.grown(present.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
+        around = self._bev.core.grown(present.cells, round(SAME_PLACE_M / self._bev.map_frame.cell_m))
         cols = self._bev.map_frame.cols
         return bool(np.isin(found.cells @ (cols, 1), around @ (cols, 1)).any())
 
@@ -105,7 +99,7 @@ class GoalWatch:
         if goal is None or self.confirmed is not None:
             return
         straight_m = self._straight_m(pose, goal)
-        if not self.is_in_view and straight_m <= self.config.redetect_m:
+        if not self.is_in_view and straight_m <= REDETECT_M:
             self._planner.blacklist(goal.cells)
             self.num_given_up += 1
             self.temporary = None
@@ -114,7 +108,7 @@ class GoalWatch:
         self._has_way = way_m is not None
         is_long = way_m is None or way_m > self._planner.config.detour_ratio * straight_m
         is_behind = is_long and straight_m < self._planner.config.detour_straight_m
-        if is_behind or (way_m is not None and way_m < self.config.confirm_m):
+        if is_behind or (way_m is not None and way_m < CONFIRM_M):
             self.confirmed, self.temporary = goal, None
 
     def _straight_m(self, pose: Pose, goal: Glimpse) -> float:

@@ -1,11 +1,11 @@
 """UniGoal's reasoning: read the goal, relate the scene, match both graphs, and find where they point."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.unigoal.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
-from evonav.agents.unigoal.object_graph import NodeGroup, ObjectGraph, ObjectGraphConfig, SceneNode
+from evonav.agents.unigoal.object_graph import Node, ObjectGraph, inside, middle_of, name_of
 from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
@@ -14,6 +14,7 @@ from evonav.agents.unigoal.questions import (
     ObjectsQuestion,
 )
 from evonav.agents.unigoal.scene_questions import (
+    RENAME,
     CorrectionQuestion,
     GroupScoreQuestion,
     LayoutQuestion,
@@ -53,7 +54,6 @@ class GraphConfig:
     """`code`: as released, six categories and names that never match; `paper`: as published, all mapped categories."""
     goal_input: Literal["text", "category", "image"] = "text"
     """Source of the goal graph: the unified instruction (the paper's setting), the category, or the image."""
-    scene: ObjectGraphConfig = field(default_factory=ObjectGraphConfig)
     steps_per_update: int = 2
     """Number of steps between two updates of the scene graph."""
     partial_score: float = 0.5
@@ -80,7 +80,7 @@ class Advice:
     """Number of goal nodes found in the scene."""
     mid_term_m: Point2 | None = None
     """`(x, z)` that attracts exploration a little."""
-    target: SceneNode | None = None
+    target: Node | None = None
     """The node to go to: the goal, completely matched."""
     reason: str = ""
 
@@ -90,7 +90,7 @@ class GraphReasoner:
 
     def __init__(self, config: GraphConfig, queries: QuerySession) -> None:
         self.config = config
-        self.scene = ObjectGraph(config.scene)
+        self.scene = ObjectGraph()
         self.goal_graph: GoalGraph | None = None
         self.subgraphs: tuple[GoalGraph, ...] = ()
         self.category: str | None = None
@@ -141,7 +141,7 @@ class GraphReasoner:
         if pairs:
             self.scene.relate(pairs, self._queries.ask(RelationLinesQuestion(self._goal, pairs), 1))
 
-    def advise(self, is_given_up: Callable[[SceneNode], bool]) -> Advice:
+    def advise(self, is_given_up: Callable[[Node], bool]) -> Advice:
         """Match the first subgraph with the scene; as released, the other subgraphs are never used.
 
         Args:
@@ -161,12 +161,12 @@ class GraphReasoner:
         group = self._best_group()
         if group is None:
             return Advice("zero", match.score, num, reason="no group fits")
-        names = ", ".join(node.name for node in group.nodes)
-        return Advice("zero", match.score, num, mid_term_m=group.centre_m, reason=f"by {names}")
+        names = ", ".join(map(name_of, group))
+        return Advice("zero", match.score, num, mid_term_m=middle_of(group), reason=f"by {names}")
 
-    def _match(self, is_given_up: Callable[[SceneNode], bool]) -> Match:
+    def _match(self, is_given_up: Callable[[Node], bool]) -> Match:
         nodes = [node for node in self.scene.nodes if not is_given_up(node)]
-        return match_graphs(self.subgraphs[0], nodes, self.scene.edges, self.config.mode, scene_word)
+        return match_graphs(self.subgraphs[0], nodes, self.scene.relations, self.config.mode, scene_word)
 
     def _is_perfect(self, match: Match) -> bool:
         """Return whether the graph is matched, its target included; released code also needs fewer than two anchors."""
@@ -178,19 +178,20 @@ class GraphReasoner:
         """Keep, rename or delete nodes and edges around the match, as the model answers."""
         config, scene = self.config, self.scene
         nodes = scene.neighbourhood(tuple(match.anchors.values()), config.correction_hops, config.correction_reach_m)
-        ids = {node.id for node in nodes}
-        edges = [edge for edge in scene.edges if {edge.subject_id, edge.object_id} <= ids]
-        verdicts = self._queries.ask(CorrectionQuestion(self._goal, self.subgraphs[0], nodes, edges))
+        relations = inside(scene.relations, nodes)
+        verdicts = self._queries.ask(CorrectionQuestion(self._goal, self.subgraphs[0], nodes, relations))
         if verdicts is None:
             return
-        for edge, verdict in zip(edges, verdicts[len(nodes) :], strict=True):
-            if verdict.action != "keep":
-                scene.set_relation(edge, verdict.word if verdict.action == "rename" else None)
+        for pair, verdict in zip(relations, verdicts[len(nodes) :], strict=True):
+            if verdict == "delete":
+                del scene.relations[pair]
+            elif verdict != "keep":
+                scene.relations[pair] = verdict.removeprefix(RENAME)
         for node, verdict in zip(nodes, verdicts, strict=False):
-            if verdict.action == "delete":
-                scene.delete(node.id)
-            elif verdict.action == "rename":
-                scene.rename(node.id, verdict.word)
+            if verdict == "delete":
+                scene.delete(node.entry_id)
+            elif verdict != "keep":
+                scene.rename(node.entry_id, verdict.removeprefix(RENAME))
 
     def _predicted(self, match: Match) -> Point2 | None:
         """Return the mean place of the unmatched goal nodes, computed from the first two matched ones.
@@ -212,7 +213,7 @@ class GraphReasoner:
             return ends[0]
         return (sum(x for x, _ in found) / len(found), sum(z for _, z in found) / len(found))
 
-    def _best_group(self) -> NodeGroup | None:
+    def _best_group(self) -> list[Node] | None:
         """Return the likeliest group of the likeliest room; `None` if no group is likely at all."""
         groups = self.scene.groups(self._room_of())
         if not groups:
@@ -220,24 +221,22 @@ class GraphReasoner:
         goal, subgraph = self._goal, self.subgraphs[0]
         rooms = tuple(sorted(groups))
         room = self._queries.ask(RoomQuestion(goal, subgraph, rooms)) or rooms[0]
-        nodes, edges = self.scene.nodes, self.scene.edges
-        best: tuple[float, NodeGroup] | None = None
+        nodes = self.scene.nodes
+        best: tuple[float, list[Node]] | None = None
         for group in groups[room]:
-            ids = {node.id for node in group.nodes}
-            inside = [edge for edge in edges if {edge.subject_id, edge.object_id} <= ids]
-            score = self._queries.ask(GroupScoreQuestion(goal, subgraph, group, inside, nodes), 1) or 0.0
+            question = GroupScoreQuestion(goal, subgraph, group, inside(self.scene.relations, group), nodes)
+            score = self._queries.ask(question, 1) or 0.0
             if score > (0.0 if best is None else best[0]):
                 best = (score, group)
         return None if best is None else best[1]
 
-    def _room_of(self) -> Callable[[SceneNode], str]:
+    def _room_of(self) -> Callable[[Node], str]:
         """Return a function that gives a node's room: as published, by nearby objects; as released, always room 0."""
         if self.config.mode == "code":
             return lambda _: ROOM_ZERO
-        around = [node.candidate for node in self.scene.nodes]
 
-        def room_of(node: SceneNode) -> str:
-            room = self._matcher.room_around(node.ground_m, around)
+        def room_of(node: Node) -> str:
+            room = self._matcher.room_around(node.ground_m, self.scene.nodes)
             return room if room in ROOMS else ELSEWHERE
 
         return room_of

@@ -6,13 +6,12 @@ alone: no box can tell what a node is, or whether it is there.
 
 import math
 import re
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 from evonav.agents.unigoal.goal_graph import GoalGraph, relation_kind
-from evonav.agents.unigoal.object_graph import NodeGroup, SceneEdge, SceneNode, Verdict
+from evonav.agents.unigoal.object_graph import Node, Relations, middle_of, name_of
 from evonav.agents.unigoal.questions import parse_relation, relation_line
 from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
@@ -24,11 +23,11 @@ from evonav.tasks.public import Goal
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _PLACE = re.compile(rf"(.+?): \(({_NUMBER}), ({_NUMBER})\)\.?")
 _VERDICT = re.compile(r"(keep|delete|rename to ([a-z][a-z -]*))\.?", re.IGNORECASE)
+RENAME = "rename to "
+"""Beginning of a verdict that has another word."""
 _APART = "away from"
 _BESIDE_M = 0.7
 """Distance of the layout between an object and one next to it."""
-
-A = TypeVar("A")
 
 
 def describe_graph(graph: GoalGraph) -> str:
@@ -37,71 +36,55 @@ def describe_graph(graph: GoalGraph) -> str:
     return f"objects [{', '.join(graph.nodes)}]" + (f", relations: {relations}" if relations else "")
 
 
-class LinesQuestion(Question[A]):
-    """A question that is answered by one line for each of a number of things, in their order."""
+def lines_for(things: Sequence[object], noun: str, text: str) -> list[str]:
+    """Return the lines of an answer that has one for each of some things, which `noun` names; else `AnswerError`."""
+    lines = lines_of(text)
+    if len(lines) != len(things):
+        raise AnswerError("invalid", f"{len(lines)} lines for {len(things)} {noun}", text)
+    return lines
 
-    things: ClassVar[str]
-    """A noun for the things, for errors."""
 
-    @property
-    @abstractmethod
-    def num_lines(self) -> int:
-        """Number of lines of an answer."""
-
-    @abstractmethod
-    def parse_lines(self, lines: Sequence[str], text: str) -> A:
-        """Parse as many lines as there are things; `text` is the whole answer, for errors."""
-
-    def parse(self, text: str) -> A:
-        """Read one line for each thing."""
-        lines = lines_of(text)
-        if len(lines) != self.num_lines:
-            raise AnswerError("invalid", f"{len(lines)} lines for {self.num_lines} {self.things}", text)
-        return self.parse_lines(lines, text)
-
-    def answer_schema(self) -> Mapping[str, Any]:
-        """Return the schema of an array with a line for each thing."""
-        num = self.num_lines
-        return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
+def lines_schema(num: int) -> Mapping[str, Any]:
+    """Return the schema of an array of `num` lines."""
+    return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
 
 @dataclass(frozen=True, slots=True)
-class RelationLinesQuestion(LinesQuestion[tuple[str, ...]]):
+class RelationLinesQuestion(Question[tuple[str, ...]]):
     """Ask for the relations of new nodes of the scene graph to the others, in one call for all pairs."""
 
     kind: ClassVar[str] = "scene-relations"
-    things: ClassVar[str] = "pairs"
     goal: Goal
-    pairs: Sequence[tuple[SceneNode, SceneNode]]
-
-    @property
-    def num_lines(self) -> int:
-        """Number of pairs."""
-        return len(self.pairs)
+    pairs: Sequence[tuple[Node, Node]]
 
     def prompt(self) -> Prompt:
         """Show the pairs by name; the model is shown no image, as in the original."""
-        pairs = "\n".join(f"{a.name} and {b.name}" for a, b in self.pairs)
+        pairs = "\n".join(f"{name_of(a)} and {name_of(b)}" for a, b in self.pairs)
         return Prompt.of(
             f"These are pairs of objects in a home:\n{pairs}\nHow do they most likely stand to each other? Answer "
             f"with exactly {len(self.pairs)} lines, one a pair in the same order, exactly of the form\n"
             'A and B: A is <relation> B\nsuch as "mug_1 and table_2: mug_1 is on table_2".',
         )
 
-    def parse_lines(self, lines: Sequence[str], text: str) -> tuple[str, ...]:
+    def parse(self, text: str) -> tuple[str, ...]:
         """Read `A and B: A is <relation> B` for each pair."""
         relations = []
-        for line, (a, b) in zip(lines, self.pairs, strict=True):
+        for line, pair in zip(lines_for(self.pairs, "pairs", text), self.pairs, strict=True):
+            a, b = map(name_of, pair)
             read = parse_relation(line)
-            if read is None or (read[0], read[2]) != (a.name, b.name):
-                raise AnswerError("invalid", f"no relation of {a.name} to {b.name}: {line[:80]!r}", text)
+            if read is None or (read[0], read[2]) != (a, b):
+                raise AnswerError("invalid", f"no relation of {a} to {b}: {line[:80]!r}", text)
             relations.append(read[1])
         return tuple(relations)
 
     def answer_text(self, answer: tuple[str, ...]) -> str:
         """Return one line a pair."""
-        named = [(a.name, b.name, relation) for (a, b), relation in zip(self.pairs, answer, strict=True)]
+        named = [(name_of(a), name_of(b), relation) for (a, b), relation in zip(self.pairs, answer, strict=True)]
         return "\n".join(relation_line(a, b, a, relation, b) for a, b, relation in named)
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """Return the schema of a line for each pair."""
+        return lines_schema(len(self.pairs))
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
         """Relate nodes by their boxes: on, under, next to, or apart."""
@@ -154,19 +137,18 @@ class GroupScoreQuestion(Question[float]):
     kind: ClassVar[str] = "group-score"
     goal: Goal
     subgraph: GoalGraph
-    group: NodeGroup
-    edges: Sequence[SceneEdge]
-    """Edges within the group."""
-    nodes: Sequence[SceneNode]
+    group: Sequence[Node]
+    relations: Relations
+    """Relations within the group."""
+    nodes: Sequence[Node]
     """All nodes, for rules that judge by surroundings. Not part of the prompt."""
 
     def prompt(self) -> Prompt:
         """Show the goal's subgraph, and the group."""
-        name = {node.id: node.name for node in self.group.nodes}
-        relations = [f"{name[e.subject_id]} is {e.relation} {name[e.object_id]}" for e in self.edges]
+        relations = _sentences(self.group, self.relations)
         return Prompt.of(
             f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}.\nIt knows a group of "
-            f"objects that stand together: [{', '.join(name.values())}]"
+            f"objects that stand together: [{', '.join(map(name_of, self.group))}]"
             + (f", relations: {'; '.join(relations)}" if relations else "")
             + ".\nHow likely is it to find the goal near this group? Answer on the first line with exactly one "
             "number from 0 to 1.",
@@ -195,28 +177,21 @@ class GroupScoreQuestion(Question[float]):
     def by_rule(self, matcher: Matcher) -> tuple[float, str]:
         """Score how well the best member's caption fits the goal, with a bonus for the right room."""
         goal = matcher.parsed(self.goal)
-        score = max(matcher.label_score(goal, node.caption) for node in self.group.nodes)
+        score = max(matcher.label_score(goal, node.label) for node in self.group)
         if goal.room is not None:
-            around = [node.candidate for node in self.nodes]
-            score += 0.2 * float(matcher.room_around(self.group.centre_m, around) == goal.room)
+            score += 0.2 * float(matcher.room_around(middle_of(self.group), self.nodes) == goal.room)
         return round(min(1.0, score), 3), "words compared"
 
 
 @dataclass(frozen=True, slots=True)
-class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
+class LayoutQuestion(Question[Mapping[str, Point2]]):
     """Ask how the goal's objects lie to each other, seen from above."""
 
     kind: ClassVar[str] = "layout"
-    things: ClassVar[str] = "objects"
     goal: Goal
     subgraph: GoalGraph
-    anchors: Mapping[str, SceneNode]
+    anchors: Mapping[str, Node]
     """Goal nodes that the scene graph has. Their places are not part of the prompt."""
-
-    @property
-    def num_lines(self) -> int:
-        """Number of the goal's objects."""
-        return len(self.subgraph.nodes)
 
     def prompt(self) -> Prompt:
         """Show the goal's subgraph; the first two anchors fix scale and direction."""
@@ -227,10 +202,11 @@ class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
             f"No two of [{', '.join(self.anchors)}] may be at the same place.",
         )
 
-    def parse_lines(self, lines: Sequence[str], text: str) -> Mapping[str, Point2]:
+    def parse(self, text: str) -> Mapping[str, Point2]:
         """Read `object: (x, y)` for each object; no two anchors may be at the same place."""
         places: dict[str, Point2] = {}
-        for line, word in zip(lines, self.subgraph.nodes, strict=True):
+        words = self.subgraph.nodes
+        for line, word in zip(lines_for(words, "objects", text), words, strict=True):
             match = _PLACE.fullmatch(line)
             if match is None or match[1].lower() != word:
                 raise AnswerError("invalid", f"no place of {word}: {line[:80]!r}", text)
@@ -243,6 +219,10 @@ class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
     def answer_text(self, answer: Mapping[str, Point2]) -> str:
         """Return one line an object."""
         return "\n".join(f"{word}: ({answer[word][0]:.3f}, {answer[word][1]:.3f})" for word in self.subgraph.nodes)
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """Return the schema of a line for each object."""
+        return lines_schema(len(self.subgraph.nodes))
 
     def by_rule(self, matcher: Matcher) -> tuple[Mapping[str, Point2], str]:
         """Place anchors where they are, objects on them there, and objects next to them a step towards the others."""
@@ -263,30 +243,20 @@ class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
 
 
 @dataclass(frozen=True, slots=True)
-class CorrectionQuestion(LinesQuestion[tuple[Verdict, ...]]):
-    """Ask which parts of the scene graph around the goal are right."""
+class CorrectionQuestion(Question[tuple[str, ...]]):
+    """Ask which parts of the scene graph around the goal are right: `keep`, `delete` or `rename to <word>`."""
 
     kind: ClassVar[str] = "correction"
-    things: ClassVar[str] = "nodes and edges"
     goal: Goal
     subgraph: GoalGraph
-    nodes: Sequence[SceneNode]
+    nodes: Sequence[Node]
     """Nodes within two hops of the match."""
-    edges: Sequence[SceneEdge]
-    """Edges between the nodes."""
-
-    @property
-    def num_lines(self) -> int:
-        """Number of nodes and edges."""
-        return len(self.nodes) + len(self.edges)
+    relations: Relations
+    """Relations between the nodes."""
 
     def prompt(self) -> Prompt:
         """Show nodes and edges, numbered."""
-        name = {node.id: node.name for node in self.nodes}
-        things = [
-            *(node.name for node in self.nodes),
-            *(f"{name[e.subject_id]} is {e.relation} {name[e.object_id]}" for e in self.edges),
-        ]
+        things = [*map(name_of, self.nodes), *_sentences(self.nodes, self.relations)]
         listed = "\n".join(f"{index}: {thing}" for index, thing in enumerate(things))
         return Prompt.of(
             f"A robot looks for {describe_graph(self.subgraph)}. It has found this, objects first, then "
@@ -295,37 +265,43 @@ class CorrectionQuestion(LinesQuestion[tuple[Verdict, ...]]):
             "relation: what it is).",
         )
 
-    def parse_lines(self, lines: Sequence[str], text: str) -> tuple[Verdict, ...]:
+    def parse(self, text: str) -> tuple[str, ...]:
         """Read `<number>: keep | delete | rename to <word>`, a line for each node, then for each edge."""
         verdicts = []
-        for index, line in enumerate(lines):
+        for index, line in enumerate(lines_for([*self.nodes, *self.relations], "nodes and edges", text)):
             number, _, decision = line.partition(":")
             match = _VERDICT.fullmatch(decision.strip())
             if number.strip() != str(index) or match is None:
                 raise AnswerError("invalid", f"no verdict on {index}: {line[:80]!r}", text)
-            if match[2] is not None:
-                verdicts.append(Verdict("rename", match[2].strip().lower()))
-            else:
-                verdicts.append(Verdict("delete" if match[1].lower() == "delete" else "keep"))
+            verdicts.append(match[1].strip().lower())
         return tuple(verdicts)
 
-    def answer_text(self, answer: tuple[Verdict, ...]) -> str:
+    def answer_text(self, answer: tuple[str, ...]) -> str:
         """Return one line a verdict."""
         return "\n".join(f"{index}: {verdict}" for index, verdict in enumerate(answer))
 
-    def by_rule(self, matcher: Matcher) -> tuple[tuple[Verdict, ...], str]:
+    def answer_schema(self) -> Mapping[str, Any]:
+        """Return the schema of a line for each node and each edge."""
+        return lines_schema(len(self.nodes) + len(self.relations))
+
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
         """Judge relations as boxes have them now: boxes grow after an edge was made."""
-        node_of = {node.id: node for node in self.nodes}
-        verdicts = [Verdict("keep")] * len(self.nodes)
-        for edge in self.edges:
-            relation = _relation(matcher, node_of[edge.subject_id], node_of[edge.object_id])
-            verdicts.append(Verdict("keep") if relation == edge.relation else Verdict("rename", relation))
+        node_of = {node.entry_id: node for node in self.nodes}
+        verdicts = ["keep"] * len(self.nodes)
+        for (a, b), known in self.relations.items():
+            relation = _relation(matcher, node_of[a], node_of[b])
+            verdicts.append("keep" if relation == known else f"{RENAME}{relation}")
         return tuple(verdicts), "judged by boxes"
 
 
-def _relation(matcher: Matcher, node: SceneNode, other: SceneNode) -> str:
+def _sentences(nodes: Sequence[Node], relations: Relations) -> list[str]:
+    """Return each relation in words."""
+    name = {node.entry_id: name_of(node) for node in nodes}
+    return [f"{name[a]} is {relation} {name[b]}" for (a, b), relation in relations.items()]
+
+
+def _relation(matcher: Matcher, a: Node, b: Node) -> str:
     """Return how a node stands to another, by their boxes."""
-    a, b = node.candidate, other.candidate
     apart_m = gap_m(a, b)
     if apart_m > matcher.config.near_m:
         return _APART
