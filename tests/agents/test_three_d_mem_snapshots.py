@@ -3,7 +3,7 @@
 import math
 from types import SimpleNamespace
 
-from evonav.agents.three_d_mem.memory import SnapshotMemory
+from evonav.agents.three_d_mem.agent import SnapshotMemory
 from evonav.memory.views import Seen, StoredView, ViewStore
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -25,16 +25,16 @@ def found(memory):
 
 
 def test_views_without_an_entry_are_no_frames():
-    views, memory = ViewStore(), SnapshotMemory()
+    views, memory = ViewStore(), SnapshotMemory(4.0)
     look(views, None)
     look(views)
     look(views, 1, None, 2)
     memory.update(views, entries(1, 2), (0.0, 0.0))
-    assert (found(memory), memory.num_frames) == ({2: {1, 2}}, 1)
+    assert (found(memory), len(memory._frames)) == ({2: {1, 2}}, 1)
 
 
 def test_a_later_view_of_more_entries_takes_over_near_ones():
-    views, memory = ViewStore(), SnapshotMemory()
+    views, memory = ViewStore(), SnapshotMemory(4.0)
     look(views, 1)
     memory.update(views, entries(1, 2), (0.0, 0.0))
     look(views, 1, 2)
@@ -43,7 +43,7 @@ def test_a_later_view_of_more_entries_takes_over_near_ones():
 
 
 def test_far_entries_stay_in_their_snapshot():
-    views, memory = ViewStore(), SnapshotMemory()
+    views, memory = ViewStore(), SnapshotMemory(4.0)
     look(views, 1)
     memory.update(views, entries(1), (0.0, 0.0))
     look(views, 1, 2)
@@ -54,29 +54,29 @@ def test_far_entries_stay_in_their_snapshot():
 
 
 def test_frames_follow_an_entry_that_became_another():
-    views, memory = ViewStore(), SnapshotMemory()
+    views, memory = ViewStore(), SnapshotMemory(4.0)
     look(views, 1, 2)
     look(views, 3)
     memory.update(views, entries(1, 2, 3), (0.0, 0.0))
     views.follow([(3, 1)])
     memory.update(views, entries(1, 2), (0.0, 0.0))
-    assert (found(memory), memory.num_frames) == ({0: {1, 2}}, 2)
+    assert (found(memory), len(memory._frames)) == ({0: {1, 2}}, 2)
     # All three views show what is now entry 2.
     views.follow([(1, 2)])
     look(views, 2, 4)
     memory.update(views, entries(2, 4), (0.0, 0.0))
-    assert (found(memory), memory.num_frames) == ({2: {2, 4}}, 3)
+    assert (found(memory), len(memory._frames)) == ({2: {2, 4}}, 3)
 
 
 def test_frames_and_snapshots_of_vanished_entries_go():
-    views, memory = ViewStore(), SnapshotMemory()
+    views, memory = ViewStore(), SnapshotMemory(4.0)
     look(views, 1, 2)
     look(views, 3)
     memory.update(views, entries(1, 2, 3), (0.0, 0.0))
     memory.update(views, entries(1), (0.0, 90.0))
-    assert (found(memory), memory.num_frames) == ({0: {1}}, 1)
+    assert (found(memory), len(memory._frames)) == ({0: {1}}, 1)
     memory.update(views, [], (0.0, 0.0))
-    assert (found(memory), memory.num_frames) == ({}, 0)
+    assert (found(memory), len(memory._frames)) == ({}, 0)
     look(views, 5)
     memory.update(views, entries(5), (0.0, 0.0))
     assert found(memory) == {2: {5}}

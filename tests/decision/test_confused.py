@@ -10,7 +10,7 @@ import pytest
 from test_noisy import Letter
 
 from evonav.agents.frontier_update.questions import ChooseQuestion
-from evonav.agents.msgnav.candidates import GraphChoice, GraphObject, PastChoice
+from evonav.agents.msgnav.memory import GraphChoice, GraphObject, PastChoice
 from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.three_d_mem.questions import SnapshotCandidate, SnapshotChoice, SnapshotQuestion
 from evonav.component import Component

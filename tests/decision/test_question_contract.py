@@ -55,9 +55,8 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Ques
         backend=Backend(decision=Component(f"{__name__}:Collecting")),
         protocol=ProtocolConfig(max_rounds=9, max_actions=60),
     )
-    with bundled_tasks() as directory:
-        agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:unigoal_as_published"]
-        evaluate(agents, task_files(directory, 1), folder, config=config, num_workers=0)
+    agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:unigoal_as_published"]
+    evaluate(agents, task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=0)
     with RunStore(folder) as store:
         assert [record.error for record in store.records() if record.error] == []
     return ASKED

@@ -94,7 +94,7 @@ print(*(f"{name}={type(new_agent(agent_factory(name))).__name__}" for name in fo
     made = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=variables)
     agents = dict(pair.split("=") for pair in made.stdout.split())
     assert len(agents) == 20
-    assert agents["3d-mem+"] == "three_d_mem_plus"
+    assert agents["3d-mem+"] == "ThreeDMem"
     assert agents["pro-without-rooms"] == "Proactive"
     listed = evonav("agents", PYTHONPATH=str(site)).stdout
     assert "plug-in: evonav_studies.relook:FailThenUpdateRelook" in listed

@@ -77,11 +77,10 @@ def test_an_agent_is_evaluated_with_the_model_and_replayed(base_url: str, tmp_pa
 
 def test_each_kind_of_question_is_answered(base_url: str, tmp_path: Path) -> None:
     script = ROOT / "scripts" / "studies" / "measure_llm.py"
-    with bundled_tasks() as folder:
-        options = ["--tasks", folder, "--num-tasks", "1", "--limit", "2", "--stride", "3", "--base-url", base_url]
-        agents = ["--agent", "3d-mem,msgnav,evonav_studies.variants:unigoal_as_published", "--out", tmp_path]
-        variables = {**os.environ, "PYTHONPATH": str(ROOT / "examples" / "studies" / "src")}
-        subprocess.run([sys.executable, script, *options, *agents], check=True, cwd=ROOT, env=variables)
+    options = ["--tasks", BUNDLED_TASKS, "--num-tasks", "1", "--limit", "2", "--stride", "3", "--base-url", base_url]
+    agents = ["--agent", "3d-mem,msgnav,evonav_studies.variants:unigoal_as_published", "--out", tmp_path]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT / "examples" / "studies" / "src")}
+    subprocess.run([sys.executable, script, *options, *agents], check=True, cwd=ROOT, env=variables)
     rows = read_log(tmp_path / "answers.jsonl")
     assert {row["kind"] for row in rows} >= KINDS
     valid = {row["kind"] for row in rows if not row["fault"]}

@@ -3,50 +3,39 @@
 import math
 import random
 
-from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
+from evonav.agents.agent import Agent, AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explanation import Explanation
 from evonav.agents.explorer import Explorer, nearest_frontier
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 
+TURN_PROBABILITY = 0.25
+"""Probability that `RandomWalk` turns although the way is free."""
 
-class StayStill:
+
+class StayStill(Agent):
     """Stops at once. It succeeds where the last stage has ended within the success radius of the next target."""
 
     sensors = SensorConfig(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
-
-    def begin_task(self, task: TaskInfo) -> None:
-        """Do nothing: there is nothing to forget."""
-
-    def begin_stage(self, goal: Goal) -> None:
-        """Ignore the goal."""
 
     def act(self, observation: Observation) -> AgentAction:
         """Stop."""
         return Stop("stays")
 
 
-class RandomWalk:
+class RandomWalk(Agent):
     """Goes straight on, or in a new direction now and then and whenever the way was blocked."""
 
-    sensors = SensorConfig(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
-
-    def __init__(self, turn_probability: float = 0.25) -> None:
-        self._turn_probability = turn_probability
-        self._random = random.Random(0)  # noqa: S311 - not for secrets
-        self._heading_rad = 0.0
+    sensors = StayStill.sensors
 
     def begin_task(self, task: TaskInfo) -> None:
         """Start the task's own random stream."""
-        self._random = random.Random(f"random-walk {task.seed}")  # noqa: S311
+        self._random = random.Random(f"random-walk {task.seed}")  # noqa: S311 - not for secrets
         self._heading_rad = self._random.uniform(-math.pi, math.pi)
-
-    def begin_stage(self, goal: Goal) -> None:
-        """Ignore the goal."""
 
     def act(self, observation: Observation) -> AgentAction:
         """Go one metre further."""
-        if not observation.is_action_success or self._random.random() < self._turn_probability:
+        if not observation.is_action_success or self._random.random() < TURN_PROBABILITY:
             self._heading_rad = self._random.uniform(-math.pi, math.pi)
         pose = observation.pose
         reach_m = self.sensors.max_travel_m
@@ -55,30 +44,23 @@ class RandomWalk:
         )
 
 
-class NearestFrontier:
+class NearestFrontier(Agent):
     """Explores the nearest frontier first and recognises nothing: the search half of an oracle baseline.
 
     Each stage starts with a blank map: what was seen on the way to another goal was not looked at for this one.
     """
 
-    def __init__(self) -> None:
-        self.sensors = SensorConfig()
-        self._explorer: Explorer | None = None
-        self._choice = ""
-
     def begin_task(self, task: TaskInfo) -> None:
         """Start with a blank map."""
-        self._explorer = Explorer(task.map_frame)
+        self._explorer, self._choice = Explorer(task.map_frame), ""
 
     def begin_stage(self, goal: Goal) -> None:
         """Start with a blank map."""
-        if self._explorer is not None:
-            self._explorer.clear()
+        self._explorer.clear()
 
     def act(self, observation: Observation) -> AgentAction:
         """Go towards the nearest frontier."""
         explorer = self._explorer
-        assert explorer is not None, "begin_task comes first"
         explorer.observe(observation)
         here = (observation.pose.x_m, observation.pose.z_m)
         frontier = nearest_frontier(explorer.frontiers, here)
@@ -91,11 +73,9 @@ class NearestFrontier:
 
     def explain(self) -> Explanation:
         """Return the choice and the counters of the last round; the agent remembers no objects."""
-        explorer = self._explorer
-        if explorer is None:
-            return Explanation()
+        counters = self._explorer.counters
         return Explanation(
             choice=self._choice,
-            num_frontiers=len(explorer.frontiers),
-            counters={name: explorer.counters[name] for name in ("conflicts", "cells_cleared")},
+            num_frontiers=len(self._explorer.frontiers),
+            counters={name: counters[name] for name in ("conflicts", "cells_cleared")},
         )

@@ -4,7 +4,6 @@ import inspect
 import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points
-from typing import Any
 
 from evonav.agents.agent import Agent
 from evonav.component import import_callable
@@ -145,22 +144,21 @@ def _forgetful(name: str, rule: str) -> Callable[..., Agent]:
 
 def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = None) -> Agent:
     """Make an agent; a factory with a parameter `decision` is given the run's model."""
-    try:
-        takes_decision = "decision" in inspect.signature(factory).parameters
-    except (TypeError, ValueError):  # builtins and some extension types tell nothing
-        takes_decision = False
-    options: dict[str, Any] = {"decision": decision} if takes_decision and decision is not None else {}
-    return factory(**options)
+    takes_decision = any(parameter.name == "decision" for parameter in _parameters(factory))
+    return factory(decision=decision) if takes_decision and decision is not None else factory()
 
 
 def needed_arguments(factory: Callable[..., Agent]) -> list[str]:
     """Return the arguments without which an agent cannot be made, other than `decision`."""
+    named = [p for p in _parameters(factory) if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    return [p.name for p in named if p.default is p.empty and p.name != "decision"]
+
+
+def _parameters(factory: Callable[..., Agent]) -> list[inspect.Parameter]:
     try:
-        parameters = inspect.signature(factory).parameters.values()
+        return list(inspect.signature(factory).parameters.values())
     except (TypeError, ValueError):  # builtins and some extension types tell nothing
         return []
-    named = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-    return [p.name for p in named if p.default is p.empty and p.name != "decision"]
 
 
 def agent_descriptions() -> dict[str, str]:

@@ -111,6 +111,14 @@ class ClosedQuestion(Question[A]):
     def choices(self) -> Sequence[A]:
         """Return all valid answers, in a fixed order."""
 
+    def parse(self, text: str) -> A:
+        """Read a first line that spells one of the choices, in any case, with spaces or a final dot or colon."""
+        line = first_line(text)
+        for choice in self.choices():
+            if _spelling(self.answer_text(choice)) == _spelling(line):
+                return choice
+        raise AnswerError("invalid", f"none of the possible answers: {line[:80]!r}", text)
+
     def answer_schema(self) -> Mapping[str, Any]:
         """Return the schema of one of the choices."""
         return {"type": "string", "enum": [self.answer_text(choice) for choice in self.choices()]}
@@ -224,6 +232,10 @@ class Metered(ModelWrapper):
             "num_questions": self._num_questions,
             **self.model.costs(),
         }
+
+
+def _spelling(line: str) -> str:
+    return " ".join(line.lower().rstrip(".: ").replace(",", " , ").split())
 
 
 def first_line(text: str) -> str:

@@ -15,7 +15,7 @@ from evonav.decision.pictures import Picture
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
 from evonav.memory.presence import Presence
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.tasks.public import Goal
 from evonav.world.pose import Pose

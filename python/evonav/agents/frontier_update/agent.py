@@ -27,7 +27,7 @@ from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal, TaskInfo
 

@@ -1,6 +1,5 @@
 """Questions of Frontier-Update and its variants (paper, Sec. C.4): the next place, and whether the target is there."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -8,15 +7,13 @@ from typing import ClassVar
 from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
-from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
+from evonav.decision.question import ClosedQuestion, YesNoQuestion
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import best_frontier, choose_candidate
 from evonav.memory.presence import DepthEvidence, Presence, judge_presence
 from evonav.points import Point2
 from evonav.tasks.public import Goal
-
-_CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +51,6 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             f"There are {len(self.objects)} objects and {len(self.frontiers)} frontiers. Answer on the first line "
             'with exactly "Object i" or "Frontier i", and give your reason on the second.',
         )
-
-    def parse(self, text: str) -> Choice:
-        """Read `Object i` or `Frontier i`, in any case, with an index of the list."""
-        line = first_line(text)
-        match = _CHOICE.fullmatch(line)
-        if match is None:
-            raise AnswerError("invalid", f"neither `Object i` nor `Frontier i`: {line[:80]!r}", text)
-        choice = Choice("object" if match[1].lower() == "object" else "frontier", int(match[2]))
-        if choice not in self.choices():
-            raise AnswerError("invalid", f"there is no {line[:80]}", text)
-        return choice
 
     def answer_text(self, answer: Choice) -> str:
         """Return `Object i` or `Frontier i`."""

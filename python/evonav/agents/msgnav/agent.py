@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from evonav.agents.agent import AgentAction, NavigateTo, SensorConfig, Stop, ViewSchedule
 from evonav.agents.explorer import AS_THREE_D_MEM, ExplorerConfig
-from evonav.agents.msgnav.candidates import GraphObject, PastChoice
-from evonav.agents.msgnav.memory import GraphMemory
+from evonav.agents.msgnav.memory import GraphMemory, GraphObject, PastChoice
 from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
 from evonav.agents.msgnav.scene_graph import Subgraph
-from evonav.agents.msgnav.viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
+from evonav.agents.msgnav.viewpoint import Viewpoint, visible_viewpoint
 from evonav.agents.navigator import NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import ObjectCandidate
@@ -45,7 +44,6 @@ class MsgNavConfig:
     """Entries seen together have an edge up to this distance."""
     max_selected: int = 20
     """Largest number of objects in a key subgraph selection."""
-    viewpoint: ViewpointConfig = field(default_factory=ViewpointConfig)
     has_fixed_viewpoint: bool = True
     """The place to stand stays as it was when the target was chosen, as in the original.
 
@@ -247,9 +245,7 @@ class MsgNav(NavigatorAgent):
         """Return the place from which most of a target can be seen."""
         navigator = self._navigator
         occupancy = navigator.explorer.map
-        return visible_viewpoint(
-            navigator.objects, points_m, occupancy.cells == FREE, occupancy.map_frame, here, self.config.viewpoint
-        )
+        return visible_viewpoint(navigator.objects, points_m, occupancy.cells == FREE, occupancy.map_frame, here)
 
     def _approach_target(self, target: MsgNavTarget, reason: str = "") -> AgentAction:
         """Commit to a target and continue towards it; the heading on arrival is the direction of travel."""

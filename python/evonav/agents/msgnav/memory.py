@@ -1,25 +1,92 @@
-"""MSGNav's memory beyond the shared one, and the parts of questions made from it."""
+"""MSGNav's memory beyond the shared one, the parts of questions made from it, and the choices among them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.msgnav.candidates import GraphImage, GraphObject, SeenObject
 from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.navigator import Navigator
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.pictures import picture_of
+from evonav.decision.pictures import Picture, picture_of
 from evonav.decision.text.language import canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.clouds import ViewClouds, clouds_of
 from evonav.memory.views import StoredView
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 
 _MIN_SIMILARITY = 0.4
 """Smallest similarity at which a word may name a label, as for `Matcher.label_score`."""
 OTHER_ROOM = "others"
 """The room of entries whose surroundings point to no type of room, named as by the original's classifier."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphObject:
+    """A node of the scene graph."""
+
+    candidate: ObjectCandidate
+    room: str
+    """The type of room; `others` if it is unknown."""
+    neighbour_ids: tuple[int, ...] = ()
+    """Ids of entries that are one edge away, ascending."""
+
+    @property
+    def entry_id(self) -> int:
+        """The id in the object memory."""
+        return self.candidate.entry_id
+
+
+@dataclass(frozen=True, slots=True)
+class SeenObject:
+    """A detection of an image."""
+
+    label: str
+    entry_id: int | None
+    """The entry that it belongs to; `None` if it belongs to none, such as a distant object."""
+    area_px: int
+    centre_m: Point2 | None
+    """`(x, z)`; `None` if it has no depth."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphImage:
+    """A stored view: one of the graph's edges, or one of this round."""
+
+    view_id: int
+    is_egocentric: bool
+    """True if the view is of this round."""
+    seen: Sequence[SeenObject]
+    """Detections, for models that do not look at images. Not part of the prompt."""
+    picture: Picture | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class PastChoice:
+    """A choice of an earlier round of this stage that did not lead to the goal."""
+
+    round: int
+    kind: Literal["object", "image", "explore"]
+    id: int = -1
+    """Id of the entry or of the view."""
+    category: str = ""
+    """The category that the image was said to show."""
+    place_m: Point2 | None = None
+    """`(x, z)` of the object that was not the goal. Not part of the prompt."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphChoice:
+    """An object of the graph, something in an image, or neither."""
+
+    kind: Literal["object", "image", "explore"]
+    id: int = -1
+    """Id of the entry, or number of the image."""
+    category: str = ""
+    """The category to go to in the image."""
 
 
 class GraphMemory:

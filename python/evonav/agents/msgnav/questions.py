@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
+from evonav.agents.msgnav.memory import GraphChoice, GraphImage, GraphObject, PastChoice
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, goal_prompt
@@ -28,7 +28,6 @@ _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)
 _OBJECT = re.compile(r"object\s+(\d+)[.]?", re.IGNORECASE)
 _IMAGE = re.compile(r"image\s+(\d+)\s*,\s*([^,.;:\n]*[^\s,.;:])[.]?", re.IGNORECASE)
 _EXPLORE = re.compile(r"continue\s+exploration[.]?", re.IGNORECASE)
-_FRONTIER = re.compile(r"frontier\s+(\d+)[.]?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,14 +288,6 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
             "Behind which one is the goal most likely found? Answer on the first line with exactly "
             '"Frontier i", and give your reason on the second.',
         )
-
-    def parse(self, text: str) -> int:
-        """Read `Frontier i`, with a frontier of the list."""
-        line = first_line(text)
-        match = _FRONTIER.fullmatch(line)
-        if match is None or int(match[1]) >= len(self.frontiers):
-            raise AnswerError("invalid", f"no frontier of the list: {line[:80]!r}", text)
-        return int(match[1])
 
     def answer_text(self, answer: int) -> str:
         """Return `Frontier i`."""

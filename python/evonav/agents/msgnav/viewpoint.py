@@ -1,28 +1,22 @@
 """Find where to stand so that remembered points show most of an object (MSGNav's viewpoint decision)."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.memory.objects import ObjectMap, SightConfig
+from evonav.memory.objects import ObjectMap
 from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
-
-@dataclass(frozen=True, slots=True)
-class ViewpointConfig:
-    """MSGNav's constants."""
-
-    num_candidates: int = 20
-    """Number of places to try, evenly spaced on a circle around the mean of the object's points."""
-    radius_m: float = 0.75
-    """Radius of that circle."""
-    eye_height_m: float = 1.5
-    """Height of the eye over the floor."""
-    sight: SightConfig = field(default_factory=SightConfig)
+NUM_CANDIDATES = 20
+"""Number of places to try, evenly spaced on a circle around the mean of the object's points (MSGNav)."""
+RADIUS_M = 0.75
+"""Radius of that circle."""
+EYE_HEIGHT_M = 1.5
+"""Height of the eye over the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +36,6 @@ def visible_viewpoint(
     is_free: NDArray[np.bool_],
     frame: MapFrame,
     here_m: Point2,
-    config: ViewpointConfig | None = None,
 ) -> Viewpoint:
     """Return the place that shows most of an object, the first of equals.
 
@@ -55,17 +48,15 @@ def visible_viewpoint(
         target_m: `(N, 3)` points of the object, at least one.
         is_free: `(R, C)`, cells known to be free.
         here_m: `(x, z)` of the agent.
-        config: MSGNav's constants.
     """
-    config = config or ViewpointConfig()
     mean_m = target_m.mean(axis=0, dtype=np.float64)
-    angles_rad = np.arange(config.num_candidates) * (math.tau / config.num_candidates)
+    angles_rad = np.arange(NUM_CANDIDATES) * (math.tau / NUM_CANDIDATES)
     offsets = np.stack([np.sin(angles_rad), np.cos(angles_rad)], axis=1)
-    circle_m = mean_m[[0, 2]] + config.radius_m * offsets
-    best = _best(objects, target_m, circle_m[_are_free(circle_m, is_free, frame)], config)
+    circle_m = mean_m[[0, 2]] + RADIUS_M * offsets
+    best = _best(objects, target_m, circle_m[_are_free(circle_m, is_free, frame)])
     if best is not None:
         return Viewpoint(*best, "circle")
-    best = _best(objects, target_m, _snapped(circle_m, is_free, frame), config)
+    best = _best(objects, target_m, _snapped(circle_m, is_free, frame))
     if best is not None:
         return Viewpoint(*best, "snapped")
     low, high = target_m.min(axis=0).astype(np.float64), target_m.max(axis=0).astype(np.float64)
@@ -76,13 +67,13 @@ def visible_viewpoint(
 
 
 def _best(
-    objects: ObjectMap, target_m: NDArray[np.float32], places_m: NDArray[np.float64], config: ViewpointConfig
+    objects: ObjectMap, target_m: NDArray[np.float32], places_m: NDArray[np.float64]
 ) -> tuple[Point2, float] | None:
     """Return the first of the places that show most; `None` if none shows anything."""
     if len(places_m) == 0:
         return None
-    eyes_m = np.insert(places_m, 1, config.eye_height_m, axis=1)
-    shares = objects.visible_shares(target_m, eyes_m, config.sight)
+    eyes_m = np.insert(places_m, 1, EYE_HEIGHT_M, axis=1)
+    shares = objects.visible_shares(target_m, eyes_m)
     index = int(shares.argmax())
     if shares[index] <= 0.0:
         return None

@@ -11,7 +11,7 @@ from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.presence import NUM_SECTORS
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, View
 from evonav.world.camera import thinned, unproject
 

@@ -19,7 +19,7 @@ from evonav.decision.home_statistics import PER_100_M2, UNKNOWN_PER_100_M2, room
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame
 
 MIN_MASK_SHARE = 0.001

@@ -13,7 +13,7 @@ from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.maps import shown_from
 from evonav.agents.proactive.posterior import Posterior, Surroundings
 from evonav.memory.occupancy import OccupancyMap
-from evonav.records import Point2
+from evonav.points import Point2
 
 SAME_PLACE_M = 0.75
 """Two rounds' options of one kind are the same if their places are this near: frontiers change with what is seen."""

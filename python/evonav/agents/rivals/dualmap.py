@@ -14,7 +14,7 @@ from evonav.agents.rivals.relatedness import Feature, Relatedness
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.home_statistics import is_furniture
 from evonav.memory.objects import ObjectEntry
-from evonav.records import Point3
+from evonav.points import Point3
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import Goal
 

@@ -11,7 +11,7 @@ from evonav.agents.frontier_update.agent import FrontierUpdateConfig
 from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
 from evonav.agents.rivals.exploration import OwnExploration, Place
 from evonav.memory.occupancy import BLOCKED, FREE, OccupancyMap
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.tasks.public import Goal
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, NavigateTo
 from evonav.agents.frontier_update.agent import FrontierUpdate
+from evonav.agents.rivals.relatedness import Relatedness
 from evonav.decision.candidates import FrontierCandidate
 from evonav.memory import Frontier
 from evonav.points import Point2
@@ -42,6 +43,11 @@ class OwnExploration(FrontierUpdate):
 
     _place: Place | None = None
     """The place that the last question offered."""
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Act as Frontier-Update does, with what labels have to do with the goal at hand."""
+        self._related = Relatedness(self._matcher, self._matcher.parsed(self._goal), self._goal_feature(observation))
+        return super().act(observation)
 
     @abstractmethod
     def _place_to_explore(self, observation: Observation) -> Place | None:

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdateConfig
 from evonav.agents.grid import numbered
 from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
 from evonav.agents.rivals.exploration import SAME_M, OwnExploration, Place, Pursuit
 from evonav.agents.rivals.relatedness import Feature, Relatedness
 from evonav.memory import Frontier
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.tasks.public import Goal
 from evonav.world.camera import thinned, unproject
@@ -191,11 +190,6 @@ class OneMap(OwnExploration):
         self._pursuit = Pursuit()
         self._looked_at: list[Point2] = []
         """Clusters of this stage that the agent went to see."""
-
-    def act(self, observation: Observation) -> AgentAction:
-        """Look, take in what cells show, and act as Frontier-Update does."""
-        self._related = Relatedness(self._matcher, self._matcher.parsed(self._goal), self._goal_feature(observation))
-        return super().act(observation)
 
     def _after_look(self, observation: Observation) -> None:
         place = self._place

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import AgentAction
 from evonav.agents.frontier_update.agent import FrontierUpdateConfig
 from evonav.agents.navigator import WITH_FALLBACK, Navigator, NavigatorConfig
 from evonav.agents.rivals.exploration import OwnExploration, Place, Pursuit
-from evonav.agents.rivals.relatedness import Relatedness
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.tasks.public import Goal
 
@@ -87,11 +85,6 @@ class Vlfm(OwnExploration):
         super().begin_stage(goal)
         self._cones = ConeMap(self._task.map_frame, self.config)
         self._pursuit = Pursuit()
-
-    def act(self, observation: Observation) -> AgentAction:
-        """Look, value what is seen, and act as Frontier-Update does."""
-        self._related = Relatedness(self._matcher, self._matcher.parsed(self._goal), self._goal_feature(observation))
-        return super().act(observation)
 
     def _places(self) -> list[Place]:
         values, radius_m = self._cones.values, self.config.value_radius_m

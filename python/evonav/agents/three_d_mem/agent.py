@@ -1,19 +1,22 @@
 """3D-Mem (paper, Sec. C.3): choose from snapshots and frontiers by a decision model, and trust the memory."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from evonav import _core
 from evonav.agents.agent import AgentAction
 from evonav.agents.explorer import AS_THREE_D_MEM
 from evonav.agents.navigator import NavigationTarget, NavigatorConfig
 from evonav.agents.navigator_agent import NavigatorAgent
-from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.pictures import crop_of, picture_of
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.language import is_structure
+from evonav.memory.objects import ObjectEntry
+from evonav.memory.views import StoredView, ViewStore
+from evonav.points import Point2
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 
@@ -30,10 +33,76 @@ class ThreeDMemConfig:
     navigator: NavigatorConfig = field(default_factory=lambda: NavigatorConfig(explorer=AS_THREE_D_MEM))
     max_classes: int = 10
     """Largest number of classes that pass the prefilter."""
-    recluster_reach_m: float = RECLUSTER_REACH_M
-    """Entries nearer than this are clustered again in each round."""
+    recluster_reach_m: float = 4.0
+    """Entries nearer to the agent than this are clustered again in each round: its 3.5 m of detections and 0.5 m."""
     num_tries: int = 3
     """Number of tries before a question without a valid answer counts as failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """A view, and the entries that it represents."""
+
+    view: StoredView
+    entry_ids: tuple[int, ...]
+    """Ids of the entries, at least one; all are seen in the view."""
+
+
+class SnapshotMemory:
+    """Keeps each entry in exactly one snapshot, whose view shows it.
+
+    Frames (views with their detections) and snapshots follow entries that merge or vanish.
+    """
+
+    def __init__(self, reach_m: float) -> None:
+        """Create a memory that clusters entries nearer to the agent than `reach_m` again at each update."""
+        self.reach_m = reach_m
+        self.snapshots: list[Snapshot] = []
+        """Snapshots by ascending id of their views."""
+        self._frames: dict[int, dict[int, float]] = {}
+        """Confidences of the remembered entries that each view shows, by ids, for views that show one."""
+        self._num_views = 0
+
+    def update(self, views: ViewStore, entries: Sequence[ObjectEntry], agent_m: Point2) -> None:
+        """Add the views that came since the last update, and cluster the entries that are new or near the agent.
+
+        Args:
+            views: The view store, the same at each call.
+        """
+        self._add_frames(views, {entry.id for entry in entries})
+        frame_of_view = {view_id: index for index, view_id in enumerate(self._frames)}
+        before = [
+            (frame_of_view[snapshot.view.id], list(snapshot.entry_ids))
+            for snapshot in self.snapshots
+            if snapshot.view.id in frame_of_view
+        ]
+        after = _core.update_snapshots(
+            [(entry.id, (entry.centre_m[0], entry.centre_m[2])) for entry in entries],
+            [list(frame.items()) for frame in self._frames.values()],
+            before,
+            agent_m=agent_m,
+            reach_m=self.reach_m,
+        )
+        view_ids = list(self._frames)
+        self.snapshots = [Snapshot(views.views[view_ids[frame]], tuple(entry_ids)) for frame, entry_ids in after]
+
+    def _add_frames(self, views: ViewStore, remembered: set[int]) -> None:
+        """Make frames of new views, and drop forgotten entries from all frames."""
+        for view in views.views[self._num_views :]:
+            self._frames[view.id] = {}
+            for seen in view.seen:
+                if seen.entry_id is not None:
+                    _note(self._frames[view.id], views.resolve(seen.entry_id), seen.confidence)
+        self._num_views = len(views.views)
+        for view_id, frame in list(self._frames.items()):
+            if not frame.keys() <= remembered:
+                renamed: dict[int, float] = {}
+                for entry_id, confidence in frame.items():
+                    _note(renamed, views.resolve(entry_id), confidence)
+                frame = {entry_id: confidence for entry_id, confidence in renamed.items() if entry_id in remembered}
+                self._frames[view_id] = frame
+            if not frame:
+                del self._frames[view_id]
 
 
 class ThreeDMem(NavigatorAgent):
@@ -147,3 +216,8 @@ class ThreeDMem(NavigatorAgent):
             "num_snapshots": len(self._snapshots.snapshots),
             **super()._round_details(reason),
         }
+
+
+def _note(frame: dict[int, float], entry_id: int, confidence: float) -> None:
+    """Store a detection's confidence; of several detections of an entry the largest counts."""
+    frame[entry_id] = max(confidence, frame.get(entry_id, confidence))

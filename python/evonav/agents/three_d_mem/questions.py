@@ -1,6 +1,5 @@
 """Questions of 3D-Mem (paper, Sec. C.3): the classes that matter, then a snapshot's object or a frontier to go to."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -14,8 +13,6 @@ from evonav.decision.text.ranking import best_frontier, choose_candidate, rank_e
 from evonav.points import Point2
 from evonav.tasks.public import Goal
 
-_OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
-_FRONTIER = re.compile(r"frontier\s+(\d+)\b[.:]?", re.IGNORECASE)
 _NONE = "none"
 
 
@@ -131,20 +128,6 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             f"Snapshots: {len(self.snapshots)}, frontiers: {len(self.frontiers)}. Answer on the first "
             'line with exactly "Snapshot i, Object j" or "Frontier i", and give your reason on the next.',
         )
-
-    def parse(self, text: str) -> SnapshotChoice:
-        """Read `Snapshot i, Object j` or `Frontier i`, in any case, with indices of the question."""
-        line = first_line(text)
-        if (found := _OBJECT.fullmatch(line)) is not None:
-            choice = SnapshotChoice(int(found[1]), int(found[2]))
-        elif (found := _FRONTIER.fullmatch(line)) is not None:
-            choice = SnapshotChoice(None, int(found[1]))
-        else:
-            message = f"neither `Snapshot i, Object j` nor `Frontier i`: {line[:80]!r}"
-            raise AnswerError("invalid", message, text)
-        if choice not in self.choices():
-            raise AnswerError("invalid", f"there is no {line[:80]}", text)
-        return choice
 
     def answer_text(self, answer: SnapshotChoice) -> str:
         """Return `Snapshot i, Object j` or `Frontier i`."""

@@ -22,7 +22,7 @@ from evonav.decision.goal_input import goal_as_given
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.rules import TextMatch
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.unigoal.object_graph import Node, Relations, name_of
-from evonav.records import Point2
+from evonav.points import Point2
 
 MatchMode = Literal["code", "paper"]
 """The names of scene nodes that are compared with a goal's words.

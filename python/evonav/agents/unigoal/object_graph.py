@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from evonav.decision.candidates import ObjectCandidate
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
-from evonav.records import Point2
+from evonav.points import Point2
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import LABEL_TRANSLATION, relabelled
 

@@ -278,13 +278,6 @@ class CategoryQuestion(ClosedQuestion[str]):
             f"{form}",
         )
 
-    def parse(self, text: str) -> str:
-        """Read one of the categories, or `none` where the question allows it."""
-        line = first_line(text).rstrip(".").lower()
-        if line not in self.choices():
-            raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
-        return line
-
     def choices(self) -> Sequence[str]:
         """Return the categories, and `none` where it is allowed."""
         return (*self.categories, NO_CATEGORY) if self.may_decline else self.categories
