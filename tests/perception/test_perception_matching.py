@@ -96,8 +96,6 @@ def test_pairs_worked_out_by_hand():
     assert by_label.ious.tolist() == pytest.approx([0.8, 0, 1.0, 0, 0.75])
     by_place = match(ious, found.confidences, truth.num_wanted)
     assert by_place.object_of.tolist() == [0, 1, IGNORED, NONE, IGNORED]
-    strict = match(ious, found.confidences, truth.num_wanted, limit=0.81)
-    assert strict.object_of.tolist() == [NONE, 1, IGNORED, NONE, NONE]
     assert main_objects(truth, found).tolist() == [1, 3, 4, NONE, 2]
 
 
@@ -107,8 +105,6 @@ def test_the_surer_of_two_halves_gets_the_object():
     for found, expected in ((detections(*halves), [NONE, 0]), (detections(*halves[::-1]), [0, NONE])):
         ious = intersections_over_union(truth, found)
         assert match(ious, found.confidences, truth.num_wanted).object_of.tolist() == expected
-    with pytest.raises(InvalidArgumentError, match="limit"):
-        match(ious, found.confidences, truth.num_wanted, limit=0.0)
 
 
 def test_views_without_objects_or_detections():

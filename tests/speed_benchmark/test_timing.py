@@ -8,7 +8,7 @@ import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.speed_benchmark.records import Row, Speeds, read_speeds, write_speeds
-from evonav.speed_benchmark.run import Timing, against, changes, markdown_of, run_section, speed_table, table_of
+from evonav.speed_benchmark.run import against, markdown_of, run_section, speed_table, table_of
 from evonav.speed_benchmark.timing import MODULES, Sampling, compare, one_core, rows_of
 
 HOUSES = [f"house {number // 4}" for number in range(12)]
@@ -132,8 +132,12 @@ def test_on_another_machine_only_ratios_are_compared():
 
 def test_a_change_must_be_worse_in_houses_than_chance_explains():
     houses = [f"house {number}" for number in range(6)]
-    noisy = Timing(1.4, dict(zip(houses, [0.5, 2.0, 0.4, 3.0, 0.6, 2.5], strict=True)))
-    steady = Timing(1.4, dict.fromkeys(houses, 1.4))
-    before = Timing(1.0, dict.fromkeys(houses, 1.0))
-    verdicts = changes({"noisy": before, "steady": before}, {"noisy": noisy, "steady": steady, "new": steady})
-    assert [(change.name, change.is_worse) for change in verdicts] == [("noisy", False), ("steady", True)]
+
+    def speeds(**by_house_ms):
+        rows = [Row(operation=name, ms=ms, ms_by_house=by_house, n=6) for name, (ms, by_house) in by_house_ms.items()]
+        return run_section(Squares, Sampling()).model_copy(update={"rows": rows})
+
+    noisy = (1.4, dict(zip(houses, [0.5, 2.0, 0.4, 3.0, 0.6, 2.5], strict=True)))
+    steady, before = ((ms, dict.fromkeys(houses, ms)) for ms in (1.4, 1.0))
+    verdicts = against(speeds(noisy=before, steady=before), speeds(noisy=noisy, steady=steady, new=steady))
+    assert [(change.name, change.is_worse) for change in verdicts] == [("noisy, ms", False), ("steady, ms", True)]

@@ -3,6 +3,7 @@
 One job is one perception on one task. Its record does not depend on other jobs, nor on the number of workers.
 """
 
+import gzip
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -14,12 +15,13 @@ from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import EMBEDDED, Backend
-from evonav.parallel.folders import check_same_run, writing
+from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.perception import Percept, Perception, StageScene
 from evonav.perception_benchmark.matching import TrueObjects, true_objects
 from evonav.perception_benchmark.memory import JudgedMemory
 from evonav.perception_benchmark.picture import side_by_side
 from evonav.perception_benchmark.records import (
+    HEADER_NAME,
     NUM_CHECKPOINTS,
     MemoryState,
     PerceptionHeader,
@@ -27,8 +29,6 @@ from evonav.perception_benchmark.records import (
     complete_tasks,
     read_header,
     record_path,
-    write_header,
-    write_record,
 )
 from evonav.perception_benchmark.rows import Matched, Rows, scored_percept
 from evonav.perception_benchmark.tour import tour
@@ -77,16 +77,6 @@ class TourConfig:
                 raise InvalidArgumentError(f"{name} = {value}: must be >= 1")
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredTasks:
-    """Result of a command."""
-
-    tasks: tuple[str, ...]
-    """Tasks that have a record of every perception of the folder."""
-    failures: tuple[tuple[str, str, str], ...]
-    """Perception, task and last line of what went wrong."""
-
-
 def measure(
     specs: Sequence[PerceptionSpec],
     tasks: Sequence[TaskFile],
@@ -96,7 +86,7 @@ def measure(
     simulator: Component[Simulator] = EMBEDDED,
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
-) -> MeasuredTasks:
+) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tour the houses with every perception; called again on the same folder, tour what is missing.
 
     Args:
@@ -107,6 +97,10 @@ def measure(
         simulator: The simulator that draws the views.
         num_workers: 0 runs everything in this process.
         on_progress: Called with records there are, records asked for, and the name of the latest.
+
+    Returns:
+        Tasks that have a record of every perception of the folder; and perception, task and last line of what went
+        wrong.
 
     Raises:
         InvalidArgumentError: There is no perception or task, or a perception is named twice.
@@ -142,10 +136,11 @@ def measure(
             if text is None:
                 failures.append((spec.name, task.task_id, why))
             else:
-                write_record(out, spec.name, task.task_id, text)
+                data = gzip.compress(text.encode(), compresslevel=6, mtime=0)
+                write_atomically(record_path(out, spec.name, task.task_id), data)
             num_done += 1
             on_progress(num_done, num_all, f"{spec.name} {task.task_id}")
-        return MeasuredTasks(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
+        return complete_tasks(out, header), sorted(failures)
 
 
 def _begun(
@@ -188,7 +183,7 @@ def _claim_models(header: PerceptionHeader, specs: Sequence[PerceptionSpec], out
         found = Backend(perception=spec.component).check_perception([AGENT])
         there = header.models.setdefault(spec.name, found)
         check_same_run({spec.name: there}, {spec.name: found}, out)
-    write_header(out, header)
+    write_atomically(out / HEADER_NAME, json.dumps(header.model_dump(), indent=2) + "\n")
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
@@ -228,9 +223,13 @@ def measure_task(
     """
     rows, memory, best = Rows(), JudgedMemory(), _BestView()
     states: list[MemoryState] = []
-    stages, num_views, image_px = _houses(case, config.num_houses), [], 1
+    houses = [stage.house_json for stage in case.stages]
+    changed = [
+        number for number in range(1, len(houses) + 1) if number == 1 or houses[number - 1] != houses[number - 2]
+    ]
+    stages, num_views, image_px = changed[: config.num_houses], [], 1
     for stage in stages:
-        simulator.reset(case.stages[stage - 1].house_json, case.start)
+        simulator.reset(houses[stage - 1], case.start)
         objects = simulator.objects
         places = tour(case, stage, simulator, views_per_room=config.views_per_room, seed=config.seed)
         goal = case.stages[stage - 1].public
@@ -238,7 +237,9 @@ def measure_task(
         memory.begin_stage(stage, objects)
         if states:
             states.append(memory.state(0.0))
-        checkpoints = _checkpoints(len(places))
+        # The places after which the memory is judged, with the share of the tour that is done there.
+        shares = [i / NUM_CHECKPOINTS for i in range(1, NUM_CHECKPOINTS + 1)]
+        checkpoints = {max(1, round(share * len(places))): share for share in shares}
         for number, poses in enumerate(places, start=1):
             frames = [simulator.render(pose, rgb=perception.needs_rgb, instances=True) for pose in poses]
             image_px = frames[0].depth_m.size
@@ -290,19 +291,3 @@ class _BestView:
             simulator.reset(case.stages[0].house_json, case.start)
             self.rgb = simulator.render(self.pose, rgb=True, instances=False).rgb
         return side_by_side(self.rgb, *self.parts)
-
-
-def _houses(case: EpisodeSpec, count: int) -> list[int]:
-    """Return the first stage, and later stages whose house differs from the one before."""
-    found, house = [1], case.stages[0].house_json
-    for number, stage in enumerate(case.stages[1:], start=2):
-        if stage.house_json != house:
-            found.append(number)
-            house = stage.house_json
-    return found[:count]
-
-
-def _checkpoints(num_places: int) -> dict[int, float]:
-    """Return the places after which the memory is judged, with the share of the tour that is done there."""
-    shares = [i / NUM_CHECKPOINTS for i in range(1, NUM_CHECKPOINTS + 1)]
-    return {max(1, round(share * num_places)): share for share in shares}

@@ -139,9 +139,8 @@ def match(
     num_wanted: int,
     *,
     is_allowed: NDArray[np.bool_] | None = None,
-    limit: float = IOU_LIMIT,
 ) -> Matches:
-    """Pair objects and detections.
+    """Pair objects and detections whose IoU is at least `IOU_LIMIT`.
 
     A detection takes a wanted object before an ignored one, whatever their overlaps; an ignored one is never used up.
 
@@ -150,15 +149,9 @@ def match(
         confidences: `(D,)`; of equal ones, the detection that comes first chooses first.
         num_wanted: Objects that count; those behind are ignored.
         is_allowed: `(T, D)` whether a pair may be one, such as by labels; default: all.
-        limit: Least IoU of a pair.
-
-    Raises:
-        InvalidArgumentError: The limit is not over 0 and at most 1.
     """
-    if not 0.0 < limit <= 1.0:
-        raise InvalidArgumentError(f"limit = {limit}: expected an IoU over 0 and at most 1")
     num_true, num_found = ious.shape
-    usable = np.where(ious >= limit, ious, 0.0)
+    usable = np.where(ious >= IOU_LIMIT, ious, 0.0)
     if is_allowed is not None:
         usable = np.where(is_allowed, usable, 0.0)
     detection_of = np.full(num_true, NONE, np.int64)

@@ -9,18 +9,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from evonav.agents.agent import EntryBelief
-from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, matched_objects
+from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, matched_object
 from evonav.memory.objects import ObjectMap
 from evonav.perception import Percept
 from evonav.perception_benchmark.matching import NONE, TrueObjects, main_objects
 from evonav.perception_benchmark.records import MemoryState
-from evonav.sensors.observation import View, VisibleOccupancy
+from evonav.sensors.observation import NO_OCCUPANCY, View
 from evonav.world.simulator import Frame, SceneObject
-
-_NO_CELLS = np.zeros((0, 2), np.int32)
 
 
 @dataclass(slots=True)
@@ -42,7 +37,7 @@ class JudgedMemory:
     def begin_stage(self, stage: int, objects: Sequence[SceneObject]) -> None:
         """Begin another house, with the memory of those before; `objects` are its bodies, in instance order."""
         if self._stage:
-            self._right_before = {belief.entry_id for belief in self._right()}
+            self._right_before = set(self._matched())
         self._objects, self._stage, self._num_views, self._seen = objects, stage, 0, set()
         self._categories.update({body.id: body.category for body in objects})
         self.map.begin_stage(stage)
@@ -54,7 +49,7 @@ class JudgedMemory:
             intrinsics=frame.intrinsics,
             depth_m=percept.depth_m,
             detections=percept.detections,
-            occupancy=VisibleOccupancy(_NO_CELLS, _NO_CELLS),
+            occupancy=NO_OCCUPANCY,
         )
         sources = main_objects(truth, percept.detections).tolist()
         done = self.map.update(view)
@@ -74,36 +69,29 @@ class JudgedMemory:
 
     def state(self, share: float) -> MemoryState:
         """Return the state of the memory now, after a share of the stage's tour."""
-        beliefs = self._beliefs()
-        right = self._right()
-        remembered = {body.id for body in matched_objects(right, self._bodies()) if body is not None}
-        sources = {belief.entry_id: self._source(belief.entry_id) for belief in beliefs}
+        entries, matched = self.map.entries, self._matched()
+        sources = {entry.id: self._source(entry.id) for entry in entries}
         there = {body.id: body for body in self._objects}
         named = [name for name in sources.values() if name]
         errors_m = [
-            math.dist(belief.centre_m, there[name].centre_m)
-            for belief in beliefs
-            if (name := sources[belief.entry_id]) in there and there[name].category == belief.label
+            math.dist(entry.centre_m, there[name].centre_m)
+            for entry in entries
+            if (name := sources[entry.id]) in there and there[name].category == entry.label
         ]
-        rights = {belief.entry_id for belief in right}
-        entry_ids = {belief.entry_id for belief in beliefs}
+        num_wrong = sum(self._categories.get(sources[entry.id], entry.label) != entry.label for entry in entries)
         return MemoryState(
             stage=self._stage,
             num_views=self._num_views,
             share=share,
-            num_entries=len(beliefs),
-            num_right=len(right),
-            num_wrong_label=sum(
-                bool(name) and self._categories[name] != belief.label
-                for belief in beliefs
-                for name in (sources[belief.entry_id],)
-            ),
+            num_entries=len(entries),
+            num_right=len(matched),
+            num_wrong_label=num_wrong,
             num_phantoms=sum(not name for name in sources.values()),
             num_objects=len(set(named)),
             num_surplus=len(named) - len(set(named)),
             num_seen=len(self._seen),
-            num_seen_held=len(self._seen & remembered),
-            num_stale=len((self._right_before & entry_ids) - rights),
+            num_seen_held=len(self._seen & {body.id for body in matched.values()}),
+            num_stale=len((self._right_before & sources.keys()) - matched.keys()),
             error_m=math.fsum(errors_m),
             num_error=len(errors_m),
         )
@@ -113,20 +101,10 @@ class JudgedMemory:
         votes = self._votes.get(entry_id)
         return votes.most_common(1)[0][0] if votes else ""
 
-    def _bodies(self) -> dict[str, list[SceneObject]]:
+    def _matched(self) -> dict[int, SceneObject]:
+        """Return the object of each entry that has one of its label in its place."""
         bodies: dict[str, list[SceneObject]] = {}
         for body in self._objects:
             bodies.setdefault(body.category, []).append(body)
-        return bodies
-
-    def _beliefs(self) -> list[EntryBelief]:
-        return [
-            EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
-            for entry in self.map.entries
-        ]
-
-    def _right(self) -> list[EntryBelief]:
-        """Return the entries that have an object of their label in their place."""
-        beliefs = self._beliefs()
-        matched = matched_objects(beliefs, self._bodies())
-        return [belief for belief, body in zip(beliefs, matched, strict=True) if body is not None]
+        found = {entry.id: matched_object(entry.label, entry.centre_m, bodies) for entry in self.map.entries}
+        return {entry_id: body for entry_id, body in found.items() if body is not None}

@@ -1,7 +1,6 @@
 """Score a perception beyond its detections: confidence, depth, pose, features, and the memory made from it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,12 +15,8 @@ DISTANCES = (*(f"{a}-{b} m" for a, b in pairwise(_STARTS)), f"over {_STARTS[-1]}
 COSINES = ("same_object", "same_category", "other", "text_own", "text_other")
 
 
-@dataclass(frozen=True, slots=True)
-class ScoreGroup:
-    """Objects and detections of one kind."""
-
-    name: str
-    measures: Mapping[str, Estimate]
+Measures = Mapping[str, Estimate]
+"""Estimates by the name of the metric."""
 
 
 def calibration(
@@ -49,36 +44,33 @@ def calibration(
     return {"ece": houses.estimate(value, resampled, num)}, rows
 
 
-def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[ScoreGroup]:
-    """Depth errors over all pixels, then by their true depth."""
+def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Measures]:
+    """Depth errors over all pixels, `all`, then by their true depth."""
     num, lost, relative, square = (
         np.array([getattr(record.depth, name) for record in records], np.float64).reshape(len(records), -1)
         for name in ("num", "num_lost", "relative", "square_m2")
     )
 
-    def group(name: str, columns: Sequence[int]) -> ScoreGroup:
-        all_px, lost_px, relatives, squares = (
-            houses.sums(table[:, columns].sum(axis=1)) for table in (num, lost, relative, square)
-        )
-        with_depth = all_px - lost_px
-        measures = {
-            "depth_relative": houses.ratio(relatives, with_depth, int(with_depth.sum())),
-            "depth_rmse_m": houses.ratio(squares, with_depth, int(with_depth.sum()), np.sqrt),
-            "depth_lost": houses.ratio(lost_px, all_px, int(all_px.sum())),
+    def group(columns: slice) -> Measures:
+        all_px, lost_px, relatives, squares = (table[:, columns].sum(axis=1) for table in (num, lost, relative, square))
+        with_depth = houses.sums(all_px - lost_px)
+        return {
+            "depth_relative": houses.rate(relatives, all_px - lost_px),
+            "depth_rmse_m": houses.ratio(houses.sums(squares), with_depth, int(with_depth.sum()), np.sqrt),
+            "depth_lost": houses.rate(lost_px, all_px),
         }
-        return ScoreGroup(name, measures)
 
-    every = list(range(len(DISTANCES)))
-    return [group("all", every), *(group(name, [i]) for i, name in enumerate(DISTANCES))]
+    return {"all": group(slice(None))} | {name: group(slice(i, i + 1)) for i, name in enumerate(DISTANCES)}
 
 
 def pose(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
     """Return the mean errors of the believed pose."""
-    nums = houses.sums([len(record.pose.offset_m) for record in records])
-    offsets = houses.sums([sum(record.pose.offset_m) for record in records])
-    turns = houses.sums([float(np.degrees(sum(record.pose.turn_rad))) for record in records])
-    num = int(nums.sum())
-    return {"pose_offset_m": houses.ratio(offsets, nums, num), "pose_turn_deg": houses.ratio(turns, nums, num)}
+    nums = [len(record.pose.offset_m) for record in records]
+    turns_deg = [float(np.degrees(sum(record.pose.turn_rad))) for record in records]
+    return {
+        "pose_offset_m": houses.rate([sum(record.pose.offset_m) for record in records], nums),
+        "pose_turn_deg": houses.rate(turns_deg, nums),
+    }
 
 
 def cosines(
@@ -87,19 +79,18 @@ def cosines(
     """Return histograms of cosines, and their means; nothing without features."""
     counts: dict[str, list[int]] = {}
     estimates: dict[str, Estimate] = {}
+    features = [record.features for record in records]
     for name in COSINES:
         table = np.zeros((len(records), NUM_COSINE_BINS))
-        for i, record in enumerate(records):
-            table[i] = getattr(record.features, name) or 0
+        for i, one in enumerate(features):
+            table[i] = getattr(one, name) or 0
         if table.any():
             counts[name] = table.sum(axis=0).astype(np.int64).tolist()
-            nums = houses.sums(table.sum(axis=1))
-            totals = houses.sums([record.features.totals.get(name, 0.0) for record in records])
-            estimates[f"cosine_{name}"] = houses.ratio(totals, nums, int(nums.sum()))
-    nums = houses.sums([record.features.num_texts for record in records])
-    if nums.any():
-        rights = houses.sums([record.features.num_right for record in records])
-        estimates["text_right"] = houses.ratio(rights, nums, int(nums.sum()))
+            estimates[f"cosine_{name}"] = houses.rate(
+                [one.totals.get(name, 0.0) for one in features], table.sum(axis=1)
+            )
+    if any(one.num_texts for one in features):
+        estimates["text_right"] = houses.rate([one.num_right for one in features], [one.num_texts for one in features])
     return counts, estimates
 
 
@@ -127,11 +118,10 @@ def memory_curve(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> lis
 
 def memory_measures(houses: ClusterBootstrap, states: Sequence[MemoryState | None]) -> dict[str, Estimate]:
     """Score the memory at one time, from one state per task."""
-    one = houses.sums([float(state is not None) for state in states])
-    num_tasks = int(one.sum())
+    is_there = [float(state is not None) for state in states]
 
     def per_task(name: str) -> Estimate:
-        return houses.ratio(houses.sums([getattr(s, name) if s else 0.0 for s in states]), one, num_tasks)
+        return houses.rate([getattr(state, name, 0.0) for state in states], is_there)
 
     return {
         "entries": per_task("num_entries"),
@@ -148,9 +138,9 @@ def memory_measures(houses: ClusterBootstrap, states: Sequence[MemoryState | Non
 def _share(
     houses: ClusterBootstrap, states: Sequence[MemoryState | None], name: str, of: Callable[[MemoryState], float]
 ) -> Estimate:
-    bottoms = houses.sums([of(state) if state else 0.0 for state in states])
-    tops = houses.sums([getattr(state, name) if state else 0.0 for state in states])
-    return houses.ratio(tops, bottoms, int(bottoms.sum()))
+    return houses.rate(
+        [getattr(state, name, 0.0) for state in states], [of(state) if state else 0.0 for state in states]
+    )
 
 
 def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
@@ -159,8 +149,3 @@ def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
         return None
     stage = record.stages[house]
     return next((state for state in record.memory if state.stage == stage and state.share == share), None)
-
-
-def measure_values(measures: Mapping[str, Estimate]) -> dict[str, dict[str, object]]:
-    """Return estimates as JSON."""
-    return {name: {"value": found.value, "interval": found.ci95, "n": found.n} for name, found in measures.items()}

@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from evonav.parallel.folders import write_atomically
-from evonav.perception_benchmark.other_scores import measure_values
 from evonav.perception_benchmark.plots import confusion_plots, feature_plots, perception_plots
 from evonav.perception_benchmark.records import read_header, read_records
 from evonav.perception_benchmark.scores import Scores, differences, scores
@@ -15,6 +15,7 @@ from evonav.report.pages.template import page_text, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.style import plot_css
 from evonav.report.tables.table import markdown_tables
+from evonav.statistics import Estimate
 
 REPORT_NAME = "report.html"
 
@@ -51,39 +52,23 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
 
 
 def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
-    """Return the content of `summary.json`."""
+    """Return the content of `summary.json`: all scores but the pictures."""
     return {
         "schema_version": 1,
-        "perceptions": [_values(one) for one in found],
+        "perceptions": [_value(replace(one, pictures=())) for one in found],
         "differences": [
-            {"perception": each.perception, "less": each.less, **measure_values(each.measures)}
-            for each in differences(found)
+            {"perception": ours, "less": less, **_value(measures)}
+            for (ours, less), measures in differences(found).items()
         ],
     }
 
 
-def _values(one: Scores) -> dict[str, Any]:
-    groups: Mapping[str, Any] = {
-        by: [{"name": group.name, **measure_values(group.measures)} for group in rows]
-        for by, rows in {**one.groups, "depth": one.depth}.items()
-    }
-    return {
-        "perception": one.perception,
-        "num_tasks": one.num_tasks,
-        "num_houses": one.num_houses,
-        "num_views": one.num_views,
-        "overall": measure_values(one.overall),
-        "groups": groups,
-        "confusions": [
-            {"category": each.category, "label": each.label, "num": each.num, **measure_values({"share": each.share})}
-            for each in one.confusions
-        ],
-        "unexplained": [{"label": label, "num": num} for label, num in one.unexplained],
-        "precision_at_recall": list(one.precision_curve),
-        "calibration": [
-            {"confidence": confidence, **measure_values({"precision": each})} for confidence, each in one.calibration
-        ],
-        "cosines": {name: list(counts) for name, counts in one.cosines.items()},
-        "memory": measure_values(one.memory),
-        "memory_by_share": [{"share": share, **measure_values(measures)} for share, measures in one.memory_curve],
-    }
+def _value(value: Any) -> Any:  # noqa: ANN401 - a part of the scores
+    """Return a part of the scores as JSON."""
+    if isinstance(value, Estimate):
+        return {"value": value.value, "interval": value.ci95, "n": value.n}
+    if is_dataclass(value):
+        return {field.name: _value(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: _value(part) for name, part in value.items()}
+    return [_value(part) for part in value] if isinstance(value, list | tuple) else value

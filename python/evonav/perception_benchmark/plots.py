@@ -75,12 +75,14 @@ def _square_plot(title: str, lines: Sequence[Line], x_label: str, y_label: str) 
 
 
 def _group_plot(found: Sequence[Scores], by: str, name: str, measure: str) -> GroupPlot:
-    first = found[0].groups[by]
     # Objects are the same for all, detections are not: then no n could stand below.
     groups = tuple(
-        f"{group.name}\nn = {group.measures[measure].n}" if measure == "recall" else group.name for group in first
+        f"{group}\nn = {measures[measure].n}" if measure == "recall" else group
+        for group, measures in found[0].groups[by].items()
     )
-    series = tuple(Series.of(one.perception, [group.measures[measure] for group in one.groups[by]]) for one in found)
+    series = tuple(
+        Series.of(one.perception, [measures[measure] for measures in one.groups[by].values()]) for one in found
+    )
     return GroupPlot(f"{measure.capitalize()} by {name}", groups, series, "% with 95% intervals by house")
 
 
@@ -108,10 +110,9 @@ def _confusion_plot(one: Scores) -> ConfusionPlot:
             by_label[each.label] += each.num
     labels = [label for label, _ in by_label.most_common(MAX_CONFUSED)]
     shares = {(each.category, each.label): each.share.value or 0.0 for each in one.confusions}
-    measures = {group.name: group.measures for group in one.groups["category"]}
     rows = []
     for name in names:
-        mine = measures[name]
+        mine = one.groups["category"][name]
         right, missed = mine["recall"].value or 0.0, 1.0 - (mine["located"].value or 0.0)
         others = (shares.get((name, label), 0.0) for label in labels)
         rows.append(ConfusionRow(name, mine["recall"].n, (right, missed, *others)))

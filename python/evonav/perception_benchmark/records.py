@@ -3,14 +3,11 @@
 A folder of `evonav perception` holds `perception.json`, the request, and `records/NAME/TASK.json.gz`.
 """
 
-import gzip
-import json
 from pathlib import Path
 from typing import Any
 
 from evonav.drawing.svg import slug
 from evonav.errors import StoreError
-from evonav.parallel.folders import write_atomically
 from evonav.report.measurements import MeasurementRecord, read_model
 
 HEADER_NAME = "perception.json"
@@ -179,24 +176,6 @@ def record_path(folder: Path, perception: str, task_id: str) -> Path:
     return folder / RECORD_DIR / slug(perception) / f"{task_id}.json.gz"
 
 
-def write_record(folder: Path, perception: str, task_id: str, text: str) -> None:
-    """Write a record.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
-    write_atomically(record_path(folder, perception, task_id), gzip.compress(text.encode(), compresslevel=6, mtime=0))
-
-
-def read_record(path: Path) -> TaskRecord:
-    """Read a record.
-
-    Raises:
-        StoreError: It is missing, damaged or of another kind.
-    """
-    return read_model(TaskRecord, path, "delete it and run the command again")
-
-
 def read_header(folder: Path) -> PerceptionHeader | None:
     """Return the header of a folder, `None` for a new one.
 
@@ -205,15 +184,6 @@ def read_header(folder: Path) -> PerceptionHeader | None:
     """
     path = folder / HEADER_NAME
     return read_model(PerceptionHeader, path, "expected a header of `evonav perception`") if path.exists() else None
-
-
-def write_header(folder: Path, header: PerceptionHeader) -> None:
-    """Write the header.
-
-    Raises:
-        StoreError: It cannot be written.
-    """
-    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(), indent=2) + "\n")
 
 
 def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
@@ -227,7 +197,10 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
         raise StoreError(f"{folder}: holds no {HEADER_NAME}; `evonav perception` makes one")
     tasks = complete_tasks(folder, header)
     return {
-        perception: [read_record(record_path(folder, perception, task)) for task in tasks]
+        perception: [
+            read_model(TaskRecord, record_path(folder, perception, task), "delete it and run the command again")
+            for task in tasks
+        ]
         for perception in header.perceptions
     }
 

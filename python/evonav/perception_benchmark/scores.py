@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from evonav.errors import StoreError
 from evonav.perception_benchmark import other_scores as other
 from evonav.perception_benchmark.average_precision import interpolated, resampled
 from evonav.perception_benchmark.matching import IGNORED, IOU_LIMIT, NONE
-from evonav.perception_benchmark.other_scores import ScoreGroup
+from evonav.perception_benchmark.other_scores import Measures
 from evonav.perception_benchmark.records import DISTANCE_BINS_M, TaskRecord
 from evonav.statistics import ClusterBootstrap, Estimate
 
@@ -50,9 +51,9 @@ class Scores:
     num_tasks: int
     num_houses: int
     num_views: int
-    overall: Mapping[str, Estimate]
-    groups: Mapping[str, Sequence[ScoreGroup]]
-    """Groups by `category`, `distance`, `size` and `outline`."""
+    overall: Measures
+    groups: Mapping[str, Mapping[str, Measures]]
+    """Objects and detections by `category`, `distance`, `size` and `outline`."""
     confusions: Sequence[LabelConfusion]
     """The most frequent first."""
     unexplained: Sequence[tuple[str, int]]
@@ -61,11 +62,11 @@ class Scores:
     """Mean over categories of the interpolated precision at recalls 0, 0.01, .. 1."""
     calibration: Sequence[tuple[float, Estimate]]
     """Mean confidence and precision of detections, by tenths of confidence; empty ones are left out."""
-    depth: Sequence[ScoreGroup]
+    depth: Mapping[str, Measures]
     cosines: Mapping[str, Sequence[int]]
     """Counts in bins of -1..1; none without features."""
-    memory: Mapping[str, Estimate]
-    memory_curve: Sequence[tuple[float, Mapping[str, Estimate]]]
+    memory: Measures
+    memory_curve: Sequence[tuple[float, Measures]]
     """Metrics by share of the first house's tour."""
     pictures: Sequence[tuple[str, str]] = field(default=(), repr=False)
     """Task and JPEG in base64."""
@@ -82,31 +83,17 @@ def scores(records: Mapping[str, Sequence[TaskRecord]]) -> list[Scores]:
     return [_Scorer(perception, mine).scores() for perception, mine in records.items()]
 
 
-@dataclass(frozen=True, slots=True)
-class PerceptionDifference:
-    """One perception less another, over the same views."""
-
-    perception: str
-    less: str
-    measures: Mapping[str, Estimate]
-
-
-def differences(found: Sequence[Scores]) -> list[PerceptionDifference]:
-    """Return the differences of every two perceptions, in the metrics that detectors are usually compared by."""
-    return [
-        PerceptionDifference(
-            b.perception,
-            a.perception,
-            {
-                name: theirs[name].minus(ours[name])
-                for ours, theirs, names in ((a.overall, b.overall, COMPARED), (a.memory, b.memory, COMPARED_MEMORY))
-                for name in names
-                if name in ours and name in theirs
-            },
-        )
-        for i, a in enumerate(found)
-        for b in found[i + 1 :]
-    ]
+def differences(found: Sequence[Scores]) -> dict[tuple[str, str], Measures]:
+    """Return one perception less another, for every two, in the metrics that detectors are usually compared by."""
+    return {
+        (b.perception, a.perception): {
+            name: theirs[name].minus(ours[name])
+            for ours, theirs, names in ((a.overall, b.overall, COMPARED), (a.memory, b.memory, COMPARED_MEMORY))
+            for name in names
+            if name in ours and name in theirs
+        }
+        for a, b in combinations(found, 2)
+    }
 
 
 class _Scorer:
@@ -150,10 +137,10 @@ class _Scorer:
         groups = {"category": self._categories(precisions)}
         for by, names in (("distance", DISTANCES), ("size", SIZES), ("outline", OUTLINES)):
             found = self.group.get(by)
-            groups[by] = [
-                ScoreGroup(name, self._measures(self.truth_group[by] == i, None if found is None else found == i))
+            groups[by] = {
+                name: self._measures(self.truth_group[by] == i, None if found is None else found == i)
                 for i, name in enumerate(names)
-            ]
+            }
         counted = self.partner != IGNORED
         ranked = (self.confidence[counted], self.partner[counted] >= 0, self.house[counted])
         error, calibration = other.calibration(houses, *ranked)
@@ -164,13 +151,13 @@ class _Scorer:
             num_tasks=len(records),
             num_houses=houses.num_clusters,
             num_views=sum(sum(record.num_views) for record in records),
-            overall={**overall, **error, **depth[0].measures, **other.pose(houses, records), **texts},
+            overall={**overall, **error, **depth.pop("all"), **other.pose(houses, records), **texts},
             groups=groups,
             confusions=self._confusions(),
             unexplained=Counter(self.label[self.place == NONE].tolist()).most_common(),
             precision_curve=curve,
             calibration=calibration,
-            depth=depth[1:],
+            depth=depth,
             cosines=cosines,
             memory=other.memory(houses, records),
             memory_curve=other.memory_curve(houses, records),
@@ -184,37 +171,31 @@ class _Scorer:
             truths: `(T,)` which objects.
             found: `(D,)` which detections; `None` where detections have no such property, and thus no precision.
         """
-        houses = self.houses
-        of = self.truth_house[truths]
-        wanted, right = houses.sums(np.ones(len(of)), of), houses.sums(self.is_found[truths], of)
-        located = houses.sums(self.is_located[truths], of)
-        both = houses.sums(self.is_found[truths] & self.is_located[truths], of)
-        num = int(wanted.sum())
+        houses, of = self.houses, self.truth_house[truths]
+        is_found, is_located = self.is_found[truths], self.is_located[truths]
+        right, wanted = houses.sums(is_found, of), houses.sums(np.ones(len(of)), of)
         measures = {
-            "recall": houses.ratio(right, wanted, num),
-            "located": houses.ratio(located, wanted, num),
-            "labelled": houses.ratio(both, located, int(located.sum())),
+            "recall": houses.rate(is_found, np.ones(len(of)), of),
+            "located": houses.rate(is_located, np.ones(len(of)), of),
+            "labelled": houses.rate(is_found & is_located, is_located, of),
         }
         if found is None:
             return measures
-        counted = found & (self.partner != IGNORED)
-        claims = houses.sums(counted, self.house)
-        hits = houses.sums(counted & (self.partner >= 0), self.house)
-        placed = found & (self.place >= 0)
-        num_placed = houses.sums(placed, self.house)
-        measures["precision"] = houses.ratio(hits, claims, int(claims.sum()))
+        counted, placed = found & (self.partner != IGNORED), found & (self.place >= 0)
+        is_hit = counted & (self.partner >= 0)
+        measures["precision"] = houses.rate(is_hit, counted, self.house)
         # Objects of a kind and detections of a kind need not be partners (a distance may be wrong): each counts half.
-        measures["f1"] = houses.ratio(right + hits, wanted + claims, num)
-        ious = houses.sums(self.place_iou[placed], self.house[placed])
-        measures["iou"] = houses.ratio(ious, num_placed, int(num_placed.sum()))
+        hits, claims = houses.sums(is_hit, self.house), houses.sums(counted, self.house)
+        measures["f1"] = houses.ratio(right + hits, wanted + claims, len(of))
+        measures["iou"] = houses.rate(np.where(placed, self.place_iou, 0.0), placed, self.house)
         return measures
 
-    def _categories(self, precisions: Mapping[str, Mapping[str, Estimate]]) -> list[ScoreGroup]:
+    def _categories(self, precisions: Mapping[str, Measures]) -> dict[str, Measures]:
         counts = Counter(self.truth_category.tolist())
-        return [
-            ScoreGroup(name, {**self._measures(self.truth_category == name, self.label == name), **precisions[name]})
+        return {
+            name: {**self._measures(self.truth_category == name, self.label == name), **precisions[name]}
             for name in sorted(counts, key=lambda name: (-counts[name], name))
-        ]
+        }
 
     def _average_precisions(self) -> tuple[list[float], dict[str, dict[str, Estimate]]]:
         """Return the mean curve, and AP by category; "" has their mean, and AP of places alone."""

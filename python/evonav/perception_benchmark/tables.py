@@ -5,12 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from evonav.counted import counted
-from evonav.perception_benchmark.other_scores import ScoreGroup
+from evonav.perception_benchmark.other_scores import Measures
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, estimate_text
 from evonav.report.tables.table import Table
-from evonav.statistics import Estimate
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
 INTERVALS = "[..]: 95% interval, bootstrap by house."
@@ -39,7 +38,7 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
 
 def _table(
     title: str,
-    rows: Iterable[tuple[str, Mapping[str, Estimate]]],
+    rows: Iterable[tuple[str, Measures]],
     columns: Mapping[str, tuple[str, Mapping[str, Any]]],
     *notes: str,
     first: str = "perception",
@@ -55,7 +54,7 @@ def _table(
     return Table(title, (first, *columns), cells, notes)
 
 
-def _overall(found: Sequence[Scores]) -> Iterator[tuple[str, Mapping[str, Estimate]]]:
+def _overall(found: Sequence[Scores]) -> Iterator[tuple[str, Measures]]:
     return ((one.perception, one.overall) for one in found)
 
 
@@ -78,7 +77,7 @@ def _differences(found: Sequence[Scores]) -> Table:
     heads = ("AP50", "AP", "precision", "recall", "F1", "located", "memory precision", "memory recall")
     return _table(
         "Perceptions against each other",
-        ((f"{each.perception} minus {each.less}", each.measures) for each in differences(found)),
+        ((f"{ours} minus {less}", measures) for (ours, less), measures in differences(found).items()),
         {head: (name, SIGNED) for head, name in zip(heads, (*COMPARED, *COMPARED_MEMORY), strict=True)},
         f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared.",
         first="perceptions",
@@ -101,9 +100,8 @@ def _parts(found: Sequence[Scores]) -> Table:
 
 
 def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
-    names = [group.name for group in found[0].groups[by]]
     rows = tuple(
-        (one.perception, measure, *(estimate_text(group.measures.get(measure), has_n=True) for group in one.groups[by]))
+        (one.perception, measure, *(estimate_text(group[measure], has_n=True) for group in one.groups[by].values()))
         for one in found
         for measure in ("recall", "precision")
     )
@@ -111,32 +109,31 @@ def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
         f"In % (n). {INTERVALS} Recall: by the true object's {quantity}; "
         "precision: by the detection's own, as perceived."
     )
-    return Table(f"By {quantity}", ("perception", "", *names), rows, (note,))
+    return Table(f"By {quantity}", ("perception", "", *found[0].groups[by]), rows, (note,))
 
 
 def _by_outline(found: Sequence[Scores]) -> Table:
     return _table(
         "Recall by how much is in the way",
-        ((one.perception, {group.name: group.measures["recall"] for group in one.groups["outline"]}) for one in found),
-        {group.name: (group.name, WITH_N) for group in found[0].groups["outline"]},
+        ((one.perception, {name: of["recall"] for name, of in one.groups["outline"].items()}) for one in found),
+        {name: (name, WITH_N) for name in found[0].groups["outline"]},
         "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border.",
     )
 
 
 def _categories(found: Sequence[Scores], most: int | None) -> Table:
-    by_word = [{group.name: group.measures for group in one.groups["category"]} for one in found]
-    names = [group.name for group in found[0].groups["category"]]
-    measures = ("recall", "precision", "ap50", "labelled")
+    names = list(found[0].groups["category"])
     rows = tuple(
         (
             name if i == 0 else "",
             one.perception,
-            str(mine[name]["recall"].n),
-            str(mine[name]["precision"].n),
-            *(estimate_text(mine[name][measure]) for measure in measures),
+            str(mine["recall"].n),
+            str(mine["precision"].n),
+            *(estimate_text(mine[measure]) for measure in ("recall", "precision", "ap50", "labelled")),
         )
         for name in names[:most]
-        for i, (one, mine) in enumerate(zip(found, by_word, strict=True))
+        for i, one in enumerate(found)
+        for mine in (one.groups["category"][name],)
     )
     columns = ("category", "perception", "objects", "detections", "recall", "precision", "AP50", "label right")
     left = "" if most is None or len(names) <= most else f" The {most} most frequent of {len(names)}."
@@ -223,22 +220,21 @@ def perception_csv(found: Sequence[Scores]) -> str:
     columns = ("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses")
     rows: list[tuple[object, ...]] = []
 
-    def write(perception: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
+    def write(perception: str, by: str, group: str, measures: Measures) -> None:
         for name, each in measures.items():
             ends = each.ci95 or (None, None)
             rows.append((perception, by, group, name, each.value, *ends, each.n, found[0].num_houses))
 
-    for each in differences(found):
-        write(each.perception, "less", each.less, each.measures)
+    for (ours, less), measures in differences(found).items():
+        write(ours, "less", less, measures)
     for one in found:
         write(one.perception, "", "", one.overall)
         write(one.perception, "memory", "", one.memory)
         for share, measures in one.memory_curve:
             write(one.perception, "memory by share of the tour", f"{share:g}", measures)
-        groups: dict[str, Sequence[ScoreGroup]] = {**one.groups, "depth": one.depth}
-        for by, parts in groups.items():
-            for group in parts:
-                write(one.perception, by, group.name, group.measures)
+        for by, parts in {**one.groups, "depth": one.depth}.items():
+            for group, measures in parts.items():
+                write(one.perception, by, group, measures)
         for pair in one.confusions:
             write(one.perception, "confusion", f"{pair.category} as {pair.label}", {"share": pair.share})
     return csv_text(columns, rows)

@@ -60,18 +60,11 @@ def grid_search(name: str) -> Search:
     )
 
 
-class DistanceField:
-    """SciPy's Dijkstra from one cell to all, on a graph that is made once a house."""
-
-    def __init__(self, grid: Grid) -> None:
-        self._grid = grid
-        self._dijkstra = optional_module("scipy.sparse.csgraph", "the peer scipy needs its library", INSTALL).dijkstra
-        self._graph = _graph(grid.costs)
-
-    def __call__(self, start: Cell) -> NDArray[np.float64]:
-        """Return the distance of every cell in metres, infinite where it is not reachable."""
-        index = start[0] * self._grid.costs.shape[1] + start[1]
-        return np.asarray(self._dijkstra(self._graph, indices=index), np.float64)
+def distance_field(grid: Grid) -> Callable[[Cell], NDArray[np.float64]]:
+    """Return SciPy's Dijkstra from one cell to all, in metres, on a graph that is made once."""
+    dijkstra = optional_module("scipy.sparse.csgraph", "the peer scipy needs its library", INSTALL).dijkstra
+    graph, num_cols = _graph(grid.costs), grid.costs.shape[1]
+    return lambda start: np.asarray(dijkstra(graph, indices=start[0] * num_cols + start[1]), np.float64)
 
 
 def _graph(costs: NDArray[np.float32]) -> Any:  # noqa: ANN401 - a sparse matrix of SciPy

@@ -1,26 +1,81 @@
-"""The peers of rendering: Embree's rays, and OpenGL on llvmpipe."""
+"""Views of bundled houses, and the renderers that draw them: ours, Embree's rays, and OpenGL on llvmpipe."""
 
 import os
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evonav.component import optional_module
+from evonav.errors import SimulationError
+from evonav.house import bundled_houses
 from evonav.speed_benchmark.timing import INSTALL, Sampling
-from evonav.speed_benchmark.views import Images, RenderedView
+from evonav.world.camera import CameraView, camera_axes
 from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
+POSES_PER_HOUSE = 20
 
-class ImagePeer(Protocol):
-    """Another renderer."""
+Images = tuple[NDArray[np.float32], NDArray[np.int32]]
+"""Depth and instances."""
+Renderer = Callable[[int], Images]
+"""Draws the view of a number."""
 
-    def prepare(self, number: int) -> None:
-        """Get the view of a number ready; not timed."""
 
-    def __call__(self, number: int) -> Images:
-        """Draw the view of a number."""
+@dataclass(frozen=True)
+class RenderedView:
+    """One image to make."""
+
+    house: int
+    """Number of the house's simulator."""
+    name: str
+    """Name of the house."""
+    camera: CameraView
+    camera_from_world: NDArray[np.float64]
+    """`(3, 3)`: right, down, forward."""
+    position_m: NDArray[np.float64]
+
+
+def views_of_houses(config: SimulatorConfig, num_houses: int) -> tuple[list[EmbeddedSimulator], list[RenderedView]]:
+    """Return a simulator a house, and 20 views in each from reachable positions, always the same."""
+    random = np.random.default_rng(0)
+    simulators, views = [], []
+    for number, house in enumerate(bundled_houses(num_houses)):
+        simulator = EmbeddedSimulator(config)
+        simulator.reset(house.to_json(), name=house.name)
+        simulators.append(simulator)
+        reachable_m = simulator.reachable_positions()
+        for index in random.choice(len(reachable_m), POSES_PER_HOUSE):
+            x_m, y_m, z_m = reachable_m[index].tolist()
+            pose = Pose(x_m, y_m, z_m, yaw_rad=float(random.uniform(0, 2 * np.pi)))
+            axes = camera_axes(pose) * [[1.0], [-1.0], [1.0]]  # down, where its own point up
+            camera = CameraView(
+                replace(pose, y_m=config.camera_height_m),
+                config.width_px,
+                config.height_px,
+                config.intrinsics.vertical_fov_rad,
+                config.near_m,
+                config.far_m,
+            )
+            position_m = np.array(camera.pose.position_m)
+            views.append(RenderedView(number, house.name or str(number), camera, axes, position_m))
+    return simulators, views
+
+
+def our_renderer(simulators: Sequence[EmbeddedSimulator], views: Sequence[RenderedView], *, rgb: bool) -> Renderer:
+    """Return what draws a view with evonav's rasteriser."""
+
+    def call(number: int) -> Images:
+        view = views[number]
+        images = simulators[view.house].render_camera(view.camera, rgb=rgb)
+        if images.instances is None:
+            raise SimulationError("no instances in images that were asked for them")
+        return images.depth_m, images.instances
+
+    return call
 
 
 def image_peers(
@@ -30,13 +85,13 @@ def image_peers(
     config: SimulatorConfig,
     *,
     rgb: bool,
-) -> dict[str, ImagePeer]:
+) -> "dict[str, Embree | OpenGL]":
     """Return the peers that are to be run, by name; one that cannot start is left out, unless it was named.
 
     Raises:
         StoreError: A named peer is not installed.
     """
-    peers: dict[str, ImagePeer] = {}
+    peers: dict[str, Embree | OpenGL] = {}
     for name in sampling.chosen(("embreex", "moderngl")):
         if name == "embreex":
             peers[f"embreex{', no colours' if rgb else ''}"] = Embree(simulators, views, config)

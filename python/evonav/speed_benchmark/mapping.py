@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,20 +72,6 @@ def measure(sampling: Sampling) -> Iterator[Row]:
     yield from compare(operation, ours, peers, [view.house for view in views], sampling=sampling, prepare=prepare)
 
 
-class Volume(Protocol):
-    """A peer: a volume to which depth images are added."""
-
-    TITLE: str
-
-    def __init__(self, views: list[MappedView]) -> None: ...
-
-    def prepare(self, number: int) -> None:
-        """Prepare what is not timed of a view, and begin again in a new house."""
-
-    def __call__(self, number: int, /) -> object:
-        """Add the view."""
-
-
 class Octree:
     """OctoMap's octree: the points of the depth image, with free space along their rays."""
 
@@ -154,7 +139,7 @@ class Tsdf:
         return self._grid.integrate(blocks, self._depth, *self._camera, *scale_and_range)
 
 
-_VOLUMES: dict[str, type[Volume]] = {"octomap": Octree, "open3d": Tsdf}
+_VOLUMES: dict[str, type[Octree | Tsdf]] = {"octomap": Octree, "open3d": Tsdf}
 
 
 def _views(num_houses: int) -> list[MappedView]:

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from evonav.errors import SimulationError
 from evonav.house import bundled_houses
-from evonav.speed_benchmark.grid_search import GRID_M, DistanceField, Grid, Position3, Search, grid_of, grid_search
+from evonav.speed_benchmark.grid_search import (
+    GRID_M,
+    Cell,
+    Grid,
+    Position3,
+    Search,
+    distance_field,
+    grid_of,
+    grid_search,
+)
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import Sampling, compare
 from evonav.world.embedded import EmbeddedSimulator
@@ -116,7 +125,7 @@ def _length_of(search: Search, queries: Sequence[Query]) -> Callable[[int], floa
 
 
 def _fields(queries: Sequence[Query]) -> dict[str, Callable[[int], object]]:
-    found: dict[str, DistanceField] = {}
+    found: dict[str, Callable[[Cell], NDArray[np.float64]]] = {}
 
     def call(number: int) -> object:
         house, grid = queries[number].house, queries[number].house.grid
@@ -125,7 +134,7 @@ def _fields(queries: Sequence[Query]) -> dict[str, Callable[[int], object]]:
 
     for query in queries:
         if query.house.name not in found and query.house.grid is not None:
-            found[query.house.name] = DistanceField(query.house.grid)
+            found[query.house.name] = distance_field(query.house.grid)
     return {DIJKSTRA: call}
 
 

@@ -5,10 +5,9 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from evonav.errors import SimulationError
-from evonav.speed_benchmark.image_peers import ImagePeer, image_peers
+from evonav.speed_benchmark.image_peers import Embree, OpenGL, Renderer, image_peers, our_renderer, views_of_houses
 from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.timing import Sampling, compare
-from evonav.speed_benchmark.views import Renderer, our_renderer, views_of_houses
 from evonav.world.simulator import SimulatorConfig
 
 NAME, TITLE = "render", "Rendering"
@@ -39,7 +38,7 @@ def measure(sampling: Sampling) -> Iterator[Row]:
             yield from compare(operation, ours, peers, houses, sampling=sampling, prepare=prepare_all(peers))
 
 
-def prepare_all(peers: Mapping[str, ImagePeer]) -> Callable[[int], None]:
+def prepare_all(peers: Mapping[str, Embree | OpenGL]) -> Callable[[int], None]:
     """Return what prepares a view for all peers; not timed."""
 
     def prepare(number: int) -> None:
@@ -49,7 +48,7 @@ def prepare_all(peers: Mapping[str, ImagePeer]) -> Callable[[int], None]:
     return prepare
 
 
-def require_same(ours: Renderer, peers: Mapping[str, ImagePeer], num_views: int) -> None:
+def require_same(ours: Renderer, peers: Mapping[str, Embree | OpenGL], num_views: int) -> None:
     """Check every seventh view, since a comparison of different pictures would mean nothing.
 
     Raises:

@@ -1,7 +1,6 @@
 """Run a section and show its figures: as a table, as Markdown, and compared with an earlier run."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,15 +29,6 @@ class Section(Protocol):
     """Description of the measurement, in Markdown."""
     measure: Callable[..., Iterator[Row]]
     """Takes a `Sampling` and the section's own options."""
-
-
-@dataclass(frozen=True, slots=True)
-class Timing:
-    """One time of a run, or its ratio to a peer's."""
-
-    value: float
-    by_house: Mapping[str, float] = field(default_factory=dict)
-    """The same number of each house alone, where it is known."""
 
 
 def run_section(
@@ -108,27 +98,39 @@ def markdown_of(speeds: Speeds) -> str:
 
 
 def against(before: Speeds, now: Speeds) -> list[BeforeAfter]:
-    """Compare a run with an earlier one, row by row.
+    """Compare the rows that both runs have.
 
-    On another machine, times are compared as multiples of the peers', and rows without a peer are left out.
+    A time is worse if it has grown by more than a quarter. Where both runs know at least two of the same houses, it
+    must have grown within houses by the whole of the 95% interval, too. On another machine, times are compared as
+    multiples of the peers', and rows without a peer are left out.
 
     Raises:
         InvalidArgumentError: The runs are of different sections.
     """
     if before.section != now.section:
         raise InvalidArgumentError(f"figures of {before.section!r} cannot be compared with those of {now.section!r}")
-    is_same = before.machine == now.machine
-    return changes(_figures(before, is_same=is_same), _figures(now, is_same=is_same))
+    earlier, latest = (_figures(one, has_times=before.machine == now.machine) for one in (before, now))
+    return [
+        BeforeAfter(name, earlier[name][0], value, _is_worse(*earlier[name], value, by_house))
+        for name, (value, by_house) in latest.items()
+        if name in earlier
+    ]
 
 
-def _figures(speeds: Speeds, *, is_same: bool) -> dict[str, Timing]:
-    found = {}
-    for row in speeds.rows:
-        if is_same:
-            found[f"{row.operation}, ms"] = Timing(row.ms, row.ms_by_house)
-        elif row.ratio:
-            found[f"{row.operation}, over {row.peer}"] = Timing(1 / row.ratio)
-    return found
+def _figures(speeds: Speeds, *, has_times: bool) -> dict[str, tuple[float, Mapping[str, float]]]:
+    """Return each time, also by house, or else its ratio to the peer's."""
+    if has_times:
+        return {f"{row.operation}, ms": (row.ms, row.ms_by_house) for row in speeds.rows}
+    return {f"{row.operation}, over {row.peer}": (1 / row.ratio, {}) for row in speeds.rows if row.ratio}
+
+
+def _is_worse(old: float, old_by_house: Mapping[str, float], new: float, by_house: Mapping[str, float]) -> bool:
+    houses = [house for house, value in by_house.items() if value > 0 and old_by_house.get(house, 0.0) > 0]
+    if new <= FACTOR * old or len(houses) < 2:
+        return new > FACTOR * old
+    growth = np.log([by_house[house] / old_by_house[house] for house in houses])
+    ci95 = ClusterBootstrap(houses, num_resamples=NUM_RESAMPLES).column_means(growth[:, None])[0].ci95
+    return ci95 is None or ci95[0] > 0
 
 
 def _number(value: float | None) -> str:
@@ -137,33 +139,3 @@ def _number(value: float | None) -> str:
 
 def _interval(ends: Interval | None) -> str:
     return NONE if ends is None else f"{_number(ends[0])}-{_number(ends[1])}"
-
-
-def changes(before: Mapping[str, Timing], now: Mapping[str, Timing]) -> list[BeforeAfter]:
-    """Compare the figures that both runs have.
-
-    A figure is worse if it has grown by more than a quarter. Where both runs know at least two of the same houses, it
-    must have grown within houses by the whole of the 95% interval, too.
-
-    Returns:
-        In the order of `now`; figures that only one run has are left out.
-    """
-    return [
-        BeforeAfter(name, before[name].value, timing.value, _is_worse(before[name], timing))
-        for name, timing in now.items()
-        if name in before
-    ]
-
-
-def _is_worse(before: Timing, now: Timing) -> bool:
-    interval = _growth_ci95(before, now)
-    return now.value > FACTOR * before.value and (interval is None or interval[0] > 0)
-
-
-def _growth_ci95(before: Timing, now: Timing) -> Interval | None:
-    """Return the interval of the mean growth within houses, as a logarithm."""
-    houses = [house for house, value in now.by_house.items() if value > 0 and before.by_house.get(house, 0.0) > 0]
-    if len(houses) < 2:
-        return None
-    growth = np.log([now.by_house[house] / before.by_house[house] for house in houses])
-    return ClusterBootstrap(houses, num_resamples=NUM_RESAMPLES).column_means(growth[:, None])[0].ci95

@@ -16,11 +16,16 @@ from evonav.statistics import ClusterBootstrap
 
 NUM_RESAMPLES = 2000
 INSTALL = "'evonav[bench]'"
-MODULES = {"embreex": "embreex", "moderngl": "moderngl", "pyastar2d": "pyastar2d", "scikit-image": "skimage"}
+MODULES = {
+    "embreex": "embreex",
+    "moderngl": "moderngl",
+    "pyastar2d": "pyastar2d",
+    "scikit-image": "skimage",
+    "octomap": "octomap",
+    "open3d": "open3d",
+    "scipy": "scipy.sparse.csgraph",
+}
 """Module of each peer that only some installations have, by the peer's name; other peers are always there."""
-MODULES["octomap"] = "octomap"
-MODULES["open3d"] = "open3d"
-MODULES["scipy"] = "scipy.sparse.csgraph"
 
 OnProgress = Callable[[int, int, str], None]
 """Takes the number of measurements done, of all, and what is measured."""

@@ -161,6 +161,11 @@ class ClusterBootstrap:
         ratios = np.divide(above, below, out=np.full_like(below, np.nan), where=below > 0)
         return self.estimate(value, transform(ratios), n)
 
+    def rate(self, above: ArrayLike, below: ArrayLike, cluster_of: NDArray[np.int64] | None = None) -> Estimate:
+        """Estimate a ratio of sums over rows, `(N,)` each, of which the second are counts; see `sums` and `ratio`."""
+        counts = self.sums(below, cluster_of)
+        return self.ratio(self.sums(above, cluster_of), counts, round(float(counts.sum())))
+
     def estimate(self, value: float, resampled: NDArray[np.float64], n: int) -> Estimate:
         """Return an estimate of which the value in each resample, `(R,)`, is known; NaN where there is none."""
         return Estimate(value, percentile_interval(resampled, self.num_clusters), n, self.num_clusters, resampled)

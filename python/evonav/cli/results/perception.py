@@ -84,7 +84,7 @@ def perception(
     task_files = chosen_tasks(tasks, limit, subset)
     with interruptible(out):
         with progress_bar("tours") as on_progress:
-            measured = measure(
+            done, failures = measure(
                 specs,
                 task_files,
                 out,
@@ -93,15 +93,15 @@ def perception(
                 num_workers=num_workers_of(workers),
                 on_progress=on_progress,
             )
-        for word, task_id, why in measured.failures:
+        for word, task_id, why in failures:
             typer.echo(f"failed: {word} {task_id}: {why}", err=True)
-        if measured.tasks:
+        if done:
             page, shown = write_perception_report(out)
             show_tables(perception_tables(shown, is_brief=True))
             typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
-    if measured.failures:
+    if failures:
         typer.echo(
-            f"incomplete: {counted(len(measured.tasks), 'task')} done; run the same command again to resume",
+            f"incomplete: {counted(len(done), 'task')} done; run the same command again to resume",
             err=True,
         )
         raise typer.Exit(EXIT_INCOMPLETE)
