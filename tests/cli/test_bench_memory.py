@@ -45,8 +45,8 @@ def test_what_became_worse_is_listed(out, tmp_path):
     assert same.exit_code == 0, same.output
     assert "0 of" in same.stdout
     old = json.loads((out / "result.json").read_text())
-    for memory in old["memories"]:
-        for stream in memory["streams"]:
+    for streams in old["memories"].values():
+        for stream in streams:
             stream["size"]["bytes_per_entry"] /= 2
     (tmp_path / "old.json").write_text(json.dumps(old))
     worse = bench(*words, "--against", tmp_path / "old.json")
@@ -75,15 +75,14 @@ def test_answers_to_exported_streams_score_as_the_memory_in_process_does(layout,
     scored = tmp_path / "scored"
     run = bench("score", streams, "--oracle", tmp_path / "truth", "--system", "mine", "--out", scored)
     assert run.exit_code == 0, run.output
-    (mine,) = json.loads((scored / "result.json").read_text())["memories"]
-    assert mine["memory"] == "mine"
-    assert mine["streams"][0]["hosting"] == "offline"
-    here = json.loads((out / "result.json").read_text())["memories"][0]["streams"][0]
-    theirs = mine["streams"][0]["update"]
+    (mine,) = json.loads((scored / "result.json").read_text())["memories"]["mine"]
+    assert mine["hosting"] == "offline"
+    here = json.loads((out / "result.json").read_text())["memories"]["never"][0]
+    theirs = mine["update"]
     if layout == "tum":  # Replica's depth images are coarser
         for name in ("removals", "seen", "standing"):
             assert theirs[name] == pytest.approx(here["update"][name], rel=0.1, abs=2), name
-    assert mine["streams"][0]["num_frames"] == here["num_frames"]
+    assert mine["num_frames"] == here["num_frames"]
     alone = bench("score", folder, folder / "entries.jsonl", "--oracle", tmp_path / "truth", "--out", tmp_path / "one")
     assert alone.exit_code == 0, alone.output
 
@@ -124,18 +123,16 @@ def test_bad_memories_get_a_verdict_each_and_the_others_go_on(tmp_path):
     words = [word for name in [*names, "never"] for word in ("--memory", name)]
     run = bench(*SMALL, *words, "--timeout", 1, "--workers", 0, "--out", tmp_path)
     assert run.exit_code == 0, run.output
-    memories = {
-        one["memory"]: one["streams"][0] for one in json.loads((tmp_path / "result.json").read_text())["memories"]
-    }
+    memories = json.loads((tmp_path / "result.json").read_text())["memories"]
     for name, verdict in verdicts.items():
-        record = memories[f"{BAD}:{name}"]
+        (record,) = memories[f"{BAD}:{name}"]
         assert verdict in record["failure"]["message"]
         assert record["update"] is None
     page = (tmp_path / "report.html").read_text()
     assert page.count("no such voxel") == 1
     for name in (f"{BAD}:Good", "never"):
-        assert memories[name]["failure"] is None
-        assert memories[name]["update"]["seen"] > 0
+        assert memories[name][0]["failure"] is None
+        assert memories[name][0]["update"]["seen"] > 0
 
 
 @pytest.fixture(scope="module")
@@ -168,10 +165,9 @@ def test_recordings_give_speed_and_size_only(recording, tmp_path):
     assert run.exit_code == 0, run.output
     assert f"{bare}: " in run.stdout
     assert "no detections, no truth: only speed and size" in run.stdout
-    (memory,) = json.loads((tmp_path / "o" / "result.json").read_text())["memories"]
-    seeing, blind = memory["streams"]
-    assert {one["kind"] for one in memory["streams"]} == {"recording"}
+    seeing, blind = json.loads((tmp_path / "o" / "result.json").read_text())["memories"]["never"]
     for one in (seeing, blind):
+        assert one["kind"] == "recording"
         assert one["failure"] is None
         assert (one["update"], one["belief"], one["queries"], one["spells"]) == (None, None, None, [])
         assert one["speed"]["observe_wall"]["n"] == one["num_frames"] - 20

@@ -50,21 +50,18 @@ def test_the_same_command_goes_on_where_it_ended(tmp_path: Path):
     out = tmp_path / "out"
     first, _, told = run(named_memories(["never"]), out, SPECS[:1])
     assert told[-1] == (1, 1, SPECS[0].name)
-    assert [stream.stream for stream in first.memories[0].streams] == [SPECS[0].name]
+    assert [stream.stream for stream in first.memories["never"]] == [SPECS[0].name]
     path = record_path(out, "never", SPECS[0].name)
     written = path.stat().st_mtime_ns
     both, failures, told = run(named_memories(["never", "numpy-list"]), out)
     assert told[0] == (1, 4, "")
     assert path.stat().st_mtime_ns == written
-    assert [(memory.memory, len(memory.streams)) for memory in both.memories] == [
-        ("never", 2),
-        ("numpy-list", 2),
-    ]
+    assert {memory: len(streams) for memory, streams in both.memories.items()} == {"never": 2, "numpy-list": 2}
     assert failures == []
     path.unlink()  # of one memory: the other one's stays
     again, _, told = run(named_memories(["never", "numpy-list"]), out)
     assert told[0] == (3, 4, "")
-    assert again.memories[0].streams[0].digest == both.memories[0].streams[0].digest
+    assert again.memories["never"][0].digest == both.memories["never"][0].digest
 
 
 def test_a_memory_that_was_edited_is_measured_again(tmp_path: Path):
@@ -83,8 +80,7 @@ def test_a_memory_that_fails_is_a_result_and_a_stream_that_cannot_be_made_is_not
     measured, ((memory, stream, why),), _ = run([broken], out, [SPECS[0], nowhere])
     assert (memory, stream) == ("own", nowhere.name)
     assert "nowhere.json" in why
-    (result,) = measured.memories
-    assert result.failures[0].failure.kind == "raised"
+    assert measured.memories["own"][0].failure.kind == "raised"
     table = next(table for table in memory_tables(measured) if table.title == "Failures")
     assert table.rows[0][:3] == ("own", SPECS[0].name, "raised")
     assert "no more" in table.rows[0][4]
@@ -126,10 +122,10 @@ def test_the_report_has_the_figures_of_the_records(tmp_path: Path):
     measured, *_ = run(named_memories(["never", "last-wins"]), out)
     found = scores(measured)
     assert found["never"]["p95_over_baseline"].value == 1.0
-    for memory in measured.memories:
-        counts = [stream.update for stream in memory.streams]
+    for memory, streams in measured.memories.items():
+        counts = [stream.update for stream in streams]
         expected = 100 * sum(one.false_forgets for one in counts) / sum(one.standing for one in counts)
-        assert found[memory.memory]["false_forgets"].value == pytest.approx(expected)
+        assert found[memory]["false_forgets"].value == pytest.approx(expected)
     page = write_memory_report(measured, out, num_missing=3)
     text = page.read_text()
     assert "3 records of those asked for are missing" in text
@@ -138,7 +134,7 @@ def test_the_report_has_the_figures_of_the_records(tmp_path: Path):
     p95 = text_of(found["last-wins"]["observe_cpu_p95_ms"], digits=2)
     assert p95 in text
     assert p95 in (out / "summary.md").read_text().replace("\\", "")
-    assert json.loads((out / "result.json").read_text())["memories"][1]["memory"] == "last-wins"
+    assert json.loads((out / "result.json").read_text())["memories"].keys() == {"never", "last-wins"}
 
 
 def test_infinite_and_missing_values_are_words():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import StoreError
 from evonav.memory_benchmark.aggregate import METRICS, estimates, ratios
 from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.counts import BeliefScore, ChangeCounts, QueryCounts, UpdateCounts
@@ -15,10 +15,8 @@ from evonav.memory_benchmark.metrics.spells import Clocks, Spell
 from evonav.memory_benchmark.records import (
     BenchmarkResult,
     MemoryFailure,
-    MemoryResult,
     Speed,
     StreamResult,
-    kinds_of,
     read_result,
 )
 from evonav.memory_benchmark.regression import against
@@ -66,16 +64,12 @@ def stream(house: str, ms: float = 1.0, kind: str = "S1", clears_after: int | No
     )
 
 
-def memory(name: str, streams: list[StreamResult]) -> MemoryResult:
-    return MemoryResult(memory=name, streams=tuple(streams))
-
-
-def result(*memories: MemoryResult) -> BenchmarkResult:
-    return BenchmarkResult(evonav_version="1.0", machine="a machine with 2 cores", memories=memories)
+def result(**memories: list[StreamResult]) -> BenchmarkResult:
+    return BenchmarkResult(machine="a machine with 2 cores", memories=memories)
 
 
 def test_figures_of_known_counts() -> None:
-    found = estimates(memory("mine", [stream(house) for house in HOUSES]))
+    found = estimates([stream(house) for house in HOUSES])
     values = {name: estimate.value for name, estimate in found.items()}
     assert values["observe_cpu_p95_ms"] == pytest.approx(2.0)
     assert values["observe_cpu_max_ms"] == pytest.approx(4.0)
@@ -108,16 +102,16 @@ def test_figures_of_known_counts() -> None:
 
 def test_intervals_are_over_houses() -> None:
     streams = [stream(house, ms=1.0 + index) for index, house in enumerate(HOUSES)]
-    estimate = estimates(memory("mine", streams))["observe_cpu_p50_ms"]
+    estimate = estimates(streams)["observe_cpu_p50_ms"]
     assert estimate.value == pytest.approx(3.5)
     assert estimate.ci95 is not None
     low, high = estimate.ci95
     assert 1.0 < low < 3.5 < high < 6.0
-    assert estimates(memory("mine", [stream("a")]))["observe_cpu_p50_ms"].ci95 is None
+    assert estimates([stream("a")])["observe_cpu_p50_ms"].ci95 is None
 
 
 def test_half_life_that_is_not_reached_is_infinite() -> None:
-    found = estimates(memory("never", [stream(house, clears_after=None) for house in HOUSES]))
+    found = estimates([stream(house, clears_after=None) for house in HOUSES])
     assert found["half_life_frames"].value == math.inf
     assert found["never_cleared"].value == pytest.approx(100 * 11 / 12)
 
@@ -126,22 +120,20 @@ def test_failed_streams_have_no_part_in_figures() -> None:
     failed = stream("a").model_copy(
         update={"failure": MemoryFailure(kind="died", message="died", frame=3), "update": None, "spells": ()}
     )
-    mine = memory("mine", [failed, *[stream(house) for house in HOUSES[1:]]])
-    assert len(mine.failures) == 1
+    mine = [failed, *[stream(house) for house in HOUSES[1:]]]
     assert estimates(mine)["removal_recall"].num_clusters == 5
-    assert estimates(memory("mine", [failed])) == {}
+    assert estimates([failed]) == {}
 
 
 def test_figures_of_one_kind() -> None:
-    mine = memory("mine", [stream("a", ms=1.0), stream("a", ms=9.0, kind="S7")])
-    assert kinds_of([mine]) == ["S1", "S7"]
+    mine = [stream("a", ms=1.0), stream("a", ms=9.0, kind="S7")]
     assert estimates(mine, "S7")["observe_cpu_p50_ms"].value == pytest.approx(9.0)
     assert estimates(mine, "S3") == {}
 
 
 def test_ratios_to_the_baseline_are_paired_by_stream() -> None:
-    never = memory("never", [stream(house, ms=2.0) for house in HOUSES])
-    mine = memory("mine", [stream(house, ms=3.0) for house in (*HOUSES, "more")])
+    never = [stream(house, ms=2.0) for house in HOUSES]
+    mine = [stream(house, ms=3.0) for house in (*HOUSES, "more")]
     found = ratios(mine, never)
     assert found["observe_cpu_p95_ms"].value == pytest.approx(1.5)
     assert found["bytes_per_entry"].value == pytest.approx(1.0)
@@ -149,24 +141,22 @@ def test_ratios_to_the_baseline_are_paired_by_stream() -> None:
 
 
 def test_result_is_read_as_it_was_written(tmp_path: Path) -> None:
-    whole = result(memory("mine", [stream("a")]))
+    whole = result(mine=[stream("a")])
     path = tmp_path / "result.json"
     path.write_text(whole.model_dump_json())
     assert read_result(path) == whole
-    assert read_result(path).memory("mine").streams[0].spells[0].lasted.frames == 3
-    with pytest.raises(InvalidArgumentError, match="memory = 'other': the result has mine"):
-        whole.memory("other")
+    assert read_result(path).memories["mine"][0].spells[0].lasted.frames == 3
 
 
 def test_files_that_are_no_results(tmp_path: Path) -> None:
     path = tmp_path / "result.json"
     with pytest.raises(StoreError, match="cannot be read"):
         read_result(path)
-    path.write_text(result(memory("mine", [stream("a")])).model_dump_json())
+    path.write_text(result(mine=[stream("a")]).model_dump_json())
     data = json.loads(path.read_text())
-    data["memories"][0]["streams"][0]["num_frames"] = "many"
+    data["memories"]["mine"][0]["num_frames"] = "many"
     path.write_text(json.dumps(data))
-    with pytest.raises(StoreError, match=r"result.json: memories.0.streams.0.num_frames = 'many'"):
+    with pytest.raises(StoreError, match=r"result.json: memories.mine.0.num_frames = 'many'"):
         read_result(path)
     data["schema_version"] = 99
     path.write_text(json.dumps(data))
@@ -176,9 +166,8 @@ def test_files_that_are_no_results(tmp_path: Path) -> None:
 
 def compared(now: list[StreamResult], before: list[StreamResult], scale: float = 1.0) -> dict[str, BeforeAfter]:
     """Compare two results; the machine of the new one is `scale` times slower."""
-    never = memory("never", [stream(house) for house in HOUSES])
-    slower = memory("never", [stream(house, ms=scale) for house in HOUSES])
-    differences = against(result(slower, memory("mine", now)), result(never, memory("mine", before)))
+    never, slower = ([stream(house, ms=ms) for house in HOUSES] for ms in (1.0, scale))
+    differences = against(result(never=slower, mine=now), result(never=never, mine=before))
     return {one.name.removeprefix("mine: "): one for one in differences if one.name.startswith("mine: ")}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from evonav.memory_benchmark.metrics.counts import NUM_BINS, calibration_error
 from evonav.memory_benchmark.metrics.spells import Clock, SpellKind, durations_of, half_life, risk_table, survival
-from evonav.memory_benchmark.records import MemoryResult, StreamResult
+from evonav.memory_benchmark.records import StreamResult, judged
 from evonav.statistics import ClusterBootstrap, Estimate
 
 BASELINE = "never"
@@ -31,13 +31,13 @@ class MemoryMetric:
     """Whether it depends on the machine."""
 
 
-def estimates(result: MemoryResult, kind: str | None = None) -> dict[str, Estimate]:
-    """Return all figures of a memory that its streams give, by name.
+def estimates(streams: Streams, kind: str | None = None) -> dict[str, Estimate]:
+    """Return all figures that a memory's streams give, by name.
 
     Args:
         kind: Kind of streams, such as `S1`; default: all. Streams in which it failed are left out.
     """
-    streams = result.of_kind(kind)
+    streams = judged(streams, kind)
     if not streams:
         return {}
     bootstrap = bootstrap_of(streams)
@@ -50,21 +50,21 @@ def bootstrap_of(streams: Streams) -> ClusterBootstrap:
     return ClusterBootstrap([stream.house for stream in streams], num_resamples=NUM_RESAMPLES)
 
 
-def paired(ours: Streams, theirs: Streams) -> tuple[list[StreamResult], list[StreamResult]]:
+def paired(ours: Streams, theirs: Streams, kind: str | None = None) -> tuple[list[StreamResult], list[StreamResult]]:
     """Return the streams that both have and in which neither failed, in the same order."""
-    others = {stream.stream: stream for stream in theirs if stream.failure is None}
-    both = [stream for stream in ours if stream.failure is None and stream.stream in others]
+    others = {stream.stream: stream for stream in judged(theirs)}
+    both = [stream for stream in judged(ours, kind) if stream.stream in others]
     return both, [others[stream.stream] for stream in both]
 
 
-def ratios(result: MemoryResult, baseline: MemoryResult, kind: str | None = None) -> dict[str, Estimate]:
+def ratios(streams: Streams, baseline: Streams, kind: str | None = None) -> dict[str, Estimate]:
     """Return times and sizes of a memory divided by those of another in the same run, over the streams of both.
 
     Args:
-        baseline: The other one, `BASELINE` in tables.
+        baseline: Streams of the other one, `BASELINE` in tables.
         kind: Kind of streams; default: all.
     """
-    ours, theirs = paired(result.of_kind(kind), baseline.of_kind(kind))
+    ours, theirs = paired(streams, baseline, kind)
     if not ours:
         return {}
     bootstrap = bootstrap_of(ours)

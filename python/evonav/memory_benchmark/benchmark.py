@@ -18,7 +18,7 @@ from evonav.drawing.svg import slug
 from evonav.errors import InvalidArgumentError
 from evonav.memory.forgetting import RULES
 from evonav.memory_benchmark.protocol import Memory
-from evonav.memory_benchmark.records import BenchmarkResult, MemoryHeader, MemoryResult, StreamResult
+from evonav.memory_benchmark.records import BenchmarkResult, MemoryHeader, StreamResult
 from evonav.memory_benchmark.run import MeasureSettings, MemorySource, measure_all
 from evonav.memory_benchmark.streams import make_stream
 from evonav.memory_benchmark.streams.export.recording import Recording
@@ -133,15 +133,13 @@ def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnyStre
     Raises:
         StoreError: A record cannot be read.
     """
-    results = []
+    found = {}
     for memory in memories:
         paths = [record_path(folder, memory, stream.name) for stream in streams]
-        records = tuple(
-            read_model(StreamResult, path, "delete it to measure it again") for path in paths if path.exists()
-        )
+        records = [read_model(StreamResult, path, "delete it to measure it again") for path in paths if path.exists()]
         if records:
-            results.append(MemoryResult(memory=memory, streams=records))
-    return BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=tuple(results))
+            found[memory] = records
+    return BenchmarkResult(machine=machine_name(), memories=found)
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:

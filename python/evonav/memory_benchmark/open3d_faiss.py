@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from evonav.component import optional_module
 from evonav.memory import ObjectMapConfig
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
-from evonav.points import Point3
+from evonav.memory_benchmark.references import point_of
 from evonav.sensors.observation import View
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
@@ -106,7 +106,7 @@ class Open3DFaissMemory:
     """The memory. It runs on one thread of faiss."""
 
     def __init__(self) -> None:
-        """Begin without entries.
+        """Load the libraries.
 
         Raises:
             StoreError: Open3D or faiss is not installed.
@@ -114,17 +114,13 @@ class Open3DFaissMemory:
         _open3d()
         _faiss().omp_set_num_threads(1)
         self.config = ObjectMapConfig()
-        self._start()
 
-    def _start(self) -> None:
+    def reset(self, info: StreamInfo) -> None:
+        """Forget everything."""
         self._entries: list[_CloudEntry] = []
         self._num_views = self._next_id = 0
         self.entry_ids: list[int | None] = []
         """Entry of each detection of the last frame; `None` where it was filtered out."""
-
-    def reset(self, info: StreamInfo) -> None:
-        """Forget everything."""
-        self._start()
 
     def visit(self, time_s: float) -> None:
         """Change nothing: the originals do not know of visits."""
@@ -191,8 +187,8 @@ class Open3DFaissMemory:
                 MemoryEntry(
                     entry_id=entry.entry_id,
                     label=entry.cloud.label,
-                    centre_m=_point((low + high) / 2.0),
-                    size_m=_point(high - low),
+                    centre_m=point_of((low + high) / 2.0),
+                    size_m=point_of(high - low),
                     confidence=entry.cloud.confidence,
                     first_seen_s=entry.first_s,
                     last_seen_s=entry.last_s,
@@ -259,11 +255,6 @@ def largest_cluster(points: Any, config: ObjectMapConfig) -> Any:  # noqa: ANN40
 
 def _box(points: Any) -> Any:  # noqa: ANN401 - of Open3D
     return points.get_oriented_bounding_box(robust=True) if len(points.points) >= 4 else None
-
-
-def _point(values: NDArray[np.float32]) -> Point3:
-    x, y, z = map(float, values)
-    return x, y, z
 
 
 @cache

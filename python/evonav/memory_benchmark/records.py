@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from evonav.errors import InvalidArgumentError
+from evonav._core import __version__
 from evonav.memory_benchmark.answers import FailureKind, Hosting
 from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.counts import BeliefScore, QueryCounts, QueryState, UpdateCounts
@@ -65,42 +65,20 @@ class StreamResult(MeasurementRecord):
     """Whether a second run gave the same bits; `None` if there was none."""
 
 
-class MemoryResult(MeasurementRecord):
-    """The results of one memory in all streams."""
-
-    memory: str
-    streams: tuple[StreamResult, ...]
-
-    @property
-    def failures(self) -> tuple[StreamResult, ...]:
-        """The streams in which it failed."""
-        return tuple(stream for stream in self.streams if stream.failure is not None)
-
-    def of_kind(self, kind: str | None) -> tuple[StreamResult, ...]:
-        """Return the streams of a kind in which it did not fail; of all kinds for `None`."""
-        return tuple(one for one in self.streams if one.failure is None and kind in (None, one.kind))
-
-
 class BenchmarkResult(MeasurementRecord):
     """All memories of one run of the benchmark."""
 
     schema_version: Version = 1
-    evonav_version: str
+    evonav_version: str = __version__
     machine: str
     """The processor and the number of its cores: times of different machines do not compare."""
-    memories: tuple[MemoryResult, ...]
+    memories: dict[str, list[StreamResult]]
+    """The results of each memory in all streams, by its name."""
 
-    def memory(self, name: str) -> MemoryResult:
-        """Return a memory by its name.
 
-        Raises:
-            InvalidArgumentError: There is none of that name.
-        """
-        for result in self.memories:
-            if result.memory == name:
-                return result
-        known = ", ".join(result.memory for result in self.memories)
-        raise InvalidArgumentError(f"memory = {name!r}: the result has {known}")
+def judged(streams: Iterable[StreamResult], kind: str | None = None) -> list[StreamResult]:
+    """Return the streams of a kind in which a memory did not fail; of all kinds for `None`."""
+    return [one for one in streams if one.failure is None and kind in (None, one.kind)]
 
 
 class MemoryHeader(MeasurementRecord):
@@ -118,8 +96,3 @@ def read_result(path: Path) -> BenchmarkResult:
         StoreError: The file cannot be read, or is no result; the message has the first field that is wrong.
     """
     return read_model(BenchmarkResult, path, "expected a result.json of `evonav bench memory`")
-
-
-def kinds_of(results: Iterable[MemoryResult]) -> list[str]:
-    """Return the kinds of all streams, sorted."""
-    return sorted({stream.kind for result in results for stream in result.streams})

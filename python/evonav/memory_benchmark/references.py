@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.memory import forgetting
-from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
+from evonav.memory.objects import ObjectEntry, ObjectMap, ObjectMapConfig
 from evonav.memory_benchmark.protocol import FoundPlace, MemoryEntry, MemoryFrame, StreamInfo
 from evonav.points import Point3
 from evonav.world.camera import unproject
@@ -34,19 +34,15 @@ class ObjectMapMemory:
         Raises:
             InvalidArgumentError: There is no such rule, or it has no such option.
         """
-        self._config = ObjectMapConfig(min_detections=min_detections)
         self._make_rule = partial(forgetting.make, rule, **options)
-        self._start()
-
-    def _start(self) -> None:
-        self.map = ObjectMap(self._config)
         self.rule = self._make_rule()
+        self.map = ObjectMap(ObjectMapConfig(min_detections=min_detections))
         self._seen_s: dict[int, tuple[float, float]] = {}
         """Times of the first and the last frame that supports each entry."""
 
     def reset(self, info: StreamInfo) -> None:
         """Begin with an empty map."""
-        self._start()
+        self.rule, self.map, self._seen_s = self._make_rule(), ObjectMap(self.map.config), {}
 
     def visit(self, time_s: float) -> None:
         """Begin a visit."""
@@ -54,11 +50,7 @@ class ObjectMapMemory:
 
     def observe(self, frame: MemoryFrame) -> None:
         """Merge the detections of a frame into the map, then forget."""
-        update = self.map.update(frame.view)
-        self._note(update, frame.time_s)
-        self._drop(self.rule.after_update(self.map, frame.view, update, frame.time_s))
-
-    def _note(self, update: ObjectUpdate, time_s: float) -> None:
+        update, time_s = self.map.update(frame.view), frame.time_s
         for gone, became in update.merged:
             first_s, last_s = self._seen_s.pop(gone, (time_s, time_s))
             other = self._seen_s.get(became, (first_s, last_s))
@@ -67,6 +59,7 @@ class ObjectMapMemory:
         for entry_id in update.entry_ids:
             if entry_id is not None:
                 self._seen_s[entry_id] = (self._seen_s.get(entry_id, (time_s,))[0], time_s)
+        self._drop(self.rule.after_update(self.map, frame.view, update, time_s))
 
     def _drop(self, entry_ids: Sequence[int]) -> None:
         for entry_id in entry_ids:
@@ -74,20 +67,19 @@ class ObjectMapMemory:
 
     def entries(self) -> list[MemoryEntry]:
         """Return the entries of the map."""
-        return [self._entry(entry) for entry in self.map.entries]
-
-    def _entry(self, entry: ObjectEntry) -> MemoryEntry:
-        first_s, last_s = self._seen_s[entry.id]
-        return MemoryEntry(
-            entry_id=entry.id,
-            label=entry.label,
-            centre_m=entry.centre_m,
-            size_m=entry.size_m,
-            confidence=entry.confidence,
-            p_present=self.rule.p_present(entry.id),
-            first_seen_s=first_s,
-            last_seen_s=last_s,
-        )
+        return [
+            MemoryEntry(
+                entry_id=entry.id,
+                label=entry.label,
+                centre_m=entry.centre_m,
+                size_m=entry.size_m,
+                confidence=entry.confidence,
+                p_present=self.rule.p_present(entry.id),
+                first_seen_s=self._seen_s[entry.id][0],
+                last_seen_s=self._seen_s[entry.id][1],
+            )
+            for entry in self.map.entries
+        ]
 
     def locate(self, text: str, k: int) -> list[FoundPlace]:
         """Return the entries with this label, those most probably present first, of equals those seen last."""
@@ -114,20 +106,13 @@ class NumpyList:
     join_m = 0.5
     """Largest distance between the middles of a detection and of the entry that it joins."""
 
-    def __init__(self) -> None:
+    def reset(self, info: StreamInfo) -> None:
         """Begin with an empty list."""
-        self._start()
-
-    def _start(self) -> None:
         self._labels: list[str] = []
         self._boxes_m: NDArray[np.float64] = np.zeros((0, 2, 3))
         """`(N, 2, 3)` smallest and largest corner of each entry's last detection."""
         self._confidences: list[float] = []
         self._seen_s: list[tuple[float, float]] = []
-
-    def reset(self, info: StreamInfo) -> None:
-        """Begin with an empty list."""
-        self._start()
 
     def visit(self, time_s: float) -> None:
         """Change nothing: the list does not know of visits."""
@@ -164,8 +149,8 @@ class NumpyList:
             MemoryEntry(
                 entry_id=index,
                 label=label,
-                centre_m=_point(box_m.mean(axis=0)),
-                size_m=_point(box_m[1] - box_m[0]),
+                centre_m=point_of(box_m.mean(axis=0)),
+                size_m=point_of(box_m[1] - box_m[0]),
                 confidence=self._confidences[index],
                 first_seen_s=self._seen_s[index][0],
                 last_seen_s=self._seen_s[index][1],
@@ -177,13 +162,16 @@ class NumpyList:
         """Return the places with this label, those seen last first."""
         found = [index for index, label in enumerate(self._labels) if label == text]
         found.sort(key=lambda index: (-self._seen_s[index][1], index))
-        return [FoundPlace(_point(self._boxes_m[index].mean(axis=0)), self._confidences[index]) for index in found[:k]]
+        return [
+            FoundPlace(point_of(self._boxes_m[index].mean(axis=0)), self._confidences[index]) for index in found[:k]
+        ]
 
     def num_bytes(self) -> int:
         """Return the bytes of the boxes and labels, and about those of the numbers that go with them."""
         return self._boxes_m.nbytes + sum(map(len, self._labels)) + 2 * SEEN_BYTES * len(self._labels)
 
 
-def _point(values: NDArray[np.float64]) -> Point3:
+def point_of(values: NDArray[np.floating]) -> Point3:
+    """Return the numbers of an array `(3,)`."""
     x, y, z = values.tolist()
     return x, y, z

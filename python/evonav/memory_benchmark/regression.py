@@ -1,9 +1,9 @@
 """Compare two results: which figures are worse than before, beyond what the houses explain."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
-from evonav.memory_benchmark.aggregate import BASELINE, METRICS, bootstrap_of, paired, ratios
-from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult
+from evonav.memory_benchmark.aggregate import BASELINE, METRICS, Streams, bootstrap_of, paired, ratios
+from evonav.memory_benchmark.records import BenchmarkResult
 from evonav.statistics import BeforeAfter, Estimate
 
 TIME_TOLERANCE = 1.25
@@ -23,49 +23,41 @@ def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASEL
     Returns:
         All figures that both results have, of the memories in both.
     """
-    earlier = {result.memory: result for result in before.memories}
-    bases = [next((one for one in result.memories if one.memory == baseline), None) for result in (now, before)]
     found: list[BeforeAfter] = []
-    for result in now.memories:
-        if (old := earlier.get(result.memory)) is None:
+    bases = [one.memories.get(baseline) for one in (now, before)]
+    for memory, streams in now.memories.items():
+        if (earlier := before.memories.get(memory)) is None:
             continue
-        found += _failures(result, old)
-        found += _figures(result, old)
-        if bases[0] is not None and bases[1] is not None and result.memory != baseline:
-            found += _times(result, old, bases[0], bases[1])
+        found += _failures(memory, streams, earlier)
+        ours, theirs = paired(streams, earlier)
+        if ours:
+            found += _figures(memory, ours, theirs)
+        if bases[0] is not None and bases[1] is not None and memory != baseline:
+            found += _times(memory, ratios(ours, bases[0]), ratios(theirs, bases[1]))
     return found
 
 
-def _failures(now: MemoryResult, before: MemoryResult) -> Iterator[BeforeAfter]:
-    names = {stream.stream for stream in now.streams} & {stream.stream for stream in before.streams}
-    counts = [sum(stream.stream in names for stream in result.failures) for result in (before, now)]
-    old, new = counts
-    yield BeforeAfter(f"{now.memory}: failed_streams", old, new, new > old, new < old)
+def _failures(memory: str, now: Streams, before: Streams) -> Iterator[BeforeAfter]:
+    both = {stream.stream for stream in now} & {stream.stream for stream in before}
+    old, new = (sum(one.stream in both and one.failure is not None for one in streams) for streams in (before, now))
+    yield BeforeAfter(f"{memory}: failed_streams", old, new, new > old, new < old)
 
 
-def _figures(now: MemoryResult, before: MemoryResult) -> Iterator[BeforeAfter]:
-    ours, theirs = paired(now.streams, before.streams)
-    if not ours:
-        return
+def _figures(memory: str, ours: Streams, theirs: Streams) -> Iterator[BeforeAfter]:
     bootstrap = bootstrap_of(ours)
     for name, metric in METRICS.items():
         if metric.is_time:
             continue
         new, old = metric.estimate(ours, bootstrap), metric.estimate(theirs, bootstrap)
         if new.value is not None and old.value is not None:
-            yield _difference(f"{now.memory}: {name}", new, old, is_higher_better=metric.is_higher_better)
+            yield _difference(f"{memory}: {name}", new, old, is_higher_better=metric.is_higher_better)
 
 
-def _times(
-    now: MemoryResult, before: MemoryResult, base_now: MemoryResult, base_before: MemoryResult
-) -> Iterator[BeforeAfter]:
-    ours, theirs = paired(now.streams, before.streams)
-    new_ratios = ratios(now.model_copy(update={"streams": tuple(ours)}), base_now)
-    old_ratios = ratios(before.model_copy(update={"streams": tuple(theirs)}), base_before)
-    for name in (name for name in new_ratios if name in old_ratios and METRICS[name].is_time):
-        values = [found[name].value or 0.0 for found in (new_ratios, old_ratios)]
+def _times(memory: str, now: Mapping[str, Estimate], before: Mapping[str, Estimate]) -> Iterator[BeforeAfter]:
+    for name in (name for name in now if name in before and METRICS[name].is_time):
+        values = [found[name].value or 0.0 for found in (now, before)]
         is_large = max(values) > TIME_TOLERANCE * min(values)
-        yield _difference(f"{now.memory}: {name}", new_ratios[name], old_ratios[name], is_large=is_large)
+        yield _difference(f"{memory}: {name}", now[name], before[name], is_large=is_large)
 
 
 def _difference(

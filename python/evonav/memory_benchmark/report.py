@@ -11,7 +11,7 @@ import numpy as np
 
 from evonav.memory_benchmark.aggregate import BASELINE, estimates, ratios
 from evonav.memory_benchmark.metrics.spells import durations_of, kaplan_meier
-from evonav.memory_benchmark.records import BenchmarkResult, kinds_of
+from evonav.memory_benchmark.records import BenchmarkResult, judged
 from evonav.memory_benchmark.streams.spec import TITLES
 from evonav.parallel.folders import write_atomically
 from evonav.report.pages.template import page_text
@@ -84,12 +84,10 @@ def scores(result: BenchmarkResult, kind: str | None = None) -> dict[str, dict[s
     Args:
         kind: Kind of streams; default: all.
     """
-    baseline = next((one for one in result.memories if one.memory == BASELINE), None)
-    found = {}
-    for memory in result.memories:
-        figures = estimates(memory, kind)
-        ratio = None if baseline is None else ratios(memory, baseline, kind).get(P95)
-        found[memory.memory] = figures if ratio is None else {**figures, RATIO: ratio}
+    baseline, found = result.memories.get(BASELINE, ()), {}
+    for memory, streams in result.memories.items():
+        ratio = ratios(streams, baseline, kind).get(P95)
+        found[memory] = {**estimates(streams, kind), **({} if ratio is None else {RATIO: ratio})}
     return found
 
 
@@ -98,19 +96,22 @@ def memory_tables(result: BenchmarkResult) -> list[Table]:
     found = scores(result)
     tables = [_table("Memories", result, found, COLUMNS, None, NOTES), _table("More", result, found, MORE, None)]
     titles = {str(kind): f"{kind}: {title}" for kind, title in TITLES.items()}
-    kinds = kinds_of(result.memories)
+    kinds = sorted({one.kind for streams in result.memories.values() for one in streams})
     for kind in kinds if len(kinds) > 1 else ():
         tables.append(_table(titles.get(kind, kind), result, scores(result, kind), COLUMNS, kind))
     rows = tuple(
-        (memory.memory, one.stream, one.failure.kind, str(one.num_frames), one.failure.message)
-        for memory in result.memories
-        for one in memory.failures
+        (memory, one.stream, one.failure.kind, str(one.num_frames), one.failure.message)
+        for memory, streams in result.memories.items()
+        for one in streams
         if one.failure is not None
     )
     if rows:
         tables.append(Table(FAILURES, ("memory", "stream", "what", "frames", "message"), rows))
     noted = tuple(
-        (memory.memory, one.stream, note) for memory in result.memories for one in memory.streams for note in one.notes
+        (memory, one.stream, note)
+        for memory, streams in result.memories.items()
+        for one in streams
+        for note in one.notes
     )
     return [*tables, Table(REMARKS, ("memory", "stream", "note"), noted)] if noted else tables
 
@@ -124,15 +125,15 @@ def _table(
     notes: tuple[str, ...] = (),
 ) -> Table:
     cells = {
-        heading: [text_of(found[memory.memory].get(name), scale, digits) for memory in result.memories]
+        heading: [text_of(found[memory].get(name), scale, digits) for memory in result.memories]
         for name, heading, scale, digits in columns
     }
     shown = {heading: texts for heading, texts in cells.items() if set(texts) != {NONE}}
     streams = []
-    for memory in result.memories:
-        num_failed = len([one for one in memory.failures if kind in (None, one.kind)])
-        streams.append(f"{len(memory.of_kind(kind))}{f' ({num_failed} failed)' if num_failed else ''}")
-    rows = zip([memory.memory for memory in result.memories], streams, *shown.values(), strict=True)
+    for every in result.memories.values():
+        num_failed = sum(one.failure is not None and kind in (None, one.kind) for one in every)
+        streams.append(f"{len(judged(every, kind))}{f' ({num_failed} failed)' if num_failed else ''}")
+    rows = zip(result.memories, streams, *shown.values(), strict=True)
     return Table(title, ("memory", "streams", *shown), tuple(rows), notes)
 
 
@@ -165,13 +166,13 @@ def write_memory_report(result: BenchmarkResult, folder: Path, *, num_missing: i
     plots: list[Plot] = [*([latency] if latency.dots else []), *([survival] if survival.lines else [])]
     if latency.dots and has_renderer():
         write_plots([latency], folder / PLOT_NAME)
-    streams = {stream.stream: stream for memory in result.memories for stream in memory.streams}
+    streams = {one.stream: one for streams in result.memories.values() for one in streams}
     text = page_text(
         "memory.html.j2",
         file_text("report.css") + plot_css() + file_text("perception.css"),
         machine=result.machine,
         version=result.evonav_version,
-        names=[memory.memory for memory in result.memories],
+        names=list(result.memories),
         num_streams=len(streams),
         num_houses=len({stream.house for stream in streams.values()}),
         missing=num_missing,
@@ -217,8 +218,8 @@ def latency_plot(found: Scores) -> ScatterPlot:
 def survival_plot(result: BenchmarkResult) -> CurvePlot:
     """Return the share of stale entries that outlast so many frames of evidence, a line a memory."""
     lines = []
-    for memory in result.memories:
-        spells = [spell for stream in memory.of_kind(None) for spell in stream.spells]
+    for memory, streams in result.memories.items():
+        spells = [spell for stream in judged(streams) for spell in stream.spells]
         durations, is_over = durations_of(spells, "evident", "evidence_frames")
         if not len(durations):
             continue
@@ -226,7 +227,7 @@ def survival_plot(result: BenchmarkResult) -> CurvePlot:
         frames = np.arange(MAX_FRAMES + 1)
         shares = np.concatenate([[1.0], left])[np.searchsorted(ends, frames, side="right")]
         points = tuple(zip(frames.astype(float).tolist(), (100.0 * shares).tolist(), strict=True))
-        lines.append(Line(memory.memory, points, has_dots=False))
+        lines.append(Line(memory, points, has_dots=False))
     return CurvePlot(
         "Stale entries that are left", tuple(lines), "frames of evidence", "% of stale entries", y_top=100.0
     )

@@ -216,7 +216,7 @@ def score(
     """Score the answers that a system wrote to files."""
     from evonav.errors import StoreError
     from evonav.memory_benchmark.offline import score as score_stream
-    from evonav.memory_benchmark.records import BenchmarkResult, MemoryResult, read_result
+    from evonav.memory_benchmark.records import BenchmarkResult, read_result
     from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.streams.export.read import ExportedStream
     from evonav.report.machine import machine_name
@@ -233,10 +233,7 @@ def score(
             truth = None if oracle is None else oracle / f"{folder.name}.jsonl.xz"
             file = entries if is_one and entries.is_file() else folder / entries
             records.append(score_stream(ExportedStream(folder, truth), file))
-    from evonav import __version__
-
-    scored = (MemoryResult(memory=system, streams=tuple(records)),)
-    result = BenchmarkResult(evonav_version=__version__, machine=machine_name(), memories=scored)
+    result = BenchmarkResult(machine=machine_name(), memories={system: records})
     _show(result, out, 0)
     if earlier is not None and against is not None:
         tell_worse(against, compare(result, earlier))

@@ -45,7 +45,6 @@ class ForgettingRule(ABC):
         """
         return ()
 
-    @abstractmethod
     def after_update(self, map_: ObjectMap, view: View, update: ObjectUpdate, time_s: float) -> tuple[int, ...]:
         """Forget after each view.
 
@@ -60,6 +59,11 @@ class ForgettingRule(ABC):
         Raises:
             InvalidArgumentError: The depth image contains NaN.
         """
+        return remove_all(map_, self.absent(map_, view, update))
+
+    @abstractmethod
+    def absent(self, map_: ObjectMap, view: View, update: ObjectUpdate) -> list[int]:
+        """Return the ids of the entries to forget after a view; see `after_update`."""
 
     def p_present(self, entry_id: int) -> float | None:
         """Return the probability that an entry's object is still there; `None` if the rule does not tell."""
