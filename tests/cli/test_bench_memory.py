@@ -13,7 +13,6 @@ from evonav.cli.bench.memory import chosen_streams
 from evonav.memory_benchmark.references import ObjectMapMemory
 from evonav.memory_benchmark.streams.export.read import ExportedStream
 
-BAD = Path(__file__).parents[1] / "memory_benchmark" / "bad_memories.py"
 SMALL = ["--streams", "S6", "--quick", "--size", "64x48"]
 
 
@@ -106,33 +105,6 @@ def test_mistakes_are_told(tmp_path):
     assert bench("export", tmp_path, "--layout", "ros").exit_code == 2
     assert "holds no stream" in str(bench("score", tmp_path).exception)
     assert "no memory 'nevr'" in str(bench("--memory", "nevr").exception)
-
-
-@pytest.mark.slow
-def test_bad_memories_get_a_verdict_each_and_the_others_go_on(tmp_path):
-    verdicts = {
-        "Raises": "observe() raises KeyError: 'no such voxel'",
-        "Hangs": "no answer to `observe` within 1 s",
-        "Dies": "the memory's process died (exit code 7)",
-        "NanBoxes": "entries()[1].centre_m = (1.0, nan, 0.0): must be finite",
-        "Million": "entries(): 1000000 entries, must be at most 100000",
-        "LiesAboutBytes": "num_bytes() = 1: 1 entry alone takes at least 6 bytes",
-        "WritesIntoFrames": "observe() raises ValueError: assignment destination is read-only",
-    }
-    names = [f"{BAD}:{name}" for name in (*verdicts, "Good")]
-    words = [word for name in [*names, "never"] for word in ("--memory", name)]
-    run = bench(*SMALL, *words, "--timeout", 1, "--workers", 0, "--out", tmp_path)
-    assert run.exit_code == 0, run.output
-    memories = json.loads((tmp_path / "result.json").read_text())["memories"]
-    for name, verdict in verdicts.items():
-        (record,) = memories[f"{BAD}:{name}"]
-        assert verdict in record["failure"]["message"]
-        assert record["update"] is None
-    page = (tmp_path / "report.html").read_text()
-    assert page.count("no such voxel") == 1
-    for name in (f"{BAD}:Good", "never"):
-        assert memories[name][0]["failure"] is None
-        assert memories[name][0]["update"]["seen"] > 0
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_memory import a_view, block
+from cup_views import GONE, HIDDEN, UNDETECTED, a_cup, a_look, a_view
+from walked_house import walked
 
 import evonav
 from evonav.errors import InvalidArgumentError
@@ -16,23 +16,6 @@ from evonav.sensors.observation import View
 
 DAY_S = 86400.0
 ALL_BUT_RESET = [name for name in forgetting.RULES if name != "reset"]
-
-
-def a_cup() -> View:
-    """A cup of 20 columns, 2.0 to 2.3 m ahead, before a wall."""
-    depth, masks = block()
-    depth[np.isinf(depth)] = 5.0
-    return a_view(depth, masks, "Cup")
-
-
-def a_look(depth_m: float, cols: slice = slice(None)) -> View:
-    """A view without detections: a surface at one depth in some columns, elsewhere the cup and the wall."""
-    depth = a_cup().depth_m.copy()
-    depth[:, cols] = depth_m
-    return a_view(depth, np.full(depth.shape, -1, np.int32))
-
-
-GONE, HIDDEN, UNDETECTED = a_look(5.0), a_look(0.8), a_look(0.8, slice(0, 0))
 
 
 class Played:
@@ -111,9 +94,7 @@ def test_a_place_with_a_surface_is_not_forgotten_after_one_missing_detection(nam
 
 def test_under_see_through_the_old_points_are_gone_after_one_clear_look() -> None:
     played = Played("see-through")
-    moved, masks = block(col=0)  # the cup has moved to the left
-    moved[np.isinf(moved)] = 5.0
-    played.see(a_view(moved, masks, "Cup"))
+    played.see(a_cup(col=0))  # the cup has moved to the left
     assert played.removed == [1]
     (entry,) = played.map.entries
     assert entry.label == "Cup"
@@ -185,8 +166,7 @@ def test_under_share_deleted_an_entry_goes_with_most_of_its_points(num_gone: int
 
 
 def test_share_deleted_notices_a_step_of_centimetres_and_see_through_does_not() -> None:
-    behind = a_cup().depth_m + np.float32(0.05)
-    view = a_view(behind, np.full(behind.shape, -1, np.int32))
+    view = a_view(a_cup().depth_m + np.float32(0.05))
     points = SeeThroughConfig(band_m=0.02, far_m=3.5, margin_px=0)
     assert Played("share-deleted", points=points).see(view).removed == [1]
     assert Played("see-through").see(view).has_cup
@@ -248,22 +228,9 @@ def test_a_typed_error_names_the_nearest_rule_and_option() -> None:
     assert all(rule.name == name for name, rule in forgetting.RULES.items())
 
 
-def walked(house: evonav.House, num_places: int = 4) -> list[View]:
-    """Views in eight directions at some places of a house."""
-    simulator = evonav.Simulator(house)
-    places = simulator.embedded.reachable_positions()
-    views = []
-    for x_m, _, z_m in places[:: max(1, len(places) // num_places)].tolist():
-        for quarter in range(8):
-            pose = replace(simulator.pose, x_m=x_m, z_m=z_m, yaw_rad=quarter * math.pi / 4)
-            simulator.teleport(pose)
-            views.append(simulator.look(rgb=False))
-    return views
-
-
 @pytest.fixture(scope="module")
 def static_tours() -> Sequence[Sequence[View]]:
-    return [walked(house) for house in evonav.load_houses()[2:4]]
+    return [walked(evonav.Simulator(house), 4) for house in evonav.load_houses()[2:4]]
 
 
 @pytest.mark.parametrize("name", ALL_BUT_RESET)

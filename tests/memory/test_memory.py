@@ -5,16 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cup_views import INTRINSICS, a_cup
 from numpy.typing import NDArray
+from walked_house import walked
 
+import evonav
 from evonav.errors import InvalidArgumentError
 from evonav.memory import FrontierConfig, ObjectMap, ObjectMapConfig, OccupancyMap
-from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.perception.ground_truth import DETECTED_KINDS
+from evonav.sensors.observation import MapFrame, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.pose import Pose
-from evonav.world.simulator import Intrinsics, OccupancyGrid
+from evonav.world.simulator import OccupancyGrid
 
-INTRINSICS = Intrinsics(60, 60, math.pi / 2)
 FRAME = MapFrame(40, 60, 0.1, (-1.0, 2.0))
 
 
@@ -24,20 +27,6 @@ def cells(*pairs: tuple[int, int]) -> NDArray[np.int32]:
 
 def seen(free: NDArray[np.int32], blocked: NDArray[np.int32]) -> VisibleOccupancy:
     return VisibleOccupancy(free=free, blocked=blocked)
-
-
-def a_view(depth_m: NDArray[np.float32], masks: NDArray[np.int32], *labels: str) -> View:
-    found = Detections(masks, labels, np.ones(len(labels), np.float32))
-    return View(Pose(0.0, 1.575, 0.0, 0.0, 0.0), INTRINSICS, depth_m, found, seen(cells(), cells()))
-
-
-def block(col: int = 20, depth_m: float = 2.0) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """A slanted square of 20 x 20 pixels, somewhere in the middle rows."""
-    depth = np.full((60, 60), np.inf, np.float32)
-    masks = np.full((60, 60), -1, np.int32)
-    depth[20:40, col : col + 20] = depth_m + np.linspace(0, 0.3, 20, dtype=np.float32)
-    masks[20:40, col : col + 20] = 0
-    return depth, masks
 
 
 def test_conflicts_go_both_ways_and_the_last_observation_counts() -> None:
@@ -121,7 +110,7 @@ def test_a_wall_hides_what_lies_behind_it_and_the_view_ends_with_range_and_angle
 
 def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
     entries = ObjectMap()
-    here, moved = a_view(*block(), "Mug"), a_view(*block(35, 2.6), "Mug")
+    here, moved = a_cup("Mug"), a_cup("Mug", col=35)
     assert entries.update(here).entry_ids == (1,)
     assert entries.update(here).entry_ids == (1,)
     entries.begin_stage(2)
@@ -149,7 +138,7 @@ def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
 
 def test_an_entry_is_the_same_object_until_it_changes() -> None:
     entries = ObjectMap()
-    here, moved = a_view(*block(), "Mug"), a_view(*block(35, 2.6), "Mug")
+    here, moved = a_cup("Mug"), a_cup("Mug", col=35)
     entries.update(here)
     entries.update(moved)
     first, second = entries.entries
@@ -159,15 +148,16 @@ def test_an_entry_is_the_same_object_until_it_changes() -> None:
     seen_again = entries.entry(2)
     assert seen_again is not None
     assert (second.num_detections, seen_again.num_detections) == (1, 2)
-    empty = replace(here, depth_m=np.where(np.arange(60)[:, None] < 30, np.float32(9.0), here.depth_m))
-    assert [one.entry_id for one in entries.remove_seen_through(empty)] == [1]
+    depth_m = np.minimum(here.depth_m, moved.depth_m)
+    depth_m[:30, :30] = 9.0
+    assert [one.entry_id for one in entries.remove_seen_through(replace(here, depth_m=depth_m))] == [1]
     left = entries.entry(1)
     assert left is not None
     assert left.num_points < first.num_points
 
 
 def test_a_map_that_was_cleared_returns_no_entry_of_before() -> None:
-    entries, here = ObjectMap(), a_view(*block(), "Mug")
+    entries, here = ObjectMap(), a_cup("Mug")
     entries.update(here)
     (before,) = entries.entries
     entries.clear()
@@ -178,37 +168,27 @@ def test_a_map_that_was_cleared_returns_no_entry_of_before() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "change"),
+    ("name", "value"),
     [
-        ("depth_m", {"depth_m": np.full((60, 60), np.nan, np.float32)}),
-        ("depth_m", {"depth_m": np.ones((30, 120), np.float32)}),
-        ("depth_m", {"depth_m": np.ones((60, 60), np.float32).T[::-1]}),
-        ("depth_m", {"depth_m": np.ones((60, 60))}),
-        ("depth_m", {"depth_m": np.ones(60, np.float32)}),
+        ("depth_m", np.full((60, 60), np.nan, np.float32)),
+        ("depth_m", np.ones((30, 120), np.float32)),
+        ("depth_m", np.ones((60, 60), np.float32).T[::-1]),
+        ("depth_m", np.ones((60, 60))),
+        ("depth_m", np.ones(60, np.float32)),
+        ("masks", np.full((60, 60), 5, np.int32)),
+        ("masks", np.full((60, 60), -1, np.int64)),
+        ("confidences", np.ones(3, np.float32)),
+        ("confidences", np.full(1, np.nan, np.float32)),
+        ("features", np.ones((3, 4), np.float32)),
+        ("features", np.full((1, 4), np.inf, np.float32)),
     ],
 )
-def test_depth_that_does_not_fit_is_named(name: str, change: dict[str, NDArray[np.float32]]) -> None:
-    entries = ObjectMap()
+def test_arrays_that_do_not_fit_are_named(name: str, value: NDArray[np.generic]) -> None:
+    entries, view = ObjectMap(), a_cup("Mug")
+    is_depth = name == "depth_m"
+    wrong = replace(view, **({name: value} if is_depth else {"detections": replace(view.detections, **{name: value})}))
     with pytest.raises((InvalidArgumentError, TypeError), match=name):
-        entries.update(replace(a_view(*block(), "Mug"), **change))
-    assert entries.num_views == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("masks", {"masks": np.full((60, 60), 5, np.int32)}),
-        ("masks", {"masks": np.full((60, 60), -1, np.int64)}),
-        ("confidences", {"confidences": np.ones(3, np.float32)}),
-        ("confidences", {"confidences": np.full(1, np.nan, np.float32)}),
-        ("features", {"features": np.ones((3, 4), np.float32)}),
-        ("features", {"features": np.full((1, 4), np.inf, np.float32)}),
-    ],
-)
-def test_detections_that_do_not_fit_are_named(name: str, change: dict[str, NDArray[np.float32]]) -> None:
-    entries, view = ObjectMap(), a_view(*block(), "Mug")
-    with pytest.raises((InvalidArgumentError, TypeError), match=name):
-        entries.update(replace(view, detections=replace(view.detections, **change)))
+        entries.update(wrong)
     assert entries.num_views == 0
 
 
@@ -229,3 +209,27 @@ def test_cells_and_parameters_that_do_not_fit_are_named() -> None:
         visible_occupancy(grid, Pose(9, 0, 9, 0), INTRINSICS, 3.0)
     with pytest.raises(InvalidArgumentError, match="`range_m`"):
         visible_occupancy(grid, Pose(0.1, 0, 0.1, 0), INTRINSICS, math.nan)
+
+
+@pytest.mark.parametrize("index", [3, 7])
+def test_the_maps_of_a_whole_house_are_true(index: int) -> None:
+    simulator = evonav.Simulator(evonav.load_houses()[index])
+    cells_of, entries = OccupancyMap(simulator.map_frame), ObjectMap()
+    num_conflicts = 0
+    for view in walked(simulator, 40):
+        num_conflicts += len(cells_of.update(view))
+        entries.update(view)
+    assert num_conflicts == 0, "the house did not change"
+    grid, known = simulator.embedded.occupancy(), cells_of.cells
+    places_m = simulator.embedded.reachable_positions()[:, [0, 2]]
+    cols, rows = np.floor((places_m - grid.corner_m) / grid.cell_m).astype(int).T
+    assert (known[rows, cols] != 0).mean() > 0.9
+    assert (grid.cells[known == 1] == 0).all()
+    assert (grid.cells[known == 2] == 1).all()
+    objects = [body for body in simulator.embedded.objects if body.kind in DETECTED_KINDS]
+    near = [
+        any(body.category == entry.label and math.dist(body.centre_m, entry.centre_m) < 0.8 for body in objects)
+        for entry in entries.entries
+    ]
+    assert len(near) > 0.4 * len(objects)
+    assert np.mean(near) > 0.9

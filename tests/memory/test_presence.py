@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_memory import a_view, block
+from cup_views import UNDETECTED, a_cup, a_look
 
 from evonav.errors import InvalidArgumentError
 from evonav.memory import ObjectMap
@@ -15,15 +15,8 @@ from evonav.sensors.observation import View
 def remembered() -> ObjectMap:
     """A map with one entry, a mug 2.0 to 2.3 m ahead."""
     entries = ObjectMap()
-    entries.update(a_view(*block(), "Mug"))
+    entries.update(a_cup("Mug"))
     return entries
-
-
-def a_look(depth_m: float, cols: slice = slice(None)) -> View:
-    """A view without detections that shows a surface at one depth, elsewhere what was there before."""
-    depth, masks = block()
-    depth[:, cols] = depth_m
-    return a_view(depth, np.full_like(masks, -1))
 
 
 def verdict(view: View, *, is_detected: bool = False) -> Presence:
@@ -48,7 +41,7 @@ def test_an_entry_that_is_half_hidden_and_half_seen_through_is_not_judged() -> N
 
 
 def test_a_surface_at_the_place_is_the_entry_though_nothing_is_detected() -> None:
-    assert verdict(a_look(0.8, slice(0, 0))) is Presence.YES
+    assert verdict(UNDETECTED) is Presence.YES
     assert verdict(a_look(0.8, slice(20, 33))) is Presence.YES  # two thirds of it are hidden
 
 
@@ -79,11 +72,10 @@ def test_the_shares_must_exceed_their_thresholds() -> None:
 
 def test_many_entries_are_compared_in_one_call_and_the_map_stays_as_it_is() -> None:
     entries = remembered()
-    entries.update(a_view(*block(35, 2.6), "Bowl"))
+    entries.update(a_cup("Bowl", col=35))
     before = [entry.num_detections for entry in entries.entries]
-    both = entries.depth_evidence([2, 1], a_look(0.8, slice(0, 0)))
+    both = entries.depth_evidence([2, 1], UNDETECTED)
     assert [found.supported_share for found in both] == [0.0, 1.0]
-    assert both[0].num_in_view < 256  # next to the block the image has no depth
     assert entries.depth_evidence([], a_look(1.0)) == []
     assert [entry.num_detections for entry in entries.entries] == before
     few = entries.depth_evidence([1], a_look(5.0), EvidenceConfig(max_points=20))

@@ -122,8 +122,3 @@ class Raising:
 
     def __init__(self) -> None:
         raise OSError("no weights")
-
-
-class WritesIntoFrames(Good):
-    def observe(self, frame: Any) -> None:
-        frame.view.depth_m[0, 0] = 0.0

@@ -16,7 +16,10 @@ OLD, NEW, OTHER = body("mug", 1.0), body("mug", 3.0), body("plate", 5.0, "Plate"
 BEFORE, GONE, AFTER = (OLD, OTHER), (OTHER,), (NEW, OTHER)
 REMOVED = TrueChange("mug", "Mug", "removed", 4, OLD, None)
 MOVED = TrueChange("mug", "Mug", "moved", 4, OLD, NEW)
-PLATE = entry(2, 5.0, "Plate")
+MUG, PLATE = entry(1, 1.0), entry(2, 5.0, "Plate")
+BOTH = [MUG, PLATE]
+CUP = body("cup", 7.0)
+ADDED = TrueChange("cup", "Mug", "added", 4, None, CUP)
 FIRST = [Shot(BEFORE, visible={"mug": 100, "plate": 100})] * 4
 
 
@@ -36,9 +39,7 @@ def removal(evidence_at: int | None, num: int = 8) -> list[Shot]:
 
 
 def test_stale_entry_cleared_at_frame_7() -> None:
-    result = judged(
-        [*FIRST, *removal(evidence_at=5)], [REMOVED], lambda i: [PLATE] if i >= 7 else [entry(1, 1.0), PLATE]
-    )
+    result = judged([*FIRST, *removal(evidence_at=5)], [REMOVED], lambda i: [PLATE] if i >= 7 else BOTH)
     evident = [spell for spell in result.spells if spell.kind == "evident"]
     # Evidence in frames 5, 6 and 7: two frames at 2 Hz and half a metre each lie between the first and the last.
     assert evident == [Spell("evident", 0, Clocks(frames=2, seconds=1.0, metres=1.0, evidence_frames=3), is_over=True)]
@@ -47,7 +48,7 @@ def test_stale_entry_cleared_at_frame_7() -> None:
 
 
 def test_stale_entry_never_cleared_is_censored() -> None:
-    result = judged([*FIRST, *removal(evidence_at=5)], [REMOVED], lambda i: [entry(1, 1.0), PLATE])
+    result = judged([*FIRST, *removal(evidence_at=5)], [REMOVED], lambda i: BOTH)
     spells = {spell.kind: spell for spell in result.spells}
     assert spells["evident"] == Spell("evident", 0, Clocks(6, 3.0, 3.0, 7), is_over=False)
     assert spells["unseen"] == Spell("unseen", 0, Clocks(1, 0.5, 0.5), is_over=False)
@@ -58,7 +59,7 @@ def test_entry_that_comes_back_was_not_cleared() -> None:
     result = judged(
         [*FIRST, *removal(evidence_at=5)],
         [REMOVED],
-        lambda i: [PLATE] if i in (6, 9, 10, 11) else [entry(1, 1.0), PLATE],
+        lambda i: [PLATE] if i in (6, 9, 10, 11) else BOTH,
     )
     (evident,) = (spell for spell in result.spells if spell.kind == "evident")
     assert (evident.lasted.frames, evident.is_over) == (4, True)
@@ -66,15 +67,13 @@ def test_entry_that_comes_back_was_not_cleared() -> None:
 
 def test_too_few_pixels_are_no_evidence() -> None:
     shots = [*FIRST, *[Shot(GONE, 2, {}, {0: 24})] * 4]
-    result = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE])
+    result = judged(shots, [REMOVED], lambda i: BOTH)
     assert [spell.kind for spell in result.spells] == ["unseen"]
     assert result.update.removals == 0
 
 
 def test_cleared_without_evidence_counts_as_unseen() -> None:
-    result = judged(
-        [*FIRST, *removal(evidence_at=8)], [REMOVED], lambda i: [entry(1, 1.0), PLATE] if i < 6 else [PLATE]
-    )
+    result = judged([*FIRST, *removal(evidence_at=8)], [REMOVED], lambda i: BOTH if i < 6 else [PLATE])
     assert result.spells == (Spell("unseen", 0, Clocks(2, 1.0, 1.0), is_over=True),)
     assert (result.update.removals, result.update.removals_done) == (1, 1)
 
@@ -83,69 +82,62 @@ def test_cleared_without_evidence_counts_as_unseen() -> None:
     ("late", "moves_done", "duplicates"),
     [
         ([entry(1, 3.0), PLATE], 1, 0),
-        ([entry(1, 1.0), entry(3, 3.0), PLATE], 0, 0),  # a move that leaves two entries
+        ([MUG, entry(3, 3.0), PLATE], 0, 0),  # a move that leaves two entries
         ([entry(1, 3.0), entry(3, 3.05), PLATE], 0, 1),  # two at the new place
         ([PLATE], 0, 0),
     ],
 )
 def test_move_is_one_entry(late: list[MemoryEntry], moves_done: int, duplicates: int) -> None:
     shots = [*FIRST, *[Shot(AFTER, 2, {"mug": 30}, {0: 30})] * 4]
-    result = judged(shots, [MOVED], lambda i: [entry(1, 1.0), PLATE] if i < 6 else late)
+    result = judged(shots, [MOVED], lambda i: BOTH if i < 6 else late)
     update = result.update
     assert (update.moves, update.moves_done, update.duplicates) == (1, moves_done, duplicates)
-    assert update.removals_done == (entry(1, 1.0) not in late)
+    assert update.removals_done == (MUG not in late)
 
 
 def test_move_without_a_look_at_the_old_place_is_not_judged() -> None:
     shots = [*FIRST, *[Shot(AFTER, 2, {"mug": 30})] * 4]
-    result = judged(shots, [MOVED], lambda i: [entry(1, 1.0), PLATE])
+    result = judged(shots, [MOVED], lambda i: BOTH)
     assert (result.update.moves, result.update.removals) == (0, 0)
     assert {(spell.kind, spell.is_over) for spell in result.spells} == {("unseen", False), ("appeared", False)}
 
 
 def test_addition_seen_late() -> None:
-    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
-    objects = (*BEFORE, body("cup", 7.0))
+    objects = (*BEFORE, CUP)
     shots = [*FIRST, *[Shot(objects, 2)] * 3, *[Shot(objects, 2, {"cup": 25})] * 3, *[Shot(objects, 3)] * 2]
-    old = [entry(1, 1.0), PLATE]
-    in_time = judged(shots, [added], lambda i: [*old, entry(9, 7.1)] if i >= 9 else old)
+    in_time = judged(shots, [ADDED], lambda i: [*BOTH, entry(9, 7.1)] if i >= 9 else BOTH)
     assert (in_time.update.additions, in_time.update.additions_done) == (1, 1)
     assert in_time.spells == (Spell("appeared", 0, Clocks(2, 1.0, 1.0, 3), is_over=True),)
-    too_late = judged(shots, [added], lambda i: [*old, entry(9, 7.1)] if i >= 10 else old)
+    too_late = judged(shots, [ADDED], lambda i: [*BOTH, entry(9, 7.1)] if i >= 10 else BOTH)
     assert (too_late.update.additions, too_late.update.additions_done) == (1, 0)
     assert too_late.spells[0].is_over
 
 
 def test_object_that_perception_missed_was_not_seen() -> None:
-    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
-    shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 60}, detected=())] * 6]
-    result = judged(shots, [added], lambda i: [entry(1, 1.0), PLATE])
+    shots = [*FIRST, *[Shot((*BEFORE, CUP), 2, {"cup": 60}, detected=())] * 6]
+    result = judged(shots, [ADDED], lambda i: BOTH)
     assert result.spells == ()
     assert (result.update.additions, result.update.seen) == (0, 4)
 
 
 def test_added_object_that_is_forgotten_later_was_found() -> None:
-    added = TrueChange("cup", "Mug", "added", 4, None, body("cup", 7.0))
-    shots = [*FIRST, *[Shot((*BEFORE, body("cup", 7.0)), 2, {"cup": 25})] * 6]
-    old = [entry(1, 1.0), PLATE]
-    result = judged(shots, [added], lambda i: [*old, entry(9, 7.1)] if i in (6, 7) else old)
+    shots = [*FIRST, *[Shot((*BEFORE, CUP), 2, {"cup": 25})] * 6]
+    result = judged(shots, [ADDED], lambda i: [*BOTH, entry(9, 7.1)] if i in (6, 7) else BOTH)
     assert result.spells == (Spell("appeared", 0, Clocks(2, 1.0, 1.0, 3), is_over=True),)
     assert (result.update.additions_done, result.update.false_forgets) == (0, 1)
 
 
 def test_false_forget() -> None:
     shots = [*FIRST, *[Shot(BEFORE, 2)] * 4]
-    both = [entry(1, 1.0), PLATE]
-    update = judged(shots, [], lambda i: [PLATE] if i == 5 else both).update
+    update = judged(shots, [], lambda i: [PLATE] if i == 5 else BOTH).update
     assert (update.standing, update.false_forgets, update.false_forgets_at_end) == (4, 1, 0)
-    update = judged(shots, [], lambda i: [PLATE] if i >= 5 else both).update
+    update = judged(shots, [], lambda i: [PLATE] if i >= 5 else BOTH).update
     assert (update.standing, update.false_forgets, update.false_forgets_at_end) == (4, 1, 1)
 
 
 def test_forgetting_at_the_start_of_a_visit_is_forgetting() -> None:
     shots = [*FIRST, *[Shot(BEFORE, 2)] * 4]
-    both = [entry(1, 1.0), PLATE]
-    update = judged(shots, [], lambda i: [] if i == 4 else both).update
+    update = judged(shots, [], lambda i: [] if i == 4 else BOTH).update
     assert (update.standing, update.false_forgets, update.false_forgets_at_end) == (4, 2, 0)
 
 
@@ -166,7 +158,7 @@ def test_moved_object_is_no_false_forget() -> None:
 def test_object_put_back_ends_the_spell() -> None:
     back = TrueChange("mug", "Mug", "moved", 8, NEW, OLD)
     shots = [*FIRST, *[Shot(AFTER, 2, {}, {0: 30})] * 4, *[Shot(BEFORE, 3, {"mug": 50})] * 4]
-    result = judged(shots, [MOVED, back], lambda i: [entry(1, 1.0), PLATE])
+    result = judged(shots, [MOVED, back], lambda i: BOTH)
     assert Spell("evident", 0, Clocks(3, 1.5, 1.5, 4), is_over=False) in result.spells
     assert Spell("appeared", 1, Clocks(0, 0.0, 0.0, 1), is_over=True) in result.spells
     assert result.update.right_entries == 5  # two, then the plate alone, then two
@@ -175,7 +167,7 @@ def test_object_put_back_ends_the_spell() -> None:
 def test_small_move_is_no_change_for_a_memory() -> None:
     near = body("mug", 1.2)
     shots = [*FIRST, *[Shot((near, OTHER), 2, {"mug": 30}, {0: 30})] * 4]
-    result = judged(shots, [TrueChange("mug", "Mug", "moved", 4, OLD, near)], lambda i: [entry(1, 1.0), PLATE])
+    result = judged(shots, [TrueChange("mug", "Mug", "moved", 4, OLD, near)], lambda i: BOTH)
     assert result.spells == ()
     assert (result.update.moves, result.update.removals) == (0, 0)
 
@@ -196,17 +188,17 @@ def test_entry_with_a_small_probability_is_not_believed() -> None:
 
 def test_change_f1_over_two_visits() -> None:
     shots = [*FIRST, *removal(evidence_at=5)]
-    told = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE] if i < 7 else [PLATE]).update
+    told = judged(shots, [REMOVED], lambda i: BOTH if i < 7 else [PLATE]).update
     assert (told.gone, told.come) == (ChangeCounts(hits=1), ChangeCounts())
-    silent = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE]).update
+    silent = judged(shots, [REMOVED], lambda i: BOTH).update
     assert (silent.gone, silent.come) == (ChangeCounts(misses=1), ChangeCounts())
-    wrong = judged(shots, [REMOVED], lambda i: [entry(1, 1.0), PLATE] if i < 7 else [entry(1, 1.0)]).update
+    wrong = judged(shots, [REMOVED], lambda i: BOTH if i < 7 else [MUG]).update
     assert wrong.gone == ChangeCounts(false_alarms=1, misses=1)
 
 
 def test_entries_asked_for_less_often() -> None:
     shots = [*FIRST, *removal(evidence_at=5)]
-    result = judged(shots, [REMOVED], lambda i: [PLATE] if i >= 7 else [entry(1, 1.0), PLATE], every=3)
+    result = judged(shots, [REMOVED], lambda i: [PLATE] if i >= 7 else BOTH, every=3)
     (evident,) = (spell for spell in result.spells if spell.kind == "evident")
     assert (evident.lasted.frames, evident.is_over) == (3, True)  # asked after frames 5 and 8
 
@@ -214,8 +206,7 @@ def test_entries_asked_for_less_often() -> None:
 def test_entry_that_is_nearer_to_another_object_is_not_forgotten() -> None:
     near = body("cup", 1.12)  # it comes next to the mug, and nearer to the mug's entry
     shots = [*FIRST, *[Shot((*BEFORE, near), 2, {"cup": 30})] * 4]
-    added = TrueChange("cup", "Mug", "added", 4, None, near)
-    update = judged(shots, [added], lambda i: [entry(1, 1.25), PLATE]).update
+    update = judged(shots, [TrueChange("cup", "Mug", "added", 4, None, near)], lambda i: [entry(1, 1.25), PLATE]).update
     assert (update.standing, update.false_forgets) == (5, 0)
 
 
