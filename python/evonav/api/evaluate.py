@@ -109,9 +109,7 @@ def _run(evaluation: Evaluation, settings: RunSettings, retry_errored: bool) -> 
             settings.workforce(),
             num_retries=settings.num_retries,
             retry_errored=retry_errored,
-            on_progress=lambda _, state: show(
-                state.num_done, state.num_stages, "" if state.latest is None else state.latest.label
-            ),
+            on_progress=lambda _, state: show(state.num_done, state.num_stages, state.label),
         )
 
 

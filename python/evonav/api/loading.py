@@ -107,7 +107,7 @@ def load_houses(
 def _house_texts(source: str | Path, options: HouseOptions | None = None) -> HouseTexts:
     if (split := split_to_make(str(source))) is not None:
         with progress_bar("houses") as show:
-            made_split(split, on_progress=lambda state: show(state.num_houses, SPLITS[split].num_houses, ""))
+            made_split(split, on_progress=lambda state: show(state.num_houses, SPLITS[split].num_houses))
     try:
         return HouseTexts(source, options)
     except HouseError as error:

@@ -1,7 +1,6 @@
 """Show tables, status lines and progress bars."""
 
 import signal
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,13 +10,10 @@ import typer
 from evonav.counted import counted
 
 EXIT_INTERRUPTED = 130
-LINE_EVERY_S = 60.0
-"""Seconds between two lines of progress where there is no terminal."""
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
-    from rich.table import Table as RichTable
+    from contextlib import AbstractContextManager
 
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress
@@ -27,18 +23,8 @@ if TYPE_CHECKING:
     from evonav.report.tables.table import Table
 
 
-_GAP = 3
+_GAP = 2
 """Width of the space between two columns of a table, in characters."""
-
-
-def show(table: "RichTable") -> None:
-    """Print a table of a terminal's own; cells that are not wrapped are never cut off."""
-    from rich.console import Console
-    from rich.measure import Measurement
-
-    console = Console()
-    needed = Measurement.get(console, console.options, table).minimum
-    Console(width=max(console.width, needed)).print(table)
 
 
 def show_tables(tables: "Iterable[Table]", *, notes: "Sequence[str]" = ()) -> None:
@@ -165,30 +151,21 @@ def write_files(
 
 def print_table(summaries: "list[AgentSummary]") -> None:
     """Print the rates of agents, and how many stages are missing."""
-    from rich.table import Table
-    from rich.text import Text
+    from evonav.report.tables.table import Table
 
-    from evonav.report.tables.table import short_names
-
-    names = short_names(summary.agent for summary in summaries)
-    table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target moved")
-    table.add_column("agent", overflow="fold")
-    for heading in ("n", "SR", "95%", "SPL", "95%", "moved", "not moved"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    title = "SR and SPL in % with 95% intervals; SR by whether the target moved"
+    columns = ("agent", "n", "SR", "95%", "SPL", "95%", "moved", "not moved")
+    rows = []
     for summary in summaries:
-        splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
-        table.add_row(
-            Text(names.get(summary.agent, summary.agent)),
-            str(summary.n),
-            percent(summary.sr),
-            _percent_interval(summary.sr_ci95),
-            percent(summary.spl),
-            _percent_interval(summary.spl_ci95),
-            *("-" if rates is None else f"{percent(rates.sr)} ({rates.n})" for rates in splits),
+        ends = (
+            "-" if ci is None else f"{100 * ci[0]:.0f}-{100 * ci[1]:.0f}" for ci in (summary.sr_ci95, summary.spl_ci95)
         )
-    show(table)
-    for name, short in names.items():
-        typer.echo(f"{short} is {name}.")
+        splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
+        moved = ("-" if rates is None else f"{percent(rates.sr)} ({rates.n})" for rates in splits)
+        rows.append(
+            (summary.agent, str(summary.n), percent(summary.sr), next(ends), percent(summary.spl), next(ends), *moved)
+        )
+    show_tables([Table(title, columns, tuple(rows))])
     for summary in summaries:
         if summary.is_incomplete:
             states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)
@@ -198,10 +175,6 @@ def print_table(summaries: "list[AgentSummary]") -> None:
 def percent(value: float | None) -> str:
     """Return a rate of 0 to 1 in percent, `-` without one."""
     return "-" if value is None else f"{100 * value:.1f}"
-
-
-def _percent_interval(interval: tuple[float, float] | None) -> str:
-    return "-" if interval is None else f"{100 * interval[0]:.0f}-{100 * interval[1]:.0f}"
 
 
 def print_checks(title: str, checks: "Iterable[tuple[str, str, str, str]]") -> None:
@@ -228,89 +201,38 @@ def status(text: str) -> "Iterator[Callable[[str], None]]":
         yield lambda name: status.update(f"{text}: {name}")
 
 
-@contextmanager
-def progress_bar(description: str) -> "Iterator[Callable[..., None]]":
-    """Show a progress bar; the yielded function takes the numbers of done and of all, and may take a description."""
-    from rich import progress as bars
-    from rich.console import Console
+def progress_bar(description: str) -> "AbstractContextManager[Callable[..., None]]":
+    """Show a progress bar on a terminal, else a line each minute; see `evonav.api.progress`."""
+    from evonav.api.progress import progress_bar
 
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TimeElapsedColumn(),
-        bars.TimeRemainingColumn(),
-    )
-    with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-        line = bar.add_task(description, total=None)
-
-        def show(num_done: int, num_all: int, latest: str = "") -> None:
-            bar.update(line, completed=num_done, total=num_all, description=latest or description)
-
-        yield show
+    return progress_bar(description, is_command=True)
 
 
 @contextmanager
 def progress() -> "Iterator[Callable[[Progress], None]]":
     """Show a progress bar over stages; the yielded function updates it."""
     with progress_bar("stages") as show:
-        yield lambda state: show(state.num_done, state.num_stages, "" if state.latest is None else state.latest.label)
+        yield lambda state: show(state.num_done, state.num_stages, state.label)
 
 
 @contextmanager
 def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
-    """Show a progress bar over houses on a terminal, else print a line each minute."""
+    """Show progress over tasks that are generated; the yielded function updates it."""
 
-    def line(state: "GenerationProgress") -> str:
-        left_s = state.seconds * (1.0 - state.share) / state.share if state.share else float("inf")
-        return f"{100 * state.share:.0f}%: {_counts(state)}, about {left_s / 60:.0f} min left"
+    def counts(state: "GenerationProgress") -> str:
+        failed = f", {state.num_failed} failed" if state.num_failed else ""
+        rejected = f"{counted(state.num_rejected, 'house')} rejected"
+        return f"{counted(state.num_tasks, 'task')} ({state.tasks_per_s:.1f}/s), {rejected}{failed}"
 
-    with _bar_or_lines("starting", 1.0) as show:
-        yield lambda state: show(state.share, _counts(state), lambda: line(state))
+    with progress_bar("starting") as show:
+        yield lambda state: show(state.share, 1.0, counts(state))
 
 
 @contextmanager
 def house_progress(count: int) -> "Iterator[Callable[[MakingProgress], None]]":
-    """Show a progress bar over houses that are made on a terminal, else print a line each minute."""
-    with _bar_or_lines("houses", float(count)) as show:
-        yield lambda state: show(
-            float(state.num_houses), "houses", lambda: f"{state.num_houses} of {counted(count, 'house')}"
-        )
-
-
-@contextmanager
-def _bar_or_lines(description: str, total: float) -> "Iterator[Callable[[float, str, Callable[[], str]], None]]":
-    """Show a progress bar on a terminal, else print a line each minute.
-
-    Yields:
-        A function of what is done, the bar's description, and a function that writes the line.
-    """
-    from rich import progress as bars
-    from rich.console import Console
-
-    from evonav.api.progress import bar_columns
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        printed_s = time.monotonic()
-
-        def tell(_done: float, _description: str, line: "Callable[[], str]") -> None:
-            nonlocal printed_s
-            if time.monotonic() - printed_s >= LINE_EVERY_S:
-                printed_s = time.monotonic()
-                typer.echo(line(), err=True)
-
-        yield tell
-        return
-    with bars.Progress(*bar_columns(), console=console) as bar:
-        task = bar.add_task(description, total=total)
-        yield lambda done, description, _: bar.update(task, completed=done, description=description)
-
-
-def _counts(state: "GenerationProgress") -> str:
-    failed = f", {state.num_failed} failed" if state.num_failed else ""
-    rejected = f"{counted(state.num_rejected, 'house')} rejected"
-    return f"{counted(state.num_tasks, 'task')} ({state.tasks_per_s:.1f}/s), {rejected}{failed}"
+    """Show progress over houses that are made; the yielded function updates it."""
+    with progress_bar("houses") as show:
+        yield lambda state: show(state.num_houses, count)
 
 
 @contextmanager

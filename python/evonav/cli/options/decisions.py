@@ -71,13 +71,11 @@ def print_estimate(
     num_workers: int,
 ) -> None:
     """Print what a run would ask and cost, estimated from a few of its tasks."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from evonav.cli.display import progress
+    from evonav.cli.display import progress, show_tables
     from evonav.counted import counted
     from evonav.decision.backends import OUTPUT_TOKENS
     from evonav.evaluation.cost_estimate import estimate_run, total_usage
+    from evonav.report.tables.table import Table
 
     options = dict(config.backend.decision.options)
     price = spending.price(options["model"])
@@ -85,16 +83,15 @@ def print_estimate(
         estimates = estimate_run(agents, tasks, config, options, num_workers=num_workers, on_progress=show)
     first = estimates[0]
     title = f"Estimate for {counted(first.num_stages, 'stage')}, from {first.num_stages_run} run with the text matcher"
-    table = Table(title=title)
-    for heading in ("agent", "requests", "by kind", "tokens in", "95%", "tokens out", "dollars"):
-        table.add_column(heading, justify="left" if heading in ("agent", "by kind") else "right")
+    rows = []
     for found in estimates:
         kinds = ", ".join(f"{kind} {count:.0f}" for kind, count in found.kinds.items())
         error = _relative(found.relative_error)
         cost = "?" if price is None else f"{price.of(total_usage([found])):.2f}"
         counts = (f"{found.num_requests:.0f}", kinds, f"{found.input_tokens:.0f}", error, f"{found.output_tokens:.0f}")
-        table.add_row(found.agent, *counts, cost)
-    Console().print(table)
+        rows.append((found.agent, *counts, cost))
+    columns = ("agent", "requests", "by kind", "tokens in", "95%", "tokens out", "dollars")
+    show_tables([Table(title, columns, tuple(rows))])
     typer.echo(
         "Input tokens assume 3 characters of text per token, and images as gpt-4o counts them: likely too many. "
         f"Output tokens assume {OUTPUT_TOKENS} per answer. The interval is over tasks (none if all or one were run). "

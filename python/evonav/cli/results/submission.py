@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import percent, print_checks, progress_bar, show
+from evonav.cli.display import percent, print_checks, progress_bar, show_tables
 from evonav.cli.options.shared import (
     AsJson,
     Limit,
@@ -100,9 +100,7 @@ def verify(
 
 
 def _print(file: Path, verdict: "PackVerdict") -> None:
-    from rich.table import Table
-    from rich.text import Text
-
+    from evonav.report.tables.table import Table
     from evonav.submission.packed_setup import packed_setup
 
     marks = {True: ("ok", "green"), False: ("fail", "bold red")}
@@ -117,11 +115,10 @@ def _print(file: Path, verdict: "PackVerdict") -> None:
         isolation = packed_setup(verdict.submission).isolation
         typer.echo(f"isolation of agents, as the run notes it: {isolation or 'not noted'}")
     if verdict.is_accepted and verdict.summary is not None:
-        scores = Table(title="SR and SPL in %, as scored again")
-        for column in ("agent", "n", "SR", "SPL"):
-            scores.add_column(column, justify="left" if column == "agent" else "right")
-        for agent, row in verdict.summary["agents"].items():
-            scores.add_row(Text(agent), str(row["n"]), percent(row["sr"]), percent(row["spl"]))
-        show(scores)
+        rows = tuple(
+            (agent, str(row["n"]), percent(row["sr"]), percent(row["spl"]))
+            for agent, row in verdict.summary["agents"].items()
+        )
+        show_tables([Table("SR and SPL in %, as scored again", ("agent", "n", "SR", "SPL"), rows)])
         if not verdict.is_rescored:
             typer.echo("The actions were not replayed: the recorded paths were trusted.")

@@ -156,8 +156,7 @@ def evaluate(
     names = names_of(agent)
 
     def tell(arm: str, progress: "Progress") -> None:
-        latest = "" if progress.latest is None else f" {progress.latest.label}"
-        show(f"{arm} {progress.num_done} of {progress.num_stages}{latest}")
+        show(f"{arm} {progress.num_done} of {progress.num_stages} {progress.label}")
 
     with interruptible(directory), status("Running") as show:
         summaries = evaluate_controlled(

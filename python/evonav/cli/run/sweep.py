@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import EXIT_INTERRUPTED, show, show_tables
+from evonav.cli.display import EXIT_INTERRUPTED, show_tables
 from evonav.cli.options import completion
 from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored, Workers
 from evonav.counted import counted
@@ -145,24 +145,18 @@ def _print_plan(
     settings: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path
 ) -> None:
     """Print the cells to run and their estimated cost."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     from evonav.cli.display import status
     from evonav.evaluation.cost_estimate import estimate_run, total_usage
     from evonav.evaluation.hosting.isolation import AgentHosting
     from evonav.evaluation.run.components import check_agent_name
+    from evonav.report.tables.table import Table
     from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
         check_agent_name(agent, None if settings.isolation == "none" else AgentHosting())
     has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
-    table = Table(
-        title=f"{counted(len(cells), 'cell')} into {out}", title_justify="left", box=SIMPLE_HEAD, pad_edge=False
-    )
-    table.add_column("cell", overflow="fold")
-    for heading in ("tasks", "stages", *(["requests", "tokens in", "dollars"] if has_models else [])):
-        table.add_column(heading, justify="right", no_wrap=True)
+    columns = ("cell", "tasks", "stages", *(("requests", "tokens in", "dollars") if has_models else ()))
+    rows = []
     total, total_usd = 0, 0.0
     with status("Estimating") as tell:
         for run in cell_runs(settings, cells, tasks, out):
@@ -181,8 +175,8 @@ def _print_plan(
                 num_requests = sum(estimate.num_requests for estimate in found)
                 cost = [f"{num_requests:.0f}", str(usage.input_tokens), dollars]
             total += run.num_stages
-            table.add_row(cell.name, str(len(run.evaluation.tasks)), str(run.num_stages), *cost)
-    show(table)
+            rows.append((cell.name, str(len(run.evaluation.tasks)), str(run.num_stages), *cost))
+    show_tables([Table(f"{counted(len(cells), 'cell')} into {out}", columns, tuple(rows))])
     for agents in dict.fromkeys(cell.agents for cell in cells):
         some = [cell.name for cell in cells if cell.agents == agents]
         which = "" if len(some) == len(cells) else f" in {', '.join(some)}"

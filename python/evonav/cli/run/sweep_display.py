@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from evonav.cli.display import LINE_EVERY_S
 from evonav.counted import counted
 
 if TYPE_CHECKING:
@@ -186,6 +185,8 @@ def showing(progress: SweepProgress) -> "Iterator[Callable[[Cell, Progress], Non
     """
     from rich.console import Console
     from rich.live import Live
+
+    from evonav.api.progress import LINE_EVERY_S
 
     console = Console(stderr=True)
     table = Live(get_renderable=progress.table, console=console, refresh_per_second=4, transient=True)

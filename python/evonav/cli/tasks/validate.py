@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from evonav.generation.validation import FolderReport
 
 NUM_EXAMPLES = 3
-"""Largest number of examples of each kind of problem in the table."""
+"""Largest number of examples of each kind of problem."""
 
 
 def validate(
@@ -51,30 +51,21 @@ def validate(
 
 def print_report(report: "FolderReport", *, is_verbose: bool = False) -> None:
     """Print whether tasks are valid, problems by kind, and if asked what the source houses already have."""
-    from rich.console import Console
-    from rich.table import Table
-
     from evonav.generation.validation import KINDS
 
-    console = Console()
-    num_stages = sum(one.num_stages for one in report.reports)
-    if report.problems:
-        table = Table(title="Problems")
-        for heading in ("kind", "problems", "tasks", "which"):
-            table.add_column(heading, justify="right" if heading in ("problems", "tasks") else "left")
-        for kind, num in Counter(problem.kind for problem in report.problems).most_common():
-            found = [problem for problem in report.problems if problem.kind == kind]
-            examples = [f"{one.task_id} {one.stage or ''}: {one.detail[:200]}" for one in found[:NUM_EXAMPLES]]
-            which = "\n".join([KINDS[kind], *examples])
-            table.add_row(kind, str(num), str(len({problem.task_id for problem in found})), which)
-        console.print(table, markup=False)
-    num_tasks = len(report.reports)
+    for kind, num in Counter(problem.kind for problem in report.problems).most_common():
+        found = [problem for problem in report.problems if problem.kind == kind]
+        num_wrong = len({problem.task_id for problem in found})
+        typer.echo(f"{kind}: {counted(num, 'problem')} in {counted(num_wrong, 'task')}: {KINDS[kind]}")
+        for one in found[:NUM_EXAMPLES]:
+            typer.echo(f"  {one.task_id} {one.stage or ''}: {one.detail[:200]}")
+    num_tasks, num_stages = len(report.reports), sum(one.num_stages for one in report.reports)
     verdict = "valid" if not report.num_invalid else "INVALID"
     num_valid = f"{num_tasks - report.num_invalid} of {counted(num_tasks, 'task')} valid"
-    console.print(f"{verdict}: {num_valid}, {counted(num_stages, 'stage')}")
+    typer.echo(f"{verdict}: {num_valid}, {counted(num_stages, 'stage')}")
     if report.source_counts and is_verbose:
         counts = ", ".join(f"{num} {kind}" for kind, num in report.source_counts.most_common())
-        console.print(f"oddities of the source houses, which make no task invalid: {counts}", markup=False)
+        typer.echo(f"oddities of the source houses, which make no task invalid: {counts}")
 
 
 def report_json(report: "FolderReport") -> str:

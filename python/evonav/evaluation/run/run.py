@@ -57,6 +57,11 @@ class Progress:
     latest: EncodedStage | None
     """The stage that was recorded last; `None` at the beginning."""
 
+    @property
+    def label(self) -> str:
+        """Name of the latest stage; empty at the beginning."""
+        return "" if self.latest is None else self.latest.label
+
 
 @dataclass(eq=False)
 class Evaluation:

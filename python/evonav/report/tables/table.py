@@ -135,6 +135,7 @@ class Table:
             caption=Text(notes),
             caption_justify="left",
             box=SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
             pad_edge=False,
         )
         for j, column in enumerate(self.columns):
