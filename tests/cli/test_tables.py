@@ -41,7 +41,7 @@ def test_every_part_tells_the_rows_apart():
         (agent, decision, seed, *["12.3"] * 9) for agent in ("fu", "ftu") for decision in "xy" for seed in "01"
     )
     columns = ("Agent", "decision", "seed", *(f"column {number}" for number in range(9)))
-    parts = in_parts(Table("Cells", columns, rows), 60)
+    parts = in_parts(Table("Cells", columns, rows), 50)
     assert len(parts) > 1
     assert all([row[:3] for row in part.rows] == [row[:3] for row in rows] for part in parts)
     same = Table("Same", columns, (rows[0], rows[0]))
