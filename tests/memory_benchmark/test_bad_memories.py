@@ -45,7 +45,7 @@ def test_failure_is_the_same_in_its_own_process_and_in_this_one(
     assert result.update is None
     assert result.speed is None
     assert result.spells == ()
-    if name not in ("Hangs", "Dies", "Missing"):
+    if kind in ("raised", "answer"):
         assert measure(getattr(bad_memories, name), STREAM, MeasureSettings(every=1)).failure == result.failure
 
 

@@ -50,17 +50,21 @@ class HostedMemory(ABC):
     peak_rss_bytes: int | None = None
     """Peak of it, known after `num_bytes`."""
 
-    @abstractmethod
-    def reset(self, info: StreamInfo) -> object:
+    def reset(self, info: StreamInfo) -> None:
         """Begin a stream."""
+        self.call("reset", info)
 
-    @abstractmethod
     def visit(self, time_s: float) -> Cost | None:
         """Begin a visit."""
+        return self.call("visit", time_s)
 
-    @abstractmethod
     def observe(self, frame: MemoryFrame) -> Cost | None:
         """Hand over a frame; return what it cost, if that is known."""
+        return self.call("observe", frame)
+
+    @abstractmethod
+    def call(self, name: str, argument: object) -> Cost | None:
+        """Call a method that answers nothing."""
 
     @abstractmethod
     def entries(self) -> CheckedEntries:
@@ -100,17 +104,9 @@ class LocalMemory(HostedMemory):
         self.can_locate = callable(_get(self._memory, "locate"))
         self._counts_bytes = callable(_get(self._memory, "num_bytes"))
 
-    def reset(self, info: StreamInfo) -> Cost:
-        """Begin a stream."""
-        return self._timed("reset", lambda: self._memory.reset(info))[1]
-
-    def visit(self, time_s: float) -> Cost:
-        """Begin a visit."""
-        return self._timed("visit", lambda: self._memory.visit(time_s))[1]
-
-    def observe(self, frame: MemoryFrame) -> Cost:
-        """Hand over a frame."""
-        return self._timed("observe", lambda: self._memory.observe(frame))[1]
+    def call(self, name: str, argument: object) -> Cost:
+        """Call a method that answers nothing."""
+        return self._timed(name, lambda: getattr(self._memory, name)(argument))[1]
 
     def entries(self) -> CheckedEntries:
         """Return the entries."""
@@ -207,7 +203,7 @@ class _MemoryServer:
 
     def do_call(self, name: str, argument: object) -> dict[str, Any]:
         """Call `reset`, `visit` or `observe`."""
-        return {"cost": asdict(getattr(self.memory, name)(argument)), "rss_bytes": resident_bytes()}
+        return {"cost": asdict(self.memory.call(name, argument)), "rss_bytes": resident_bytes()}
 
     def do_entries(self) -> dict[str, Any]:
         """Return the entries."""

@@ -10,7 +10,7 @@ from pydantic.dataclasses import dataclass
 from evonav.errors import StoreError
 from evonav.memory_benchmark.answers import CheckedEntries, Hosting, MemoryFailedError, read_entries
 from evonav.memory_benchmark.local import Cost, HostedMemory
-from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame, StreamInfo
+from evonav.memory_benchmark.protocol import MemoryEntry, MemoryFrame
 from evonav.memory_benchmark.records import StreamResult
 from evonav.memory_benchmark.run import measure
 from evonav.memory_benchmark.truth import Stream
@@ -68,14 +68,11 @@ class _Answers(HostedMemory):
         if self._next is None:
             raise StoreError(f"{path}: has no line")
 
-    def reset(self, info: StreamInfo) -> None:
-        """Do nothing."""
+    def call(self, name: str, argument: object) -> Cost | None:
+        """Read the line of a frame, if there is one; the other methods do nothing."""
+        return self._read(argument) if isinstance(argument, MemoryFrame) else None
 
-    def visit(self, time_s: float) -> None:
-        """Do nothing."""
-
-    def observe(self, frame: MemoryFrame) -> Cost | None:
-        """Read the line of a frame, if there is one."""
+    def _read(self, frame: MemoryFrame) -> Cost | None:
         self._last = frame.index
         if self._next is None or self._next[1].frame > frame.index:
             return None

@@ -6,7 +6,7 @@ docs/memory.md says where that differs from the original code. Nothing is ever f
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -63,25 +63,16 @@ def corners_of(points_m: NDArray[np.float32]) -> Corners:
     return columns_m.min(axis=1), columns_m.max(axis=1)
 
 
-@dataclass
 class _Matcher:
     """Compares detections with entries by a faiss index of each entry."""
 
-    clouds: list[Cloud]
-    config: ObjectMapConfig
-    points: list[NDArray[np.float32]] = field(init=False)
-    corners: list[Corners] = field(init=False)
-    indices: list[Any] = field(init=False)
-
-    def __post_init__(self) -> None:
-        faiss = _faiss()
-        self.points = [cloud.points_m for cloud in self.clouds]
+    def __init__(self, clouds: list[Cloud], config: ObjectMapConfig) -> None:
+        self.clouds, self.config = clouds, config
+        self.points = [cloud.points_m for cloud in clouds]
         self.corners = [corners_of(points) for points in self.points]
-        self.indices = []
-        for points in self.points:
-            index = faiss.IndexFlatL2(3)
+        self.indices = [_faiss().IndexFlatL2(3) for _ in clouds]
+        for index, points in zip(self.indices, self.points, strict=True):
             index.add(points)
-            self.indices.append(index)
 
     def overlap(self, query: NDArray[np.float32], corners: Corners, number: int) -> float:
         """Return the share of points that have a point of an entry within the overlap radius."""

@@ -24,7 +24,7 @@ from evonav.memory_benchmark.answers import (
     checked,
 )
 from evonav.memory_benchmark.local import Cost, HostedMemory
-from evonav.memory_benchmark.protocol import FoundPlace, Memory, MemoryFrame, StreamInfo
+from evonav.memory_benchmark.protocol import FoundPlace, Memory
 
 _KINDS: dict[ErrorKind, FailureKind] = {ErrorKind.TIMEOUT: "hung", ErrorKind.CRASH: "died"}
 
@@ -63,17 +63,11 @@ class RemoteMemory(HostedMemory):
             raise MemoryFailedError("load", str(error)) from None
         self.can_locate = bool(parts["can_locate"])
 
-    def reset(self, info: StreamInfo) -> Cost:
-        """Begin a stream."""
-        return self._call("reset", info)
-
-    def visit(self, time_s: float) -> Cost:
-        """Begin a visit."""
-        return self._call("visit", time_s)
-
-    def observe(self, frame: MemoryFrame) -> Cost:
-        """Hand over a frame."""
-        return self._call("observe", frame)
+    def call(self, name: str, argument: object) -> Cost:
+        """Call a method that answers nothing."""
+        parts = self._ask("call", name, argument, shown=name)
+        self.rss_bytes = parts["rss_bytes"]
+        return Cost(**parts["cost"])
 
     def entries(self) -> CheckedEntries:
         """Return the entries."""
@@ -103,11 +97,6 @@ class RemoteMemory(HostedMemory):
     def close(self) -> None:
         """End the process."""
         self._process.close(is_at_once=True)
-
-    def _call(self, name: str, argument: object) -> Cost:
-        parts = self._ask("call", name, argument, shown=name)
-        self.rss_bytes = parts["rss_bytes"]
-        return Cost(**parts["cost"])
 
     def _ask(self, operation: str, *arguments: object, shown: str | None = None) -> dict[str, Any]:
         try:

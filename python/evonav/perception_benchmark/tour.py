@@ -26,7 +26,8 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
         views_per_room: Largest number of views, rounded up to whole places.
         seed: Together with task and stage it decides what is drawn.
     """
-    generator = np.random.Generator(np.random.PCG64(_seed_of(seed, case.task_id, stage)))
+    digest = hashlib.sha256(f"perception tour\0{seed}\0{case.task_id}\0{stage}".encode()).digest()
+    generator = np.random.Generator(np.random.PCG64(int.from_bytes(digest[:8], "big")))
     house = case.parsed_house(stage)
     rooms: dict[str, list[tuple[float, float]]] = {}
     for x_m, _, z_m in simulator.reachable_positions().tolist():
@@ -63,8 +64,3 @@ def _walk(places: Sequence[tuple[float, float]], start: tuple[float, float]) -> 
         here = min(left, key=lambda place: (math.dist(place, here), place))
         left.remove(here)
         yield here
-
-
-def _seed_of(seed: int, task_id: str, stage: int) -> int:
-    digest = hashlib.sha256(f"perception tour\0{seed}\0{task_id}\0{stage}".encode()).digest()
-    return int.from_bytes(digest[:8], "big")

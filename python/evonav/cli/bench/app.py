@@ -1,7 +1,6 @@
 """`evonav bench`: how fast evonav is on this machine, compared with other libraries."""
 
-from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
@@ -29,45 +28,6 @@ SECTIONS = {
     "generation": "generation",
 }
 """Sections of `evonav bench speed`, each with its module of `evonav.speed_benchmark`."""
-
-
-def _run(
-    section: "Section",
-    limit: int | None,
-    repeats: int,
-    peer: "Sequence[str] | None",
-    out: Path | None,
-    before: Path | None,
-    *,
-    is_one_core: bool = True,
-    **options: Any,  # noqa: ANN401 - the section's own
-) -> None:
-    """Measure a section, print its table, write its files and compare it."""
-    from evonav.speed_benchmark.records import read_speeds, write_speeds
-    from evonav.speed_benchmark.run import against, markdown_of, run_section, speed_table, table_of
-    from evonav.speed_benchmark.timing import Sampling, one_core
-
-    earlier = None if before is None else read_speeds(before)
-    names = listed(peer)
-    peers = None if not names else [name for name in names if name != "none"]
-    rows: list[Row] = []
-    try:
-        with ExitStack() as stack:
-            if is_one_core:
-                stack.enter_context(one_core())
-            on_progress = stack.enter_context(progress_bar(section.TITLE))
-            sampling = Sampling(limit, repeats, peers, on_progress)
-            speeds = run_section(section, sampling, on_row=rows.append, **options)
-    except KeyboardInterrupt:
-        if rows:
-            show_tables([speed_table(f"{section.TITLE}, interrupted", rows)])
-        typer.echo("interrupted; nothing is written", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    show_tables([table_of(speeds)])
-    if out is not None:
-        typer.echo(f"written: {', '.join(map(str, write_speeds(speeds, out, markdown_of(speeds))))}")
-    if earlier is not None and before is not None:
-        tell_worse(before, against(earlier, speeds), earlier.machine if earlier.machine != speeds.machine else None)
 
 
 @bench_app.command(cls=Command)
@@ -110,6 +70,11 @@ def speed(
     a map's update (octomap, open3d). gym: an environment's step (sync and async, which are Gymnasium's own; embreex,
     moderngl). agents: an agent's decision round, and its memory. generation: a task, with all of its files written.
     """
+    from evonav.speed_benchmark.records import read_speeds, write_speeds
+    from evonav.speed_benchmark.run import against as compare
+    from evonav.speed_benchmark.run import markdown_of, run_section, speed_table, table_of
+    from evonav.speed_benchmark.timing import Sampling, one_core
+
     if section not in SECTIONS:
         raise typer.BadParameter(f"{section}: expected {', '.join(SECTIONS)}{did_you_mean(section, SECTIONS)}")
     own = {"--houses": (houses, "generation"), "--agent": (agent, "agents"), "--no-growth": (growth, "agents")}
@@ -126,6 +91,23 @@ def speed(
         if sizes and min(sizes) < 1:
             raise typer.BadParameter(f"--envs {min(sizes)}: must be at least 1")
         options = {**({"num_envs": sizes} if sizes else {}), **({} if steps is None else {"num_steps": steps})}
-    module = import_module(f"evonav.speed_benchmark.{SECTIONS[section]}")
-    peers = ["none"] if section in ("agents", "generation") else peer
-    _run(cast("Section", module), limit, repeats, peers, out, against, is_one_core=section != "gym", **options)
+    module = cast("Section", import_module(f"evonav.speed_benchmark.{SECTIONS[section]}"))
+    earlier = None if against is None else read_speeds(against)
+    names = ["none"] if section in ("agents", "generation") else listed(peer)
+    peers = [name for name in names if name != "none"] if names else None
+    rows: list[Row] = []
+    try:
+        with nullcontext() if section == "gym" else one_core(), progress_bar(module.TITLE) as on_progress:
+            sampling = Sampling(limit, repeats, peers, on_progress)
+            speeds = run_section(module, sampling, on_row=rows.append, **options)
+    except KeyboardInterrupt:
+        if rows:
+            show_tables([speed_table(f"{module.TITLE}, interrupted", rows)])
+        typer.echo("interrupted; nothing is written", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    show_tables([table_of(speeds)])
+    if out is not None:
+        typer.echo(f"written: {', '.join(map(str, write_speeds(speeds, out, markdown_of(speeds))))}")
+    if earlier is not None and against is not None:
+        other_machine = earlier.machine if earlier.machine != speeds.machine else None
+        tell_worse(against, compare(earlier, speeds), other_machine)

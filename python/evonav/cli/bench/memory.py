@@ -15,7 +15,6 @@ from evonav.counted import counted
 if TYPE_CHECKING:  # the command must start fast
     from evonav.memory_benchmark.benchmark import AnyStream
     from evonav.memory_benchmark.records import BenchmarkResult
-    from evonav.memory_benchmark.streams.export.recording import Recording
     from evonav.memory_benchmark.streams.spec import StreamSpec
     from evonav.statistics import BeforeAfter
 
@@ -132,11 +131,21 @@ def memory(
     from evonav.memory_benchmark.records import read_result
     from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.run import MeasureSettings
+    from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
+    from evonav.memory_benchmark.streams.export.recording import Recording
     from evonav.parallel.local import num_cores
 
     earlier = None if against is None else read_result(against)
     chosen = named_memories(listed(memories))
-    specs: list[AnyStream] = [*read_recordings(recordings or (), up)]
+    axis = next((known for known in EVONAV_FROM_WORLD if known == up), None)
+    if axis is None:
+        raise typer.BadParameter(f"--up {up}: expected {', '.join(EVONAV_FROM_WORLD)}")
+    specs: list[AnyStream] = []
+    for folder in recordings or ():
+        specs.append(recording := Recording(folder, axis))
+        labels = recording.info.labels
+        has = f"detections of {counted(len(labels), 'label')}" if labels else "no detections"
+        typer.echo(f"{folder}: {counted(recording.num_frames, 'frame')}, {has}, no truth: only speed and size")
     if streams or not recordings:
         specs += chosen_streams(streams, houses, seeds, size, perception, is_quick=quick)
     own_process = None if in_process is None else not in_process
@@ -267,24 +276,6 @@ def chosen_streams(
         parse_perception(perception)
         specs = [spec if spec.kind == "S8" else replace(spec, perception=perception) for spec in specs]
     return specs
-
-
-def read_recordings(folders: "Sequence[Path]", up: str) -> "list[Recording]":
-    """Read recordings except for their images, and say what each has; `StoreError` for a missing or malformed file."""
-    from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
-    from evonav.memory_benchmark.streams.export.recording import Recording
-
-    axis = next((known for known in EVONAV_FROM_WORLD if known == up), None)
-    if axis is None:
-        raise typer.BadParameter(f"--up {up}: expected {', '.join(EVONAV_FROM_WORLD)}")
-    found = []
-    for folder in folders:
-        recording = Recording(folder, axis)
-        labels = recording.info.labels
-        has = f"detections of {counted(len(labels), 'label')}" if labels else "no detections"
-        typer.echo(f"{folder}: {counted(recording.num_frames, 'frame')}, {has}, no truth: only speed and size")
-        found.append(recording)
-    return found
 
 
 def _show(result: "BenchmarkResult", out: Path, num_missing: int) -> None:

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
 
 from evonav.errors import StoreError
 from evonav.memory_benchmark.protocol import MemoryFrame
-from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.layouts import (
     FRAMES_FILE,
     ORACLE_FILE,
@@ -99,8 +100,12 @@ def view_of(folder: Path, line: FrameLine, intrinsics: Intrinsics, depth_scale: 
     if line.pose is None:
         raise StoreError(f"{folder / FRAMES_FILE}: frame {line.index} has no `pose`")
     shape = (intrinsics.height_px, intrinsics.width_px)
-    depth_m = images.read_depth(folder / line.depth, depth_scale)
-    rgb = None if line.rgb is None else images.read_rgb(folder / line.rgb)
+    depth = _image(folder / line.depth)
+    if depth.ndim != 2:
+        raise StoreError(f"{folder / line.depth}: a depth image of {depth.shape[-1]} channels, expected 1")
+    metres = depth.astype(np.float64) / depth_scale
+    depth_m = np.where(metres == 0.0, np.inf, metres).astype(np.float32)
+    rgb = None if line.rgb is None else np.ascontiguousarray(_image(folder / line.rgb, "RGB").astype(np.uint8))
     for name, image in ((line.depth, depth_m), (line.rgb, rgb)):
         if image is not None and image.shape[:2] != shape:
             raise StoreError(f"{folder / str(name)}: shape {image.shape[:2]}, expected {shape}")
@@ -112,7 +117,7 @@ def _detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> Detect
     """Return the detections of a frame; none if it has no masks."""
     if line.masks is None:
         return Detections(np.full(shape, -1, np.int32), (), np.empty(0, np.float32))
-    masks = images.read_masks(folder / line.masks)
+    masks = np.ascontiguousarray(_image(folder / line.masks).astype(np.int32) - 1)
     confidences = line.confidences or (1.0,) * len(line.labels)
     if masks.shape != shape or len(confidences) != len(line.labels) or int(masks.max()) >= len(line.labels):
         raise StoreError(
@@ -126,3 +131,11 @@ def _detections(folder: Path, line: FrameLine, shape: tuple[int, int]) -> Detect
         except (OSError, ValueError) as error:
             raise StoreError(f"{folder / line.features}: cannot be read: {error}") from error
     return Detections(masks, line.labels, np.array(confidences, np.float32), features)
+
+
+def _image(path: Path, mode: str | None = None) -> NDArray[np.generic]:
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image if mode is None else image.convert(mode))
+    except (OSError, UnidentifiedImageError) as error:
+        raise StoreError(f"{path}: cannot be read as an image: {error}") from error

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.memory_benchmark.protocol import MemoryFrame
-from evonav.memory_benchmark.streams.export import images
 from evonav.memory_benchmark.streams.export.conversion import quaternion_of, world_from_camera
 from evonav.memory_benchmark.streams.export.layouts import (
     CAMERA_FILE,
@@ -106,11 +106,14 @@ def _write_frame(frame: MemoryFrame, folder: Path, layout: FileLayout) -> FrameL
     """Write the images of a frame, and return its line."""
     view, index, found = frame.view, frame.index, frame.view.detections
     names = {"depth": layout.depth.format(index), "masks": MASKS.format(index)}
-    images.write_depth(folder / names["depth"], view.depth_m, layout.depth_scale)
-    images.write_masks(folder / names["masks"], found.masks)
+    # 16 bits; 0 where nothing is, or too far for them.
+    depth = np.where(np.isfinite(view.depth_m), np.rint(view.depth_m.astype(np.float64) * layout.depth_scale), 0.0)
+    depth[depth > np.iinfo(np.uint16).max] = 0.0
+    for name, image in (("depth", depth), ("masks", found.masks + 1)):
+        Image.fromarray(image.astype(np.uint16)).save(folder / names[name], compress_level=1)
     if view.rgb is not None:
         names["rgb"] = layout.rgb.format(index)
-        images.write_rgb(folder / names["rgb"], view.rgb)
+        Image.fromarray(view.rgb).save(folder / names["rgb"], quality=95)
     if found.features is not None:
         names["features"] = FEATURES.format(index)
         (folder / names["features"]).parent.mkdir(exist_ok=True)
