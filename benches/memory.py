@@ -16,8 +16,7 @@ from evonav.memory.presence import DepthEvidence
 from evonav.memory_benchmark.open3d_faiss import Cloud, associate, detect, merged
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.sensors.visibility import visible_occupancy
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import compare
+from evonav.speed_benchmark.timing import Row, compare
 from evonav.world.camera import camera_axes
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, OccupancyGrid

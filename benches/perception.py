@@ -14,8 +14,7 @@ from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.shorthand import parse_perception
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import compare
+from evonav.speed_benchmark.timing import Row, compare
 from evonav.tasks.public import Goal
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

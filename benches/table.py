@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evonav.report.machine import machine_name
-from evonav.speed_benchmark.records import Row
+from evonav.speed_benchmark.timing import Row
 
 README = Path(__file__).with_name("README.md")
 _INTRODUCTION = """# Benchmarks

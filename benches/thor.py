@@ -17,8 +17,7 @@ from ai2thor.controller import Controller
 import evonav.thor
 from benches import canned_engine
 from evonav.house import bundled_houses
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import rows_of
+from evonav.speed_benchmark.timing import Row, rows_of
 from evonav.thor.engine import Engine
 from evonav.thor.events import Emitter
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from evonav.errors import StoreError
-from evonav.memory_benchmark.aggregate import METRICS, estimates, ratios
+from evonav.memory_benchmark.aggregate import METRICS, against, estimates, ratios
 from evonav.memory_benchmark.metrics.costs import Percentiles, Sample, Size
 from evonav.memory_benchmark.metrics.counts import BeliefScore, ChangeCounts, QueryCounts, UpdateCounts
 from evonav.memory_benchmark.metrics.spells import Clocks, Spell
@@ -19,7 +19,6 @@ from evonav.memory_benchmark.records import (
     StreamResult,
     read_result,
 )
-from evonav.memory_benchmark.regression import against
 from evonav.statistics import BeforeAfter
 
 HOUSES = ("a", "b", "c", "d", "e", "f")

@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.speed_benchmark.records import Row, Speeds, read_speeds, write_speeds
-from evonav.speed_benchmark.run import against, markdown_of, run_section, speed_table, table_of
-from evonav.speed_benchmark.timing import MODULES, Sampling, compare, one_core, rows_of
+from evonav.speed_benchmark.run import (
+    Speeds,
+    against,
+    markdown_of,
+    read_speeds,
+    run_section,
+    speed_table,
+    table_of,
+    write_speeds,
+)
+from evonav.speed_benchmark.timing import MODULES, Row, Sampling, compare, one_core, rows_of
 
 HOUSES = [f"house {number // 4}" for number in range(12)]
 

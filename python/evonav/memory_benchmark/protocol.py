@@ -79,7 +79,11 @@ class FoundPlace:
 
 
 class Memory(Protocol):
-    """A scene memory. It may also have `locate` and `num_bytes`, see `CanLocate` and `CountsBytes`."""
+    """A scene memory.
+
+    It may also have `locate(text: str, k: int) -> Sequence[FoundPlace]`, which returns at most `k` places of what
+    `text` names, the best first, and is timed; and `num_bytes() -> int`, the number of bytes that it holds.
+    """
 
     def reset(self, info: StreamInfo) -> None:
         """Forget everything: a new stream begins."""
@@ -92,17 +96,3 @@ class Memory(Protocol):
 
     def entries(self) -> Sequence[MemoryEntry]:
         """Return all that the memory believes in now; this is not timed."""
-
-
-class CanLocate(Protocol):
-    """A memory that can be asked where something is."""
-
-    def locate(self, text: str, k: int) -> Sequence[FoundPlace]:
-        """Return at most `k` places of what `text` names, the best first; this is timed."""
-
-
-class CountsBytes(Protocol):
-    """A memory that knows its size."""
-
-    def num_bytes(self) -> int:
-        """Return the number of bytes that the memory holds."""

@@ -27,8 +27,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import Sampling, rows_of
+from evonav.speed_benchmark.timing import Row, Sampling, rows_of
 from evonav.tasks.listing import BUNDLED_TASKS, task_file
 from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.simulator import Simulator

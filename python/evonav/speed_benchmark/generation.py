@@ -15,8 +15,7 @@ from evonav.generation import worker
 from evonav.generation.journal import Outcome
 from evonav.generation.worker import GenerationOptions, process_house
 from evonav.house.files import BUNDLED, HouseText, HouseTexts
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import Sampling, rows_of
+from evonav.speed_benchmark.timing import Row, Sampling, rows_of
 
 NAME, TITLE = "generation", "Task generation"
 NOTES = """\

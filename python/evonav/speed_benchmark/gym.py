@@ -12,9 +12,8 @@ import gymnasium
 import numpy as np
 
 from evonav.speed_benchmark.image_peers import image_peers, our_renderer, views_of_houses
-from evonav.speed_benchmark.records import Row
 from evonav.speed_benchmark.rendering import prepare_all, require_same
-from evonav.speed_benchmark.timing import Sampling, compare, one_core, rows_of
+from evonav.speed_benchmark.timing import Row, Sampling, compare, one_core, rows_of
 from evonav.world.simulator import SimulatorConfig
 
 NAME, TITLE = "gym", "Gymnasium"

@@ -11,8 +11,7 @@ from evonav.house import bundled_houses
 from evonav.memory import OccupancyMap
 from evonav.sensors.observation import MapFrame
 from evonav.sensors.visibility import visible_occupancy
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import INSTALL, Sampling, compare
+from evonav.speed_benchmark.timing import INSTALL, Row, Sampling, compare
 from evonav.world.camera import camera_axes, unproject
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

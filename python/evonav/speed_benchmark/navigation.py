@@ -19,8 +19,7 @@ from evonav.speed_benchmark.grid_search import (
     grid_of,
     grid_search,
 )
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import Sampling, compare
+from evonav.speed_benchmark.timing import Row, Sampling, compare
 from evonav.world.embedded import EmbeddedSimulator
 
 NAME, TITLE = "navigation", "Navigation"

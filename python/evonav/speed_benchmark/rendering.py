@@ -6,8 +6,7 @@ import numpy as np
 
 from evonav.errors import SimulationError
 from evonav.speed_benchmark.image_peers import Embree, OpenGL, Renderer, image_peers, our_renderer, views_of_houses
-from evonav.speed_benchmark.records import Row
-from evonav.speed_benchmark.timing import Sampling, compare
+from evonav.speed_benchmark.timing import Row, Sampling, compare
 from evonav.world.simulator import SimulatorConfig
 
 NAME, TITLE = "render", "Rendering"

@@ -1,22 +1,64 @@
-"""Run a section and show its figures: as a table, as Markdown, and compared with an earlier run."""
+"""Run a section, keep its figures in a file, show them as a table, and compare them with an earlier run."""
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from pydantic import Field
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
+from evonav.parallel.folders import write_atomically
 from evonav.report.machine import machine_name
+from evonav.report.measurements import MeasurementRecord, read_model
 from evonav.report.tables.numbers import NONE
 from evonav.report.tables.table import Table
-from evonav.speed_benchmark.records import Row, Speeds
-from evonav.speed_benchmark.timing import Sampling
+from evonav.speed_benchmark.timing import Row, Sampling
 from evonav.statistics import BeforeAfter, ClusterBootstrap, Interval
 
 FACTOR = 1.25
 """Growth of a time from which on it counts as worse."""
 NUM_RESAMPLES = 2000
+
+
+JSON_NAME, MARKDOWN_NAME = "speed.json", "speed.md"
+
+
+class Speeds(MeasurementRecord):
+    """The figures of one section, and where they were measured."""
+
+    section: str
+    title: str
+    notes: str
+    """Description of the measurement, in Markdown."""
+    evonav: str
+    """Version."""
+    machine: str
+    repeats: int
+    rows: list[Row]
+    left_out: dict[str, str] = Field(default_factory=dict)
+    """Peers that were not run, with the reason."""
+
+
+def write_speeds(speeds: Speeds, folder: Path, markdown: str) -> tuple[Path, Path]:
+    """Write `speed.json` and `speed.md` into a folder of the section's name.
+
+    Raises:
+        StoreError: A file cannot be written.
+    """
+    here = folder / speeds.section
+    text = speeds.model_dump_json(indent=2) + "\n"
+    return write_atomically(here / JSON_NAME, text), write_atomically(here / MARKDOWN_NAME, markdown)
+
+
+def read_speeds(path: Path) -> Speeds:
+    """Read a `speed.json`.
+
+    Raises:
+        StoreError: The file cannot be read, or is none.
+    """
+    return read_model(Speeds, path, "expected a speed.json of `evonav bench`")
 
 
 class Section(Protocol):

@@ -8,11 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import Field
 
 from evonav.component import optional_module
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.speed_benchmark.records import Row
-from evonav.statistics import ClusterBootstrap
+from evonav.report.measurements import MeasurementRecord
+from evonav.statistics import ClusterBootstrap, Interval
 
 NUM_RESAMPLES = 2000
 INSTALL = "'evonav[bench]'"
@@ -26,6 +27,29 @@ MODULES = {
     "scipy": "scipy.sparse.csgraph",
 }
 """Module of each peer that only some installations have, by the peer's name; other peers are always there."""
+
+
+class Row(MeasurementRecord):
+    """One operation, alone or compared with one peer."""
+
+    operation: str
+    ms: float = Field(ge=0, allow_inf_nan=False)
+    """Median of our times."""
+    ms_ci95: Interval | None = None
+    """95% interval by house; `None` of fewer than two houses."""
+    ms_by_house: dict[str, float] = Field(default_factory=dict)
+    """Median of our times in each house."""
+    n: int = Field(ge=1)
+    """Number of measurements."""
+    peer: str | None = None
+    peer_ms: float | None = Field(default=None, ge=0, allow_inf_nan=False)
+    """Median of the peer's times."""
+    ratio: float | None = Field(default=None, ge=0, allow_inf_nan=False)
+    """Median of the pairwise ratios peer / evonav: above 1 evonav is faster."""
+    ratio_ci95: Interval | None = None
+    facts: dict[str, float] = Field(default_factory=dict)
+    """Other figures, by their name with its unit."""
+
 
 OnProgress = Callable[[int, int, str], None]
 """Takes the number of measurements done, of all, and what is measured."""

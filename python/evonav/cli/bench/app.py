@@ -13,8 +13,8 @@ from evonav.cli.group import Command, new_app
 from evonav.cli.options.shared import HOUSES, Against, Limit, did_you_mean, listed, numbers_of
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.speed_benchmark.records import Row
     from evonav.speed_benchmark.run import Section
+    from evonav.speed_benchmark.timing import Row
 
 bench_app = new_app(help="Measure scene memories, and evonav's speed on this machine.")
 bench_app.add_typer(memory_app, name="memory")
@@ -70,9 +70,8 @@ def speed(
     a map's update (octomap, open3d). gym: an environment's step (sync and async, which are Gymnasium's own; embreex,
     moderngl). agents: an agent's decision round, and its memory. generation: a task, with all of its files written.
     """
-    from evonav.speed_benchmark.records import read_speeds, write_speeds
     from evonav.speed_benchmark.run import against as compare
-    from evonav.speed_benchmark.run import markdown_of, run_section, speed_table, table_of
+    from evonav.speed_benchmark.run import markdown_of, read_speeds, run_section, speed_table, table_of, write_speeds
     from evonav.speed_benchmark.timing import Sampling, one_core
 
     if section not in SECTIONS:

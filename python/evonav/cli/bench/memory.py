@@ -127,9 +127,9 @@ def memory(
     """
     if context.invoked_subcommand is not None:
         return
+    from evonav.memory_benchmark.aggregate import against as compare
     from evonav.memory_benchmark.benchmark import benchmark, named_memories
     from evonav.memory_benchmark.records import read_result
-    from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.run import MeasureSettings
     from evonav.memory_benchmark.streams.export.conversion import EVONAV_FROM_WORLD
     from evonav.memory_benchmark.streams.export.recording import Recording
@@ -224,9 +224,9 @@ def score(
 ) -> None:
     """Score the answers that a system wrote to files."""
     from evonav.errors import StoreError
+    from evonav.memory_benchmark.aggregate import against as compare
     from evonav.memory_benchmark.offline import score as score_stream
     from evonav.memory_benchmark.records import BenchmarkResult, read_result
-    from evonav.memory_benchmark.regression import against as compare
     from evonav.memory_benchmark.streams.export.read import ExportedStream
     from evonav.report.machine import machine_name
 
