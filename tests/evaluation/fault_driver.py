@@ -12,7 +12,7 @@ import shutil
 import traceback
 from pathlib import Path
 
-from test_run import CONFIG
+from toy_run import CONFIG
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.store import RunStore

@@ -3,18 +3,16 @@
 import ctypes
 import gc
 import hashlib
-import math
 import os
 import socket
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from toy_agents import Explorer
 
-from evonav.agents.agent import EntryBelief, NavigateTo, SensorConfig, Stop, ViewSchedule
+from evonav.agents.agent import EntryBelief, NavigateTo, Stop
 from evonav.agents.explanation import Explanation
 from evonav.decision.question import DecisionModel
 from evonav.errors import DecisionError, SimulatorLostError
@@ -42,17 +40,6 @@ class Pretending(Unruly):
 
     def mischief(self):
         raise SimulatorLostError("gone")
-
-
-class Unspeakable(Unruly):
-    """Its error has no text."""
-
-    def mischief(self):
-        class HorribleError(Exception):
-            def __str__(self):
-                raise ValueError
-
-        raise HorribleError
 
 
 class Exiting(Unruly):
@@ -150,76 +137,11 @@ class Unmakeable(Explorer):
         raise RuntimeError("not today")
 
 
-class Telling(Explorer):
-    """Says things that no record can hold, in stage 2."""
-
-    @property
-    def said(self):
-        return Explanation()
-
-    def explain(self):
-        return replace(self.said if self.stage == 2 else Explanation(), objects=self.entries)
-
-    def entries(self):
-        return []
-
-
-class Verbose(Telling):
-    said = Explanation(details={"thoughts": "x" * 2_000_000})
-
-
-class Deep(Telling):
-    @property
-    def said(self):
-        inner = []
-        for _ in range(100):
-            inner = [inner]
-        return Explanation(details={"inner": inner})
-
-
-class Secretive(Telling):
-    said = Explanation(details={"model": object()})
-
-
-class Mistaken(Telling):
-    said = Explanation(num_entries="many")
-
-
-class Misplaced(Telling):
-    said = Explanation(chosen_entry=EntryBelief(1, "Mug", (0.0, math.nan, 0.0), (1.0, 1.0, 1.0), 1))
-
-
-class Unlimited(Telling):
-    """Remembers an object without a place."""
-
-    def entries(self):
-        size_m = (1.0, math.inf if self.stage == 2 else 1.0, 1.0)
-        return [EntryBelief(1, "Mug", (0.0, 0.0, 0.0), size_m, 1)]
-
-
-class Unfocused(Explorer):
-    """Asks for views without an angle between them."""
-
-    def begin_stage(self, stage):
-        super().begin_stage(stage)
-        self.sensors = SensorConfig(first_round=ViewSchedule(3, math.nan)) if stage.stage == 2 else SensorConfig()
-
-
 class Farthest(Explorer):
     """Goes where no house is, but the number is finite."""
 
     def act(self, observation):
         return NavigateTo((1e5, -1e5)) if self.stage == 2 else super().act(observation)
-
-
-class Exotic(Telling):
-    """All of this can be kept."""
-
-    said = Explanation(
-        choice="half a pair: \ud800, \U0001f600, \x00",
-        counters={"counts": np.int64(3)},
-        details={"nan": math.nan, "float32": np.float32(0.1), 3: (1, 2), "large": 10**30, "inf": -math.inf},
-    )
 
 
 class Keeping(Explorer):

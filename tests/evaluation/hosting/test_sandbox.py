@@ -6,28 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from short_tasks import short_tasks
-from test_agent_end import have_ended
-from test_run import TOY, records, texts
+import spying_agent
+from processes import have_ended
 from toy_house import write_tasks
+from toy_run import NEEDS_SANDBOX, SHORT, TOY, records
 
 from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import AgentHosting, environment, policy_of
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
+from evonav.tasks.listing import task_files
 
-NEEDS_SANDBOX = pytest.mark.skipif(
-    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
-)
-SHORT = ProtocolConfig(max_rounds=3)
 SANDBOX = AgentHosting("sandbox", timeout_s=20.0)
 
 
@@ -35,7 +29,7 @@ def spied(folder, monkeypatch, *, isolation):
     """Evaluate the spy from a folder that holds its file, notes, the tasks and the run, and return what it reached."""
     project = folder / "project"
     project.mkdir()
-    text = Path(__file__).with_name("spying_agent.py").read_text()
+    text = Path(spying_agent.__file__).read_text()
     filled = re.sub(r"(?m)^THE_USERS_HOME = .*$", lambda _: f"THE_USERS_HOME = {str(Path.home())!r}", text)
     (project / f"spy_{isolation}.py").write_text(filled)
     (project / "notes.txt").write_text("the agent's own")
@@ -43,7 +37,7 @@ def spied(folder, monkeypatch, *, isolation):
     (project / "shortcut").symlink_to(project / "tasks")
     monkeypatch.setenv("SOME_KEY", "canary-of-the-evaluator")
     monkeypatch.chdir(project)
-    config = RunConfig(backend=TOY, protocol=SHORT, hosting=replace(SANDBOX, isolation=isolation))
+    config = replace(SHORT, hosting=replace(SANDBOX, isolation=isolation))
     tasks = task_files(project / "tasks", 1)
     evaluate([f"./spy_{isolation}.py:Spy"], tasks, project / "run", config=config, num_workers=1)
     (first, *_) = records(project / "run", f"./spy_{isolation}.py:Spy")
@@ -75,6 +69,10 @@ def test_a_spy_in_a_sandbox_reaches_nothing(tmp_path, monkeypatch):
     assert not (project / "written").exists()
     assert not Path(found["home"][-1]).exists()
     assert have_ended([found["left child"]])
+    with RunStore(project / "run") as store:
+        assert store.meta("sessions")[0]["isolation"].startswith("sandbox (Landlock ")
+        assert all("agent_peak_rss_mb" in costs for costs in store.costs().values())
+    assert "sandbox (Landlock" in write_report(project / "run").read_text(encoding="utf-8")
 
 
 def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
@@ -92,30 +90,11 @@ def test_without_a_sandbox_the_spy_reaches_all_of_it(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @NEEDS_SANDBOX
-def test_agents_do_the_same_in_a_sandbox(tmp_path):
-    agents = ["fu", "random-walk", "msgnav"]
-    tasks, reader = short_tasks(BUNDLED_TASKS, 2)
-    config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4))
-    evaluate(agents, tasks, tmp_path / "free", config=config, num_workers=1)
-    config = replace(config, hosting=SANDBOX)
-    evaluate(agents, tasks, tmp_path / "shut", config=config, num_workers=1)
-    assert texts(tmp_path / "shut") == texts(tmp_path / "free")
-    with RunStore(tmp_path / "shut") as shut, RunStore(tmp_path / "free") as free:
-        assert shut.meta("sessions")[0]["isolation"].startswith("sandbox (Landlock ")
-        assert free.meta("sessions")[0]["isolation"] == "process"
-        assert all("agent_peak_rss_mb" in costs for costs in shut.costs().values())
-        assert shut.meta("config") == free.meta("config")  # it does not decide records
-    assert "sandbox (Landlock" in write_report(tmp_path / "shut").read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-@NEEDS_SANDBOX
-def test_failures_are_contained_as_without_a_sandbox(tmp_path):
-    write_tasks(tmp_path / "tasks")
+def test_failures_are_contained_as_without_a_sandbox(tasks, tmp_path):
     agents = {"unruly_agents:Segfaulting": ErrorKind.CRASH, "unruly_agents:Hungry": ErrorKind.AGENT}
     agents |= {"unruly_agents:LeavingChildren": ErrorKind.CRASH, "toy_agents:Raising": ErrorKind.AGENT}
-    config = RunConfig(backend=TOY, protocol=SHORT, hosting=SANDBOX)
-    evaluate(list(agents), task_files(tmp_path / "tasks", 1), tmp_path / "run", config=config, num_workers=1)
+    config = replace(SHORT, hosting=SANDBOX)
+    evaluate(list(agents), tasks[:1], tmp_path / "run", config=config, num_workers=1)
     for agent, kind in agents.items():
         first, second, third = records(tmp_path / "run", agent)
         assert (first.is_scored, second.state, third.is_scored) == (True, EndState.ERRORED, True)
@@ -130,23 +109,19 @@ def test_failures_are_contained_as_without_a_sandbox(tmp_path):
         ({"decision": Component("evonav.decision.backends:custom", {"path": "x.py"})}, 1, "needs files or a network"),
     ],
 )
-def test_what_has_no_sandbox_is_refused_before_it_starts(tmp_path, monkeypatch, change, num_workers, reason):
+def test_what_has_no_sandbox_is_refused_before_it_starts(tasks, tmp_path, monkeypatch, change, num_workers, reason):
     monkeypatch.setattr("evonav.evaluation.run.components.sandbox_problem", lambda: None)
-    write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=replace(TOY, **change), hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match=f"isolation = sandbox: .*{reason}"):
-        evaluate(
-            ["stay-still"], task_files(tmp_path / "tasks"), tmp_path / "run", config=config, num_workers=num_workers
-        )
+        evaluate(["stay-still"], tasks, tmp_path / "run", config=config, num_workers=num_workers)
     assert not (tmp_path / "run").exists()
 
 
-def test_a_system_without_one_says_so(tmp_path, monkeypatch):
+def test_a_system_without_one_says_so(tasks, tmp_path, monkeypatch):
     monkeypatch.setattr("evonav.evaluation.run.components.sandbox_problem", lambda: "this kernel offers no Landlock")
-    write_tasks(tmp_path / "tasks")
     config = RunConfig(backend=TOY, hosting=SANDBOX)
     with pytest.raises(InvalidArgumentError, match="isolation = sandbox: this kernel offers no Landlock"):
-        evaluate(["stay-still"], task_files(tmp_path / "tasks"), tmp_path / "run", config=config, num_workers=1)
+        evaluate(["stay-still"], tasks, tmp_path / "run", config=config, num_workers=1)
 
 
 def test_what_is_hidden_is_left_out_wherever_it_lies(tmp_path):

@@ -1,10 +1,7 @@
 """Several episodes at once on a worker: the same records, one episode's end is no other's, and little memory."""
 
-import hashlib
-import json
 import os
 import signal
-import subprocess
 import sys
 import time
 import weakref
@@ -14,18 +11,13 @@ from pathlib import Path
 
 import pytest
 from chaos import num_recorded
-from processes import children
-from short_tasks import short_tasks
-from test_agent_end import is_running
-from test_nothing_lost import many_tasks
-from test_run import TOY, texts
+from processes import children, is_running
+from toy_run import CHEAP, many_tasks, started_driver, texts
 
 from evonav.component import Component
-from evonav.decision.vlm.mock_answers import mock_answer
-from evonav.decision.vlm.mock_server import FAULTS
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.hosting.fork_server import IS_SUPPORTED
-from evonav.evaluation.hosting.isolation import AgentHosting, usual_isolation
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
@@ -33,69 +25,13 @@ from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate, evaluate_all
-from evonav.evaluation.run.run import Evaluation, RunConfig
+from evonav.evaluation.run.run import Evaluation
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
 from evonav.evaluation.run.worker import WorkerContext, WorkerSetup
 from evonav.parallel.worker import Workforce
-from evonav.tasks.listing import BUNDLED_TASKS
-from vlm_stub import serving
 
 WAITING = "waiting_parts:Waiting"
-CHEAP = RunConfig(
-    backend=replace(TOY, tasks=Component("chaos_house:load_spec")),
-    protocol=ProtocolConfig(max_rounds=3),
-    hosting=AgentHosting(usual_isolation()),
-)
-NAMES_OF_FAULTS = ("server_error", "malformed", "truncated", "refusal", "broken_json")
-
-
-def faulty_reply(request):
-    """Answers after a while; which requests meet a fault, about a tenth, is decided by what they ask alone."""
-    number = int(hashlib.sha256(json.dumps(request, sort_keys=True).encode()).hexdigest()[:8], 16)
-    reply = {"text": mock_answer(request)} if number % 10 else FAULTS[NAMES_OF_FAULTS[number // 10 % 5]]
-    return {**reply, "hang_s": 0.05}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("backend", ["bundled", "toy"])
-def test_records_with_a_model_are_the_same_for_any_number_at_once(tmp_path, monkeypatch, backend):
-    """Bundled tasks ask much and with images; toy ones are many, and all ask the same at once."""
-    monkeypatch.setenv("OPENAI_API_KEY", "none")
-    found, most, cpu_s = {}, {}, {}
-    toy_tasks = many_tasks(tmp_path / "tasks", 6)
-    for num_workers, at_once in ((1, 1), (1, 3), (2, 2)) if backend == "bundled" else ((1, 1), (1, 6), (2, 3)):
-        name = f"{num_workers}-{at_once}"
-        with serving(faulty_reply) as stub:
-            tasks, reader = short_tasks(BUNDLED_TASKS, 1, 3)
-            host = {
-                "server": {"base_url": stub.url, "max_retries": 0},
-                "cache": str(tmp_path / f"{name}.exchanges"),
-                "ledger": str(tmp_path / f"{name}.spending"),
-                "mode": "auto",
-            }
-            parts = Backend(tasks=reader) if backend == "bundled" else CHEAP.backend
-            decision = Component("evonav.decision.backends:vlm", {"model": "m"}, host)
-            config = replace(CHEAP, backend=replace(parts, decision=decision))
-            evaluate(
-                ["fu"],
-                tasks if backend == "bundled" else toy_tasks,
-                tmp_path / name,
-                config=config,
-                num_workers=num_workers,
-                episodes_at_once=at_once,
-            )
-            most[name] = stub.most_at_once
-        found[name] = (texts(tmp_path / name), (tmp_path / name / "summary.json").read_bytes())
-        with RunStore(tmp_path / name) as store:
-            cpu_s[name] = sum(one["cpu_s"] for one in store.costs().values())
-        assert cpu_s[name] > 0.0
-        # Of each episode its own, not that of all on the worker; each worker also imports what it needs.
-        assert num_workers > 1 or cpu_s[name] < (1.0 + at_once / 2.0) * cpu_s["1-1"]
-    assert most.pop("1-1") == 1
-    assert all(number > 1 for number in most.values())
-    assert all(one == found["1-1"] for one in found.values())
-    assert len(found["1-1"][0]) == (3 + 3 if backend == "bundled" else 18 + 18)
 
 
 @pytest.mark.parametrize("isolation", ["process", "none"])
@@ -140,16 +76,16 @@ def test_an_episode_that_ends_its_worker_is_errored_and_no_other(tmp_path, how, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("agent", ["toy_agents:Dying", "toy_agents:Raising", "toy_agents:Hanging"])
-def test_an_agent_that_fails_costs_its_own_stages(tmp_path, agent):
+def test_agents_that_fail_cost_their_own_stages(tmp_path):
     tasks = many_tasks(tmp_path / "tasks", 2)
+    failing = {"toy_agents:Dying", "toy_agents:Raising", "toy_agents:Hanging"}
     config = replace(CHEAP, hosting=replace(CHEAP.hosting, timeout_s=4.0))
     for at_once in (1, 4):
         run = tmp_path / str(at_once)
-        evaluate([agent, WAITING], tasks, run, config=config, episodes_at_once=at_once, num_retries=0)
+        evaluate([*sorted(failing), WAITING], tasks, run, config=config, episodes_at_once=at_once, num_retries=0)
     assert texts(tmp_path / "4") == texts(tmp_path / "1")
     with RunStore(tmp_path / "4") as store:
-        assert {record.agent for record in store.records() if record.error is not None} == {agent}
+        assert {record.agent for record in store.records() if record.error is not None} == failing
 
 
 @pytest.mark.slow
@@ -181,27 +117,6 @@ def test_ray_runs_many_at_once(tmp_path, monkeypatch):
     assert texts(tmp_path / "run") == texts(tmp_path / "local")
 
 
-DRIVER = """
-import sys
-from pathlib import Path
-from test_many_episodes import CHEAP
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.tasks.listing import task_files
-
-tasks, run_dir, agent, at_once = sys.argv[1:]
-evaluate([agent], task_files(Path(tasks)), Path(run_dir), config=CHEAP, episodes_at_once=int(at_once))
-"""
-
-
-def driver(tmp_path, agent, at_once):
-    """Starts a run of the tasks in a folder."""
-    return subprocess.Popen(
-        [sys.executable, "-c", DRIVER, str(tmp_path / "tasks"), str(tmp_path / "run"), agent, str(at_once)],
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )
-
-
 def agents_of(pid):
     return [child for child, line in children(pid).items() if line.startswith("evonav-agent\n")]
 
@@ -216,35 +131,18 @@ def waited_for(condition, timeout_s=60.0):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
-def test_an_interrupt_ends_all_and_the_run_is_resumed(tmp_path):
+@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_that_is_ended_leaves_no_process_and_is_resumed(tmp_path, kill):
     tasks = many_tasks(tmp_path / "tasks", 8)
-    run = driver(tmp_path, WAITING, 6)
-    waited_for(lambda: len(agents_of(run.pid)) == 6)
-    waited_for(lambda: num_recorded(tmp_path / "run") >= 2)
-    everything = list(children(run.pid))
-    run.send_signal(signal.SIGINT)
-    run.wait(timeout=30)
-    waited_for(lambda: not any(map(is_running, everything)), 10.0)
-    kept = num_recorded(tmp_path / "run")
-    assert kept < 24
-    evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
-    evaluate([WAITING], tasks, tmp_path / "whole", config=replace(CHEAP, hosting=AgentHosting()), num_workers=0)
-    assert texts(tmp_path / "run") == texts(tmp_path / "whole")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not IS_SUPPORTED, reason="needs forks")
-def test_a_killed_driver_leaves_no_process_and_a_second_one_does_not_disturb_it(tmp_path):
-    tasks = many_tasks(tmp_path / "tasks", 8)
-    run = driver(tmp_path, WAITING, 6)
+    run = started_driver(tmp_path, agents=[WAITING], episodes_at_once=6)
     waited_for(lambda: len(agents_of(run.pid)) == 6)
     waited_for(lambda: num_recorded(tmp_path / "run") >= 2)
     with pytest.raises(StoreError, match=rf"another evonav is writing here \(process {run.pid} on "):
         evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
     assert len(agents_of(run.pid)) == 6
     everything = list(children(run.pid))
-    run.kill()
-    run.wait(timeout=30)
+    run.send_signal(kill)
+    assert run.wait(timeout=30) != 0
     waited_for(lambda: not any(map(is_running, everything)), 10.0)
     assert num_recorded(tmp_path / "run") < 24
     evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
@@ -259,7 +157,7 @@ def test_an_episode_that_waits_needs_little_memory(tmp_path):
     many_tasks(tmp_path / "tasks", 12)
     used_mb = {}
     for at_once in (2, 12):
-        run = driver(tmp_path, "waiting_parts:Standing", at_once)
+        run = started_driver(tmp_path, agents=["waiting_parts:Standing"], episodes_at_once=at_once)
         try:
             waited_for(lambda pid=run.pid, number=at_once: len(agents_of(pid)) == number)
             time.sleep(2.0)

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 from hostile_values import ENDS, ERRORS, RAW, STAGES
-from test_run import TOY, records, texts
 from toy_house import write_tasks
+from toy_run import TOY, records, texts
 
 from evonav.agents.hosting import wire
 from evonav.component import Component

@@ -6,33 +6,26 @@ import random
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from chaos import disturb, num_recorded, texts
 from power_loss import Disk, read_log
 from processes import children
-from test_run import CONFIG
-from toy_house import EPISODES, write_tasks
+from toy_house import write_tasks
+from toy_run import CHEAP, CONFIG, driver_command, driver_environment, many_tasks
 from typer.testing import CliRunner
 
-from evonav.agents.hosting.sandbox import sandbox_problem
 from evonav.cli import app
-from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.hosting.isolation import AgentHosting
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.parallel import folders
 from evonav.parallel.folders import replacing, write_atomically, writing
 from evonav.parallel.local import PROCESS_NAME
 from evonav.tasks.listing import task_files
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
@@ -54,7 +47,7 @@ def faults(tmp_path_factory):
     def run(call):
         done = subprocess.run(
             [sys.executable, "-c", f"import fault_driver; fault_driver.{call}"],
-            env={**os.environ, **ONE_THREAD, "LD_PRELOAD": str(library), "PYTHONPATH": os.pathsep.join(sys.path)},
+            env=driver_environment(**ONE_THREAD, LD_PRELOAD=str(library)),
             capture_output=True,
             text=True,
             check=False,
@@ -142,45 +135,9 @@ def texts_of_stages(run):
         return list(store.record_texts())
 
 
-def many_tasks(folder, num):
-    """Tasks that differ in name alone."""
-    for number in range(num):
-        name = f"{list(EPISODES)[number % 2]}-{number:03}"
-        (folder / name).mkdir(parents=True)
-        (folder / name / "task.json").write_text(json.dumps({"task_id": name, "num_stages": 3}))
-    return task_files(folder)
-
-
-CHEAP = RunConfig(
-    backend=Backend(tasks=Component("chaos_house:load_spec"), simulator=Component("chaos_house:make_simulator")),
-    protocol=ProtocolConfig(max_rounds=3),
-)
-DRIVER = """
-import sys
-from pathlib import Path
-from evonav.agents.hosting.sandbox import sandbox_problem
-from evonav.component import Component
-from evonav.evaluation.hosting.isolation import AgentHosting
-from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.listing import task_files
-from evonav.evaluation.protocol import ProtocolConfig
-
-config = RunConfig(
-    backend=Backend(tasks=Component("chaos_house:load_spec"), simulator=Component("chaos_house:make_simulator")),
-    protocol=ProtocolConfig(max_rounds=3),
-    hosting=AgentHosting("process" if sandbox_problem() else "sandbox"),
-)
-tasks, run, at_once = task_files(Path(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
-evaluate(["random-walk"], tasks, run, config=config, num_workers=2, num_retries=5, episodes_at_once=at_once)
-"""
 HERE_ALONE = {"config": CHEAP, "num_workers": 0}
-MANY_AT_ONCE = {
-    "config": replace(CHEAP, hosting=AgentHosting("process" if sandbox_problem() else "sandbox")),
-    "num_workers": 2,
-    "episodes_at_once": 4,
-}
+MANY_AT_ONCE = {"config": CHEAP, "num_workers": 2, "episodes_at_once": 4}
+RESILIENT = {"agents": ["random-walk"], "num_workers": 2, "num_retries": 5}
 
 
 @pytest.mark.slow
@@ -190,10 +147,10 @@ def test_a_wall_clock_that_jumps_changes_nothing(tmp_path, at_once):
     library = compiled("clock.c", tmp_path)
     tasks = many_tasks(tmp_path / "tasks", 8)
     evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
-    environment = {**os.environ, "LD_PRELOAD": str(library), "PYTHONPATH": os.pathsep.join(sys.path)}
+    environment = driver_environment(LD_PRELOAD=str(library))
     look = [sys.executable, "-c", "import time; print(max(abs(time.time() - time.time()) for _ in range(20)))"]
     assert float(subprocess.run(look, env=environment, check=True, capture_output=True).stdout) > 3600.0
-    command = [sys.executable, "-c", DRIVER, str(tmp_path / "tasks"), str(tmp_path / "run"), str(at_once)]
+    command = driver_command(tmp_path, **RESILIENT, episodes_at_once=at_once)
     subprocess.run(command, env=environment, check=True, timeout=120.0)
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
     with RunStore(tmp_path / "run") as store:
@@ -224,10 +181,7 @@ def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
     (early_open, early_mb), (late_open, late_mb) = seen
     assert early_open == late_open
     assert late_mb < 1.05 * early_mb
-    script = tmp_path / "driver.py"
-    script.write_text(DRIVER)
-    command = [sys.executable, str(script), str(tmp_path / "tasks"), str(run), "1"]
-    kills = disturb(command, run, 210, 10, seed=1, environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
+    kills = disturb(driver_command(tmp_path, **RESILIENT), run, 210, 10, seed=1, environment=driver_environment())
     assert kills.total() == 10
     assert len(kills) >= 2
     assert num_recorded(run) == 210
@@ -292,9 +246,7 @@ def test_a_run_on_a_read_only_disk_is_read_and_not_continued(small_disk, tmp_pat
     assert texts_of_stages(small / "run")[:6] == kept
 
 
-def test_the_second_driver_is_told_of_the_first(tmp_path):
-    write_tasks(tmp_path / "tasks")
-    tasks = task_files(tmp_path / "tasks")
+def test_the_second_driver_is_told_of_the_first(tasks, tmp_path):
     with (
         writing(tmp_path / "run"),
         pytest.raises(StoreError, match=rf"another evonav is writing here \(process {os.getpid()} on "),
@@ -306,13 +258,13 @@ def test_the_second_driver_is_told_of_the_first(tmp_path):
     ("kind", "options", "is_refused"),
     [("nfs4", "rw,vers=4.2", False), ("nfs", "rw,nolock", True), ("cifs", "rw,nobrl", True), ("ext4", "rw", False)],
 )
-def test_network_file_systems_have_no_shared_memory_and_some_no_locks(tmp_path, monkeypatch, kind, options, is_refused):
+def test_network_file_systems_have_no_shared_memory_and_some_no_locks(
+    tasks, tmp_path, monkeypatch, kind, options, is_refused
+):
     mounts = tmp_path / "mounts"
     where = str(tmp_path).replace(" ", "\\040")
     mounts.write_text(f"1 0 0:1 / / rw - ext4 /dev/a rw\n2 1 0:2 / {where} rw - {kind} server:/a {options}\n")
     monkeypatch.setattr(folders, "_MOUNTS", mounts)
-    write_tasks(tmp_path / "tasks")
-    tasks = task_files(tmp_path / "tasks", 1)
     if is_refused:
         with pytest.raises(StoreError, match="without locks"):
             evaluate(["random-walk"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
@@ -323,10 +275,9 @@ def test_network_file_systems_have_no_shared_memory_and_some_no_locks(tmp_path, 
     assert mode == ("wal" if kind == "ext4" else "delete")
 
 
-def test_an_agent_of_the_running_script_is_refused_at_once(tmp_path):
-    write_tasks(tmp_path / "tasks")
+def test_an_agent_of_the_running_script_is_refused_at_once(tasks, tmp_path):
     with pytest.raises(InvalidArgumentError, match="a module of its own, or use num_workers=0"):
-        evaluate(["__main__:Mine"], task_files(tmp_path / "tasks"), tmp_path / "run", config=CONFIG, num_workers=1)
+        evaluate(["__main__:Mine"], tasks, tmp_path / "run", config=CONFIG, num_workers=1)
     assert not (tmp_path / "run").exists()
 
 

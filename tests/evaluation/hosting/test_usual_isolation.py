@@ -5,10 +5,8 @@ import tempfile
 from dataclasses import replace
 
 import pytest
-from test_run import TOY
-from toy_house import write_tasks
+from toy_run import NEEDS_SANDBOX, TOY
 
-from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting import isolation, scratch
@@ -20,11 +18,7 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run_settings import RunSettings
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.parallel.folders import writing
-from evonav.tasks.listing import task_files
 
-NEEDS_SANDBOX = pytest.mark.skipif(
-    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
-)
 READING = """
 import os
 from pathlib import Path
@@ -81,17 +75,16 @@ def test_without_one_or_beside_a_gpu_a_process_is_the_default(monkeypatch, reaso
 
 
 @NEEDS_SANDBOX
-def test_downloaded_models_can_be_read_and_their_keys_cannot(tmp_path, monkeypatch):
+def test_downloaded_models_can_be_read_and_their_keys_cannot(tasks, tmp_path, monkeypatch):
     (tmp_path / "cache" / "hub").mkdir(parents=True)
     (tmp_path / "cache" / "hub" / "weights").write_text("1 2 3")
     (tmp_path / "cache" / "token").write_text("hf_secret")
     monkeypatch.setenv("HF_HOME", str(tmp_path / "cache"))
     (tmp_path / "agents").mkdir()
     (tmp_path / "agents" / "mine.py").write_text(READING)
-    write_tasks(tmp_path / "tasks")
     names = [f"{tmp_path}/agents/mine.py:{kind}" for kind in ("Reading", "Stealing")]
     config = config_of(workers=1, isolation="sandbox")
-    evaluate(names, task_files(tmp_path / "tasks", 1), tmp_path / "run", config=config, num_workers=1)
+    evaluate(names, tasks[:1], tmp_path / "run", config=config, num_workers=1)
     with RunStore(tmp_path / "run") as store:
         (first, *_), (refused, *_) = (list(store.records(name)) for name in names)
     assert first.is_scored

@@ -1,28 +1,24 @@
 """What an agent is told of a task does not tell which one it is, so that it cannot generate the task again."""
 
 import gzip
-import hashlib
 from collections import defaultdict
 
 import pytest
 from regenerating_agent import candidates, names_of, task_named
 from short_tasks import short_tasks
-from test_run import TOY, records, texts
-from toy_house import write_tasks
+from toy_run import SHORT, records, texts
 
 import evonav
 from evonav.evaluation.episode.spec import opaque_task_id
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import NAMES_KEY, RunConfig, agent_seed, perception_seed
+from evonav.evaluation.run.run import NAMES_KEY, RunConfig
 from evonav.report import write_report
 from evonav.submission.pack import pack
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
+from evonav.tasks.listing import BUNDLED_TASKS
 
-SHORT = ProtocolConfig(max_rounds=3)
 AGENT = "regenerating_agent:Regenerating"
 
 
@@ -40,19 +36,12 @@ def test_the_agent_finds_the_targets_where_the_name_tells_the_task(name_of):
     assert [found.oracle(k).target for k in numbers] == [task.oracle(k).target for k in numbers]
 
 
-def test_the_name_without_a_secret_is_the_former_one():
-    task_id = "bundled-0084-812ff1-s0"
-    seed = perception_seed(0, task_id)
-    assert seed == agent_seed(0, "", task_id)
-    assert list(names_of(task_id))[2] == hashlib.sha256(f"task\0{seed}".encode()).hexdigest()[:12]
-
-
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """The same evaluation twice: two agents on two stages, in processes of their own."""
     folders = [tmp_path_factory.mktemp("run") for _ in range(2)]
     tasks, reader = short_tasks(BUNDLED_TASKS, 2)
-    config = RunConfig(backend=Backend(tasks=reader), protocol=SHORT)
+    config = RunConfig(backend=Backend(tasks=reader), protocol=SHORT.protocol)
     for folder in folders:
         evaluate([AGENT, "random-walk"], tasks, folder, config=config, num_workers=1)
     return folders
@@ -93,15 +82,12 @@ def test_nothing_that_is_shown_holds_the_secret(runs, tmp_path):
     assert not [path for path in files if secret in path.read_bytes()]
 
 
-def test_a_resumed_run_keeps_its_names(tmp_path):
-    write_tasks(tmp_path / "tasks")
-    arguments = ([AGENT], task_files(tmp_path / "tasks"), tmp_path / "run")
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    evaluate(*arguments, config=config, num_workers=0)
+def test_a_resumed_run_keeps_its_names(tasks, tmp_path):
+    evaluate([AGENT], tasks, tmp_path / "run", config=SHORT, num_workers=0)
     before, secret = texts(tmp_path / "run"), secret_of(tmp_path / "run")
     with RunStore(tmp_path / "run") as store:
         store.forget_episode(AGENT, "toy-moved", 2)
-    evaluate(*arguments, config=config, num_workers=0)
+    evaluate([AGENT], tasks, tmp_path / "run", config=SHORT, num_workers=0)
     assert texts(tmp_path / "run") == before
     assert secret_of(tmp_path / "run") == secret
     names = defaultdict(set)
@@ -112,11 +98,9 @@ def test_a_resumed_run_keeps_its_names(tmp_path):
     assert len(set().union(*names.values())) == len(names) > 1
 
 
-def test_tasks_come_in_the_order_of_their_secret_names(tmp_path):
-    write_tasks(tmp_path / "tasks")
-    tasks, seen = task_files(tmp_path / "tasks"), []
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    evaluate(["stay-still"], tasks, tmp_path / "run", config=config, num_workers=0, on_progress=seen.append)
+def test_tasks_come_in_the_order_of_their_secret_names(tasks, tmp_path):
+    seen = []
+    evaluate(["stay-still"], tasks, tmp_path / "run", config=SHORT, num_workers=0, on_progress=seen.append)
     order = list(dict.fromkeys(news.latest.task_id for news in seen if news.latest))
     secret = secret_of(tmp_path / "run")
     assert order == sorted((task.task_id for task in tasks), key=lambda name: opaque_task_id(secret, name))

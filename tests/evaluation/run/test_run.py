@@ -1,60 +1,21 @@
 """Runs on disk: determinism, resumption, containment, refusal."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from itertools import pairwise
 
 import pytest
-from toy_house import write_tasks
+from toy_run import CONFIG, TOY, records, texts
 
-from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.parallel.folders import writing
 from evonav.report.run import load_run
 from evonav.tasks.listing import task_files
-
-TOY = Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator"))
-CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
-
-
-@pytest.fixture
-def tasks(tmp_path):
-    write_tasks(tmp_path / "tasks")
-    return task_files(tmp_path / "tasks")
-
-
-def texts(run_dir):
-    with RunStore(run_dir) as store:
-        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.floor_plans())]
-
-
-def records(run_dir, agent):
-    with RunStore(run_dir) as store:
-        return list(store.records(agent))
-
-
-@pytest.mark.slow
-def test_records_are_the_same_for_any_number_of_workers(tasks, tmp_path):
-    agents = ["random-walk", "nearest-frontier", "toy_agents:Idle"]
-    for workers in (0, 2):
-        evaluate(agents, tasks, tmp_path / str(workers), config=CONFIG, num_workers=workers)
-    evaluate(agents[::-1], tasks, tmp_path / "1, in another order", config=CONFIG, num_workers=1)
-    assert len(texts(tmp_path / "0")) == 3 * 6 + 6
-    for other in ("1, in another order", "2"):
-        assert texts(tmp_path / other) == texts(tmp_path / "0")
-        assert (tmp_path / other / "summary.json").read_bytes() == (tmp_path / "0" / "summary.json").read_bytes()
 
 
 def test_the_floor_plan_of_a_stage_is_made_once_for_all_agents(tasks, tmp_path, monkeypatch):
@@ -102,6 +63,13 @@ def test_an_agents_fault_costs_its_stage_alone(tasks, tmp_path, agent, message):
     stages = records(tmp_path / "run", agent)
     failed = [record.stage for record in stages if record.state is EndState.ERRORED]
     assert failed == ([2] if agent in ("toy_agents:Raising", "toy_agents:Speechless") else [1, 2, 3])
+    with RunStore(tmp_path / "run") as store:
+        failure = store.failures()[0]
+    assert (failure.stage, failure.kind, failure.is_retried) == (failed[0], ErrorKind.AGENT, False)
+    if agent == "toy_agents:Raising":
+        assert 'toy_agents.py", line' in failure.traceback
+        assert 'raise RuntimeError("no idea")' in failure.traceback
+        assert "toy_agents.py" not in failure.message
     for record in stages:
         assert record.failed_before == tuple(stage for stage in failed if stage < record.stage)
         if record.stage in failed:
@@ -173,21 +141,6 @@ def test_agents_can_join_a_run(tasks, tmp_path):
     assert len(content["paired_differences"]) == 1
 
 
-@pytest.mark.slow
-def test_errored_stages_run_again_when_asked(tasks, tmp_path, monkeypatch):
-    alive = tmp_path / "alive"
-    monkeypatch.setenv("TOY_ALIVE", str(alive))
-    arguments = (["toy_agents:DyingOnce"], tasks[:1], tmp_path / "run")
-    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1)
-    assert summary.counts["errored"] == 1
-    alive.touch()
-    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1)
-    assert summary.counts["errored"] == 1
-    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1, retry_errored=True)
-    assert not summary.is_incomplete
-    assert summary.n == 3
-
-
 def test_a_resumed_episode_is_never_a_mix_of_two_rollouts(tasks, tmp_path):
     run = tmp_path / "run"
     agent = "toy_agents:Undecided"
@@ -233,12 +186,6 @@ def test_a_file_that_is_no_run_is_refused(tmp_path):
         RunStore(tmp_path)
 
 
-def test_a_second_writer_is_kept_out(tasks, tmp_path):
-    with writing(tmp_path / "run"), pytest.raises(StoreError, match="another evonav"):
-        evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
-    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
-
-
 def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, monkeypatch):
     run = tmp_path / "run"
     evaluate(["random-walk"], tasks, run, config=CONFIG)
@@ -253,53 +200,3 @@ def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, mon
     monkeypatch.setattr(RunStore, "states", states)
     assert load_run(run).agents == ("random-walk",)
     assert load_run(run).agents == ("random-walk", "toy_agents:Idle")
-
-
-INTERRUPTED = """
-import sys
-from pathlib import Path
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.listing import task_files
-from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.isolation import AgentHosting
-from evonav.component import Component
-from evonav.evaluation.run.components import Backend
-from evonav.evaluation.protocol import ProtocolConfig
-
-if __name__ == "__main__":
-    root = Path(sys.argv[1])
-    config = RunConfig(
-        backend=Backend(tasks=Component("toy_house:load_spec"), simulator=Component("toy_house:make_simulator")),
-        protocol=ProtocolConfig(max_rounds=12),
-    )
-    show = lambda news: print(news.num_done, flush=True)
-    evaluate(["random-walk", "nearest-frontier"], task_files(root / "tasks"), root / "run", config=config,
-             num_workers=2, on_progress=show)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
-def test_a_run_that_was_ended_can_be_resumed(tasks, tmp_path, kill):
-    agents = ["random-walk", "nearest-frontier"]
-    evaluate(agents, tasks, tmp_path / "whole", config=CONFIG, num_workers=0)
-    script = tmp_path / "script.py"
-    script.write_text(INTERRUPTED)
-    child = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={"PYTHONPATH": os.pathsep.join(sys.path), "PATH": ""},
-        text=True,
-    )
-    while child.stdout.readline().strip() in ("", "0", "1"):
-        assert child.poll() is None
-    child.send_signal(kill)
-    assert child.wait(timeout=30) != 0
-    child.stdout.close()
-    time.sleep(0.2)
-    with RunStore(tmp_path / "run") as store:
-        assert 2 <= len(store.states()) < 12
-    evaluate(agents, tasks, tmp_path / "run", config=CONFIG, num_workers=2)
-    assert texts(tmp_path / "run") == texts(tmp_path / "whole")

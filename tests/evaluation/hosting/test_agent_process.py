@@ -10,11 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from short_tasks import short_tasks
-from test_run import CONFIG, TOY, records, texts
 from toy_house import write_tasks
+from toy_run import CONFIG, NEEDS_SANDBOX, SHORT, records, texts
 
-from evonav.agents.registry import BUILT_IN
+from evonav.agents.hosting.shared_slots import NUM_SLOTS
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import RemoteAgent
@@ -29,7 +28,6 @@ from evonav.evaluation.hosting.processes import AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
@@ -39,22 +37,12 @@ from evonav.tasks.public import Goal, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
-SHORT = ProtocolConfig(max_rounds=3)
-
 CONTAINED = {
     "toy_agents:Raising": (ErrorKind.AGENT, "RuntimeError: no idea [toy_agents:"),
     "toy_agents:Speechless": (ErrorKind.AGENT, "'forward' is no action"),
     "unruly_agents:Undecided": (ErrorKind.DECISION, "no key"),
     "unruly_agents:Pretending": (ErrorKind.AGENT, "SimulatorLostError: gone"),
-    "unruly_agents:Unspeakable": (ErrorKind.AGENT, "HorribleError: (its message cannot be read)"),
-    "unruly_agents:Verbose": (ErrorKind.AGENT, "must be at most 1000000"),
-    "unruly_agents:Deep": (ErrorKind.AGENT, "deeper than 32"),
-    "unruly_agents:Secretive": (ErrorKind.AGENT, "diagnostics: not JSON-ready"),
-    "unruly_agents:Misplaced": (ErrorKind.AGENT, "diagnostics.chosen_entry.centre_m.1 = nan: Input should be a finite"),
-    "unruly_agents:Unlimited": (ErrorKind.AGENT, "entries.0.size_m.1 = inf: Input should be a finite number"),
-    "unruly_agents:Unfocused": (ErrorKind.AGENT, "sensors.first_round.spacing_deg = nan: Input should be a finite"),
     "unruly_agents:Amnesiac": (ErrorKind.AGENT, "RuntimeError: who am I? [unruly_agents:"),
-    "unruly_agents:Mistaken": (ErrorKind.AGENT, "diagnostics.num_entries = 'many': Input should be a valid integer"),
 }
 """In any process: the agent goes on with the next stage."""
 
@@ -84,11 +72,10 @@ def tasks(tmp_path_factory):
 @pytest.fixture(scope="module")
 def run_dir(tasks, tmp_path_factory):
     """All of them in one run, so that they share workers, which have more agents than they keep processes."""
-    config = RunConfig(backend=TOY, protocol=SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
+    config = replace(SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
     folder = tmp_path_factory.mktemp("run")
-    agents = [*CONTAINED, *LOST, *UNHARMED, "unruly_agents:Exotic", "unruly_agents:Unmakeable", "unruly_agents:Hungry"]
-    agents.append("unruly_agents:Farthest")
-    evaluate(agents, tasks, folder, config=config, num_workers=2)
+    others = [f"unruly_agents:{name}" for name in ("Unmakeable", "Hungry", "Farthest")]
+    evaluate([*CONTAINED, *LOST, *UNHARMED, *others], tasks, folder, config=config, num_workers=2)
     return folder
 
 
@@ -111,8 +98,7 @@ def test_a_failure_costs_its_stage_alone(run_dir, agent):
 @pytest.mark.parametrize("agent", UNHARMED)
 def test_what_harms_nobody_costs_nothing(run_dir, tasks, tmp_path, agent):
     assert all(record.is_scored for record in records(run_dir, agent))
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    evaluate(["toy_agents:Explorer"], tasks, tmp_path, config=config, num_workers=0)
+    evaluate(["toy_agents:Explorer"], tasks, tmp_path, config=SHORT, num_workers=0)
     walked = [[entry.path_m for entry in record.trace] for record in records(tmp_path, "toy_agents:Explorer")]
     assert [[entry.path_m for entry in record.trace] for record in records(run_dir, agent)] == walked
 
@@ -128,16 +114,6 @@ def test_an_agent_that_cannot_be_made_is_errored_in_every_stage(run_dir):
         assert record.memory_lost_at is None
 
 
-def test_diagnostics_arrive_as_records_can_hold_them(run_dir):
-    _, second, _ = records(run_dir, "unruly_agents:Exotic")
-    told = second.trace[0]
-    assert told.choice == "half a pair: ?, \U0001f600, \x00"
-    assert told.counters == {"counts": 3}
-    assert told.details["3"] == [1, 2]
-    assert told.details["large"] == 10**30
-    assert told.details["float32"] == float(np.float32(0.1))
-
-
 def test_what_agents_print_is_in_the_log(run_dir):
     lines = (run_dir / LOG_NAME).read_text().splitlines()
     about = f"unruly_agents:Printing {records(run_dir, 'unruly_agents:Printing')[0].task_id} stage 2 | "
@@ -147,42 +123,18 @@ def test_what_agents_print_is_in_the_log(run_dir):
 
 
 def test_records_are_the_same_in_either_process(run_dir, tasks, tmp_path):
-    agents = [*CONTAINED, "unruly_agents:Exotic", "unruly_agents:Unmakeable"]
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    evaluate(agents, tasks, tmp_path, config=config, num_workers=0)
+    agents = [*CONTAINED, "unruly_agents:Unmakeable"]
+    evaluate(agents, tasks, tmp_path, config=SHORT, num_workers=0)
     with RunStore(run_dir) as own, RunStore(tmp_path) as shared:
         for agent in agents:
             assert list(own.record_texts(agent)) == list(shared.record_texts(agent)), agent
-
-
-@pytest.fixture(scope="module")
-def built_in_runs(tmp_path_factory):
-    """Two stages of all built-in agents: in processes of their own, and in this one."""
-    own, shared = tmp_path_factory.mktemp("own"), tmp_path_factory.mktemp("shared")
-    tasks, reader = short_tasks(BUNDLED_TASKS, 2)
-    config = RunConfig(backend=Backend(tasks=reader), protocol=ProtocolConfig(max_rounds=4, max_actions=8))
-    evaluate(list(BUILT_IN), tasks, own, config=config, num_workers=1)
-    evaluate(list(BUILT_IN), tasks, shared, config=config, num_workers=0)
-    return own, shared
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("agent", BUILT_IN)
-def test_built_in_agents_do_the_same_in_either_process(built_in_runs, agent):
-    with RunStore(built_in_runs[0]) as own, RunStore(built_in_runs[1]) as shared:
-        found = list(own.record_texts(agent))
-        assert len(found) == 2
-        assert found == list(shared.record_texts(agent))
-        assert list(own.floor_plans()) == list(shared.floor_plans())
-    if agent != "stay-still":  # which stops at once
-        assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in found)
 
 
 @pytest.mark.parametrize("num_retries", [0, 1])
 def test_an_agent_lost_between_stages_fails_the_next_one(tasks, tmp_path, monkeypatch, num_retries):
     """Its process ends as it tells the costs of stage 1: stage 2 is not run by an agent that remembers nothing."""
     monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
-    config = RunConfig(backend=replace(TOY, decision=Component("unruly_agents:Fatal")), protocol=SHORT)
+    config = replace(SHORT, backend=replace(SHORT.backend, decision=Component("unruly_agents:Fatal")))
     arguments = ["toy_agents:Explorer"], tasks[:1], tmp_path / "run"
     evaluate(*arguments, config=config, num_workers=1, num_retries=num_retries)
     found = records(tmp_path / "run", "toy_agents:Explorer")
@@ -215,33 +167,17 @@ def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):
     """A stage after a loss was run without memory: it is not kept when the lost stage is tried again."""
     monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
     arguments = (["toy_agents:DyingOnce"], tasks, tmp_path / "run")
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    (summary,) = evaluate(*arguments, config=config, num_workers=1)
+    (summary,) = evaluate(*arguments, config=SHORT, num_workers=1)
     assert summary.counts["errored"] == 1
     assert records(tmp_path / "run", "toy_agents:DyingOnce")[2].memory_lost_at == 3
     before = texts(tmp_path / "run")
-    evaluate(*arguments, config=config, num_workers=1)
+    evaluate(*arguments, config=SHORT, num_workers=1)
     assert texts(tmp_path / "run") == before
     (tmp_path / "alive").touch()
-    (summary,) = evaluate(*arguments, config=config, num_workers=1, retry_errored=True)
+    (summary,) = evaluate(*arguments, config=SHORT, num_workers=1, retry_errored=True)
     assert not summary.is_incomplete
     stages = records(tmp_path / "run", "toy_agents:DyingOnce")
     assert [(record.failed_before, record.memory_lost_at) for record in stages] == [((), None)] * 3
-
-
-@pytest.mark.slow
-def test_a_resumed_run_repeats_its_failures(tasks, tmp_path):
-    """An episode that is not finished runs again with its errored stage, which is not recorded twice."""
-    config = RunConfig(backend=TOY, protocol=SHORT)
-    arguments = (["toy_agents:Dying"], tasks, tmp_path)
-    evaluate(*arguments, config=config, num_workers=1)
-    whole = texts(tmp_path)
-    with RunStore(tmp_path) as store:
-        store.forget_episode("toy_agents:Dying", tasks[0].task_id, 3)
-    seen = []
-    evaluate(*arguments, config=config, num_workers=1, on_progress=seen.append)
-    assert [news.latest.stage for news in seen if news.latest] == [3]
-    assert texts(tmp_path) == whole
 
 
 @pytest.mark.parametrize("num_workers", [0, 1])
@@ -292,8 +228,8 @@ GOAL = Goal(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8))
 
 
 @contextmanager
-def begun(name):
-    with closing(AgentProcesses(AgentHosting(timeout_s=30.0))) as processes:
+def begun(name, isolation="process"):
+    with closing(AgentProcesses(AgentHosting(isolation, timeout_s=30.0))) as processes:
         agent = RemoteAgent(processes, name, Component("evonav.decision.backends:text_match"), 0)
         agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
         agent.begin_stage(GOAL)
@@ -346,6 +282,21 @@ def test_arrays_cross_the_border_whatever_their_layout_and_size(echo):
         assert acted(echo, seen).reason == f"{len(sides)} views"
         assert json.loads(json.dumps(echo.diagnostics().details["seen"])) == digests(seen)
     assert echo.cpu_s > 0.0
+
+
+@pytest.mark.parametrize("isolation", ["process", pytest.param("sandbox", marks=NEEDS_SANDBOX)])
+def test_what_an_agent_keeps_is_in_its_own_memory(isolation):
+    """The evaluator's grows by a few observations and no more; what it has sent stays as it was."""
+    rng = np.random.default_rng(0)
+    with begun("unruly_agents:Keeping", isolation) as agent:
+        for _ in range(8):
+            seen = Observation(tuple(view(rng, 300) for _ in range(3)), Pose(1.0, 0.9, 2.0, 0.5), True, 3)
+            before = [one.detections.masks.copy() for one in seen.views]
+            acted(agent, seen)
+            assert all(np.array_equal(one.detections.masks, was) for one, was in zip(seen.views, before, strict=True))
+        size = sum(array.nbytes + 64 for one in seen.views for array in (one.depth_m, one.rgb, one.detections.masks))
+        block = agent._process._block
+        assert os.fstat(block.descriptor).st_blocks * 512 <= NUM_SLOTS * (size + 4096)
 
 
 def test_processes_are_reused_and_agents_are_not():

@@ -4,10 +4,11 @@ import os
 import sqlite3
 from pathlib import Path
 
+import asking_agent
 import pytest
 from short_tasks import short_tasks
+from toy_run import NEEDS_SANDBOX
 
-from evonav.agents.hosting import sandbox
 from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.hosting.isolation import AgentHosting, Isolation
@@ -19,9 +20,6 @@ from evonav.evaluation.run.run import RunConfig
 from evonav.tasks.listing import BUNDLED_TASKS
 from vlm_stub import KEY, check_request, serving
 
-NEEDS_SANDBOX = pytest.mark.skipif(
-    sandbox.sandbox_problem() is not None, reason=f"no sandbox here: {sandbox.sandbox_problem()}"
-)
 PRICE = [2.0, 8.0]
 
 
@@ -79,7 +77,7 @@ def test_a_model_is_asked_for_an_agent_in_a_sandbox_as_for_any_other(
 @NEEDS_SANDBOX
 def test_an_agent_reaches_the_model_and_nothing_else_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
-    agent = f"{Path(__file__).with_name('asking_agent.py')}:Asking"
+    agent = f"{asking_agent.__file__}:Asking"
     with (
         serving(lambda _: {"text": "2"}) as stub,
         run(tmp_path / "run", [agent], stub.url, isolation="sandbox", num_stages=3) as store,

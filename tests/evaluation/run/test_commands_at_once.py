@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from test_run import texts
+from toy_run import texts
 from typer.testing import CliRunner
 
 from evonav.cli import app

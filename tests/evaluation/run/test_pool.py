@@ -8,8 +8,7 @@ import time
 
 import pytest
 from processes import children
-from test_run import CONFIG, texts
-from toy_house import write_tasks
+from toy_run import CONFIG, texts
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
@@ -20,15 +19,8 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate, evaluate_all
 from evonav.evaluation.run.run import Evaluation, RunConfig
 from evonav.parallel.worker import Workforce
-from evonav.tasks.listing import task_files
 
 AGENT = "nearest-frontier"
-
-
-@pytest.fixture
-def tasks(tmp_path):
-    write_tasks(tmp_path / "tasks")
-    return tuple(task_files(tmp_path / "tasks"))
 
 
 def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
@@ -39,7 +31,8 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
         simulator=Component("flaky_simulator:make", {"num_losses": 0}, {"folder": str(folder)}),
     )
     configs = [RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=3), seed=seed) for seed in (0, 1)]
-    together = [Evaluation(("random-walk",), tasks, tmp_path / f"cell-{i}", config) for i, config in enumerate(configs)]
+    cells = [tmp_path / f"cell-{index}" for index in range(2)]
+    together = [Evaluation(("random-walk",), tuple(tasks), *one) for one in zip(cells, configs, strict=True)]
     news = []
     summaries = evaluate_all(together, Workforce(1), on_progress=lambda *one: news.append(one))
     assert len((folder / "starts").read_text()) == 2  # one a run, though episodes of both are under way at once
@@ -48,8 +41,8 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
     for index, config in enumerate(configs):
         alone = tmp_path / f"alone-{index}"
         assert evaluate(["random-walk"], tasks, alone, config=config, num_workers=0) == summaries[index]
-        assert texts(alone) == texts(tmp_path / f"cell-{index}")
-    assert texts(tmp_path / "cell-0") != texts(tmp_path / "cell-1")
+        assert texts(alone) == texts(cells[index])
+    assert texts(cells[0]) != texts(cells[1])
     with pytest.raises(InvalidArgumentError, match="the same folder"):
         evaluate_all([together[0], together[0]], Workforce(0))
 
@@ -66,17 +59,6 @@ def test_an_agent_whose_process_dies_is_tried_again(tasks, tmp_path, monkeypatch
         (failure,) = store.failures()
         assert (failure.stage, failure.kind, failure.is_retried) == (2, ErrorKind.CRASH, True)
         assert store.retries() == {(agent, tasks[0].task_id, 2): 1}
-
-
-@pytest.mark.parametrize("num_workers", [0, 1])
-def test_an_exception_is_kept_with_its_traceback_and_not_tried_again(tasks, tmp_path, num_workers):
-    evaluate(["toy_agents:Raising"], tasks[:1], tmp_path / "run", config=CONFIG, num_workers=num_workers)
-    with RunStore(tmp_path / "run") as store:
-        (failure,) = store.failures()
-    assert (failure.stage, failure.kind, failure.is_retried) == (2, ErrorKind.AGENT, False)
-    assert 'raise RuntimeError("no idea")' in failure.traceback
-    assert "toy_agents.py" in failure.traceback
-    assert "toy_agents.py" not in failure.message
 
 
 def test_a_task_that_cannot_be_read_is_the_harness_failure_of_every_stage(tasks, tmp_path):
