@@ -9,7 +9,7 @@ from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import AgentHosting
-from evonav.evaluation.run.components import check_agent_name
+from evonav.evaluation.run.components import check_agent_names
 
 FORGETFUL = (
     "fu",
@@ -41,7 +41,7 @@ def test_agents_with_object_entries_of_ours_take_a_rule() -> None:
 def test_a_rule_that_does_not_exist_is_named_with_the_nearest() -> None:
     for isolation in ("none", "process"):
         with pytest.raises(InvalidArgumentError, match=r"no forgetting rule 'baies': did you mean `bayes`[?]$"):
-            check_agent_name("fu@baies", AgentHosting(isolation))
+            check_agent_names(["fu@baies"], AgentHosting(isolation))
 
 
 @pytest.mark.parametrize("name", [name for name in FORGETFUL if name != "dualmap"])  # its anchors are no entries

@@ -24,7 +24,7 @@ import evonav
 from evonav.agents.agent import NavigateTo, Stop
 from evonav.cli import app
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.components import check_agent_name
+from evonav.evaluation.run.components import check_agent_names
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.house import bundled_houses
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
@@ -210,8 +210,7 @@ def made_small(words: list[str], place: Path) -> list[str]:
         del options["--limit"]
     if words.count("--agent") == 1:
         names = words[words.index("--agent") + 1].split(",")
-        for name in names:
-            check_agent_name(name)
+        check_agent_names(names)
         options["--agent"] = ",".join(names if len(names) == 1 else [names[0], names[-1]])
     elif words[0] == "evaluate" and "--agent" not in words:
         options["--agent"] = "ftu" if "--perception" in words else "fu,ftu"

@@ -6,7 +6,7 @@ from typing import Any
 
 from evonav.agents.registry import import_name, needed_arguments, new_agent, register
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.run.components import check_agent_name
+from evonav.evaluation.run.components import check_agent_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ def named_agents(agents: Iterable[Any]) -> NamedAgents:
     local: list[str] = []
     for agent in _flat(agents):
         if isinstance(agent, str):
-            check_agent_name(agent)
+            check_agent_names([agent])
             names.append(agent)
             continue
         _check(agent)

@@ -13,7 +13,7 @@ from evonav.api.progress import progress_bar
 from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.components import Backend, check_decision
+from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate_all
 from evonav.evaluation.run.run import Evaluation
 from evonav.evaluation.run.run_settings import DecisionResources, RunSettings, Settings, SpendingSettings, settings_of
@@ -87,10 +87,9 @@ def evaluate(
     costs = read_settings(SpendingSettings, "", spending or {}, "spending")
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
-    decisions.check()
     model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_episodes))
     if not decisions.asks_rules:
-        check_decision(model, seed)
+        model.create(seed).check()
     backend = Backend(
         simulator=simulation.component(),
         perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),

@@ -20,7 +20,7 @@ from evonav._core import __version__
 from evonav.decision.vlm.account import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.run.components import Backend, check_decision
+from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate_all
 from evonav.evaluation.run.run import Evaluation, Progress, RunConfig
 from evonav.evaluation.run.run_settings import DecisionResources
@@ -153,7 +153,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
     )
     try:
         config = config_of(sweep, run.cell, resources)
-        check_decision(config.backend.decision, run.cell.seed)
+        config.backend.decision.create(run.cell.seed).check()
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error
     return replace(run, evaluation=replace(run.evaluation, config=config))

@@ -9,7 +9,7 @@ from toy_run import NEEDS_SANDBOX, TOY
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting import isolation, scratch
+from evonav.evaluation.hosting import isolation
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.process import check_importable
 from evonav.evaluation.records.schema import EndState
@@ -95,7 +95,7 @@ def test_downloaded_models_can_be_read_and_their_keys_cannot(tasks, tmp_path, mo
 
 def test_folders_of_killed_runs_are_deleted_and_no_others(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    left, young, running, foreign = (tmp_path / f"{scratch.PREFIX}{name}" for name in ("a", "b", "c", "d"))
+    left, young, running, foreign = (tmp_path / f"{isolation.SCRATCH_PREFIX}{name}" for name in ("a", "b", "c", "d"))
     outside = tmp_path / "outside"
     for folder in (left, young, running, outside):
         (folder / "large").mkdir(parents=True)
@@ -104,12 +104,12 @@ def test_folders_of_killed_runs_are_deleted_and_no_others(tmp_path, monkeypatch)
     foreign.symlink_to(outside)
     for folder in (left, running, outside):
         os.utime(folder, (0, 0))
-    with writing(running), scratch.agents_scratch() as name:
+    with writing(running), isolation.agents_scratch() as name:
         assert not left.exists()
         assert young.exists()
         assert running.exists()
         assert (outside / "large").exists()
-        with scratch.agents_scratch():
+        with isolation.agents_scratch():
             assert os.path.isdir(name)  # noqa: PTH112 - a text
     assert not os.path.exists(name)  # noqa: PTH110
 

@@ -48,7 +48,6 @@ def decision_component(
         DecisionError: The model cannot be asked from here: a key or package is missing.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.evaluation.run.components import check_decision
     from evonav.evaluation.run.run_settings import DecisionResources
 
     decisions.check()
@@ -59,7 +58,7 @@ def decision_component(
     resources = None if dry_run else DecisionResources.of_run(out, spending, num_askers)
     decision = decisions.component(seed, resources)
     if resources is not None and not decisions.asks_rules:
-        check_decision(decision, seed)
+        decision.create(seed).check()
     return decision
 
 

@@ -148,12 +148,12 @@ def _print_plan(
     from evonav.cli.display import status
     from evonav.evaluation.cost_estimate import estimate_run, total_usage
     from evonav.evaluation.hosting.isolation import AgentHosting
-    from evonav.evaluation.run.components import check_agent_name
+    from evonav.evaluation.run.components import check_agent_names
     from evonav.report.tables.table import Table
     from evonav.sweeps.run import cell_runs
 
-    for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
-        check_agent_name(agent, None if settings.isolation == "none" else AgentHosting())
+    names = list(dict.fromkeys(agent for cell in cells for agent in cell.agents))
+    check_agent_names(names, None if settings.isolation == "none" else AgentHosting())
     has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
     columns = ("cell", "tasks", "stages", *(("requests", "tokens in", "dollars") if has_models else ()))
     rows = []

@@ -1,14 +1,21 @@
-"""Decide how far an agent's process is shut off, and what one in a sandbox may read."""
+"""Decide how far an agent's process is shut off, and what one in a sandbox may read and write."""
 
 import os
+import shutil
+import stat
 import sys
+import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Literal
 
 from evonav.agents.hosting.sandbox import Policy, landlock_abi, sandbox_problem
+from evonav.errors import StoreError
+from evonav.parallel.folders import LOCK_NAME, writing
 from evonav.parallel.local import SPARING, THREAD_VARIABLES, search_path
 from evonav.perception.weights import MODELS_VARIABLE
 
@@ -17,6 +24,9 @@ Isolation = Literal["none", "process", "sandbox"]
 IS_SUPPORTED = os.name == "posix"
 """True where agents can have processes of their own; elsewhere they run in the evaluator's."""
 
+SCRATCH_PREFIX = "evonav-agents-"
+_LEFT_S = 60.0
+"""A folder that is younger may be about to be locked."""
 _GPU_DEVICES = ("/dev/nvidiactl", "/dev/kfd")
 _SYSTEM = (
     "/bin",
@@ -181,3 +191,35 @@ def _shown(place: Path, hidden: Sequence[Path]) -> Iterator[tuple[Path, bool]]:
     for inner in sorted(place.iterdir()):
         if not inner.is_symlink():
             yield from _shown(inner, hidden)
+
+
+# Where it may write
+
+
+@contextmanager
+def agents_scratch() -> Iterator[str]:
+    """Lend a locked temporary folder, which is deleted at the end; `StoreError` if the file system has no locks."""
+    with TemporaryDirectory(prefix=SCRATCH_PREFIX, ignore_cleanup_errors=True) as name, writing(Path(name)):
+        for folder in Path(name).parent.glob(f"{SCRATCH_PREFIX}*"):
+            with suppress(OSError, StoreError):  # locked, or deleted by another run
+                if _may_be_left(folder):
+                    with writing(folder):
+                        shutil.rmtree(folder)
+        yield name
+
+
+def new_scratch(folder: str | None) -> Path:
+    """Return a new folder for one process.
+
+    Args:
+        folder: The lent folder; default, and where it is not there, as on other machines of a cluster: the system's.
+    """
+    parent = folder if folder is not None and Path(folder).is_dir() else None
+    return Path(mkdtemp(prefix="evonav-agent-", dir=parent))
+
+
+def _may_be_left(folder: Path) -> bool:
+    """Return whether a folder is our user's and was locked a while ago."""
+    status = folder.lstat()
+    is_own = stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+    return is_own and (folder / LOCK_NAME).exists() and time.time() - status.st_mtime > _LEFT_S

@@ -37,11 +37,11 @@ from evonav.evaluation.hosting.isolation import (
     AgentHosting,
     ProcessSetup,
     environment,
+    new_scratch,
     policy_of,
     with_absolute_file,
 )
 from evonav.evaluation.hosting.model_relay import ModelRelay
-from evonav.evaluation.hosting.scratch import new_scratch
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each, search_path
 from evonav.parallel.one_core import OneCore

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -26,15 +26,13 @@ from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.world.simulator import Simulator, SimulatorConfig, vertical_fov_deg
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_spec")
-
-
+TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
+TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
 USUAL_CAMERA = {"width_px": 300, "height_px": 300, "hfov_deg": 90.0}
 """The camera of runs whose headers do not say another one: options of simulators, with AI2-THOR's defaults."""
 EMBEDDED: Component[Simulator] = Component(
     "evonav.evaluation.run.components:embedded_simulator", {"style": SimulatorConfig().style}
 )
-TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
-TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
 RECENT_HOUSES: deque[Any] = deque(maxlen=8)
 """Houses of this process's simulators: the next agent in a task finds those of its stages there."""
 
@@ -147,43 +145,37 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     return new_agent(agent_factory(name), decision)
 
 
-def check_agent_names(names: Sequence[str], hosting: AgentHosting, setup: ProcessSetup) -> None:
-    """Check, as `check_agent_name` does, that workers can make these agents: several share one process's imports."""
-    fork_server = new_fork_server(hosting, setup) if len(names) > 1 else None  # which starts nothing yet
-    with nullcontext() if fork_server is None else closing(fork_server):
-        for name in names:
-            check_agent_name(name, hosting, setup, fork_server)
-
-
-def check_agent_name(
-    name: str,
-    hosting: AgentHosting | None = None,
-    setup: ProcessSetup = NO_SETUP,
-    fork_server: ForkServer | None = None,
+def check_agent_names(
+    names: Sequence[str], hosting: AgentHosting | None = None, setup: ProcessSetup = NO_SETUP
 ) -> None:
-    """Check that workers can make an agent of this name.
+    """Check that workers can make these agents.
 
     Args:
-        hosting: The place where agents run: one that is not built in is imported there. Default: in this process.
-        fork_server: Server that forks the process; default: a fresh one is started.
+        hosting: The place where agents run: those that are not built in are imported there, in processes that share
+            what they import. Default: in this process.
 
     Raises:
-        InvalidArgumentError: No agent has this name, or it cannot be imported.
+        InvalidArgumentError: No agent has one of the names, or it cannot be imported.
     """
-    if name in ORACLE_BASELINE_NAMES or name in BUILT_IN:
-        return
-    try:
-        if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
-            agent_factory(name)
-        else:
-            check_importable(name, hosting, setup, fork_server)
-    except InvalidArgumentError as error:
-        if ":" in name or name.endswith(".py") or RULE_MARK in name:
-            raise
-        near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINE_NAMES), 1)
-        known = ", ".join(sorted(ORACLE_BASELINE_NAMES))
-        hint = f"; did you mean `{near[0]}`?" if near else f"; oracle baselines are {known}"
-        raise InvalidArgumentError(f"{error}{hint}") from error
+    with ExitStack() as stack:
+        fork_server: ForkServer | None = None
+        if hosting is not None and len(names) > 1 and (fork_server := new_fork_server(hosting, setup)) is not None:
+            stack.enter_context(closing(fork_server))  # which starts nothing yet
+        for name in names:
+            if name in ORACLE_BASELINE_NAMES or name in BUILT_IN:
+                continue
+            try:
+                if hosting is None or hosting.is_in_process or name.partition(RULE_MARK)[0] in BUILT_IN:
+                    agent_factory(name)
+                else:
+                    check_importable(name, hosting, setup, fork_server)
+            except InvalidArgumentError as error:
+                if ":" in name or name.endswith(".py") or RULE_MARK in name:
+                    raise
+                near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINE_NAMES), 1)
+                known = ", ".join(sorted(ORACLE_BASELINE_NAMES))
+                hint = f"; did you mean `{near[0]}`?" if near else f"; oracle baselines are {known}"
+                raise InvalidArgumentError(f"{error}{hint}") from error
 
 
 def load_spec(path: Path) -> EpisodeSpec:
@@ -192,16 +184,6 @@ def load_spec(path: Path) -> EpisodeSpec:
     from evonav.tasks import load_task
 
     return episode_spec(load_task(path))
-
-
-def check_decision(decision: Component[DecisionModel], seed: int) -> None:
-    """Check before a run that its model can be asked from here, without asking it.
-
-    Raises:
-        DecisionError: A key or package is missing.
-        InvalidArgumentError: The model cannot be made.
-    """
-    decision.create(seed).check()
 
 
 def embedded_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - `style` and those of `USUAL_CAMERA`

@@ -11,7 +11,7 @@ from typing import Any
 from evonav.component import Component
 from evonav.decision.vlm.shared_file import fold_log
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.hosting.scratch import agents_scratch
+from evonav.evaluation.hosting.isolation import agents_scratch
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.encoded import EncodedStage
 from evonav.evaluation.records.schema import ErrorKind, StageFailure
