@@ -18,6 +18,7 @@ from evonav.decision.pictures import Picture
 from evonav.decision.prompts import with_notice
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
+from evonav.evaluation.episode.observer import EpisodeObserver
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.staleness import entry_record, matched_object
 from evonav.evaluation.hosting.process import AgentFailedError
@@ -57,7 +58,7 @@ class Loss:
     message: str
 
 
-class Recorder:
+class Recorder(EpisodeObserver):
     """Record what an agent does and believes as it runs, until `take`."""
 
     def __init__(

@@ -1,7 +1,5 @@
 """Observe episodes, and attribute the errors of a stage."""
 
-from typing import Protocol
-
 from evonav.agents.hosting import error_text
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation.hosting.process import AgentFailedError
@@ -11,7 +9,7 @@ from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
 
-class EpisodeObserver(Protocol):
+class EpisodeObserver:
     """Observes a running episode (`evonav.replay.replay`) without changing the agent or the record.
 
     If it raises `AgentFailedError`, the stage fails as if the agent had failed.
@@ -19,19 +17,15 @@ class EpisodeObserver(Protocol):
 
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
         """Note that a stage's house is loaded; the agent has not received the goal yet."""
-        ...
 
     def house_changes(self, simulator: Simulator) -> None:
         """Note that the house has changed during the stage, before the views of the next round."""
-        ...
 
     def round_begins(self, observation: Observation) -> None:
         """Receive the observation that the agent receives next."""
-        ...
 
     def round_ends(self, record: RoundRecord) -> None:
         """Receive the record of a round, after the agent's action was executed."""
-        ...
 
 
 class StageFailedError(Exception):

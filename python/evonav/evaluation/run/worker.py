@@ -14,9 +14,10 @@ perception or a reader of tasks, has to expect two threads at once.
 """
 
 import json
+import math
 import threading
 import time
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from dataclasses import asdict, dataclass, replace
@@ -31,6 +32,7 @@ from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.observer import EpisodeObserver
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent, post_mortem
@@ -42,7 +44,6 @@ from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.parallel.local import EndedError
-from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator
 
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, ErrorKind.CRASH, ErrorKind.TIMEOUT)
@@ -223,7 +224,7 @@ class WorkerContext:
             self._processes.close()
 
 
-class _Heartbeat:
+class _Heartbeat(EpisodeObserver):
     """Reports after every round that the episode continues."""
 
     def __init__(self, on_round: Callable[[], None]) -> None:
@@ -232,30 +233,8 @@ class _Heartbeat:
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
         self._on_round()
 
-    def house_changes(self, simulator: Simulator) -> None:
-        pass
-
-    def round_begins(self, observation: Observation) -> None:
-        pass
-
     def round_ends(self, record: RoundRecord) -> None:
         self._on_round()
-
-
-class _Retries:
-    """Counts the retries that are left to an episode."""
-
-    def __init__(self, num_retries: int) -> None:
-        self._num_left: defaultdict[int, int] = defaultdict(lambda: num_retries)
-
-    def take(self, failure: StageFailure) -> bool:
-        """Use up a retry after a failure, if it may be retried and one is left."""
-        if failure.kind not in RETRIED:
-            return False
-        # The limit for failures of the agent's own process is per episode and not per stage: retries take time.
-        stage = 0 if failure.kind.is_agents else failure.stage
-        self._num_left[stage] -= 1
-        return self._num_left[stage] >= 0
 
 
 class EpisodeWork:
@@ -277,7 +256,7 @@ class EpisodeWork:
         """
         run, _, job_text = text.partition("\n")
         with self._used(int(run)) as context:
-            job, num_left = EpisodeJob(**json.loads(job_text)), _Retries(context.setup.num_retries)
+            job, num_failed = EpisodeJob(**json.loads(job_text)), Counter[int]()
             try:
                 task = context.task(job.path)
                 spec = replace(task, opaque_id=job.opaque_id)
@@ -286,8 +265,9 @@ class EpisodeWork:
                     is_whole = True
                     with context.attempt(spec, job) as outcomes:
                         for outcome in outcomes:
-                            if outcome.failure is not None and num_left.take(outcome.failure):
-                                yield _text(outcome.failure)
+                            failure = outcome.failure
+                            if failure is not None and _num_tried(failure, num_failed) <= context.setup.num_retries:
+                                yield _text(failure)
                                 is_whole = False
                                 break
                             yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
@@ -325,6 +305,14 @@ class EpisodeWork:
         for context in self._contexts.values():
             context.close()
         self._contexts.clear()
+
+
+def _num_tried(failure: StageFailure, num_failed: Counter[int]) -> float:
+    """Count a failure, and return how many there were; infinity for one that a retry cannot avoid."""
+    # The limit for failures of the agent's own process is per episode and not per stage: retries take time.
+    stage = 0 if failure.kind.is_agents else failure.stage
+    num_failed[stage] += 1
+    return num_failed[stage] if failure.kind in RETRIED else math.inf
 
 
 def _text(event: EncodedStage | StageFailure | None) -> str:
