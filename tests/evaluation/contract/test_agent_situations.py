@@ -8,11 +8,10 @@ import doubting_agent
 from evonav.agents.baselines import NearestFrontier
 from evonav.evaluation.contract.situations import check_situations, place_of
 from evonav.evaluation.run.components import Backend
-from evonav.tasks.listing import BUNDLED_TASKS
 
 
 def situations(agent):
-    return {found.name: found for found in check_situations(Backend(), BUNDLED_TASKS, "mine", agent, 0)}
+    return {found.name: found for found in check_situations(Backend(), "mine", agent, 0)}
 
 
 def test_an_agent_that_handles_every_situation_passes():

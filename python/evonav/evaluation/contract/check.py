@@ -5,9 +5,9 @@ its calls.
 """
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -61,126 +61,114 @@ def check_agent(
     return ContractReport(name, tuple(examination.checks()))
 
 
-@dataclass(slots=True)
-class _Run:
-    """The records of one or more episodes of one agent object."""
-
-    records: list[StageRecord] = field(default_factory=list)
-    memory_mb: float | None = None
-
-    @property
-    def actions(self) -> list[tuple[int, Any]]:
-        return [(record.stage, entry.action) for record in self.records for entry in record.trace]
-
-
+@dataclass(frozen=True, slots=True)
 class _Examination:
     """Runs episodes of an agent, and compares them."""
 
-    def __init__(
-        self, name: str, factory: Callable[..., Agent] | None, backend: Backend, seed: int, timeout_s: float
-    ) -> None:
-        self._name = name
-        self._factory = factory
-        self._backend = backend
-        self._seed = seed
-        self._hosting = AgentHosting(timeout_s=timeout_s)
+    name: str
+    factory: Callable[..., Agent] | None
+    backend: Backend
+    seed: int
+    timeout_s: float
 
     def checks(self) -> Iterator[Check]:
-        if self._name in ORACLE_BASELINE_NAMES:
+        if self.name in ORACLE_BASELINE_NAMES:
             yield Check("importable", "fail", "an oracle baseline: it knows the target, and is no agent")
             return
-        with closing(AgentProcesses(self._hosting)) as processes:
-            yield from self._examine(BUNDLED_TASKS, processes)
+        with closing(AgentProcesses(AgentHosting(timeout_s=self.timeout_s))) as processes:
+            yield from self._checks(processes)
 
-    def _examine(self, tasks: Path, processes: AgentProcesses) -> Iterator[Check]:
-        spec, other = _changing_tasks(self._backend, tasks)
-        remote: _Run | None = None
-        if self._factory is None or _is_importable(self._name, self._factory):
-            remote = self._remote_run(spec, processes)
+    def _checks(self, processes: AgentProcesses) -> Iterator[Check]:
+        spec, other = _changing_tasks(self.backend)
+        remote, memory_mb = None, None
+        if self.factory is None or _is_importable(self.name, self.factory):
+            remote, memory_mb = self._remote_run(spec, processes)
             first_check = self._check_remote(remote)
             yield first_check
             if first_check.verdict == "fail":
                 return
         else:
             advice = "define the class in a module or file, outside of functions, so that evaluations can run it"
-            finding = f"`{self._name}` cannot be imported by its name: {advice} in a process of its own"
+            finding = f"`{self.name}` cannot be imported by its name: {advice} in a process of its own"
             yield Check("own process", "warn", finding)
         try:
-            factory = self._factory or agent_factory(self._name)
+            factory = self.factory or agent_factory(self.name)
             if needed := ", ".join(f"`{name}`" for name in needed_arguments(factory)):
                 yield Check("made", "fail", f"it needs the arguments {needed}: give them defaults, or make a {ADVICE}")
                 return
             probe = self._probe(factory)
-            first = self._run(probe, spec)
+            first = list(self._episode(probe, spec))
         except BaseException as error:  # the code of others may raise SystemExit, too
             yield Check("made", "fail", f"making it raises {describe(error, caller=PACKAGE)}")
             return
         yield Check("made", "pass", "without arguments, or with `decision` alone")
-        yield from points_of(probe, first.records)
-        if not any(record.error is not None and record.error.kind.is_agents for record in first.records):
-            yield from self._compare(factory, spec, other, first, remote)
+        yield from points_of(probe, first)
+        if not any(record.error is not None and record.error.kind.is_agents for record in first):
+            yield from self._compare(factory, spec, other, first, remote, memory_mb)
             makes: Callable[[], Agent | HostedAgent] = partial(self._probe, factory)
             if remote is not None:
-                makes = partial(RemoteAgent, processes, self._name, self._backend.decision, self._seed)
-            yield from check_situations(self._backend, tasks, self._name, makes, self._seed)
+                makes = partial(RemoteAgent, processes, self.name, self.backend.decision, self.seed)
+            yield from check_situations(self.backend, self.name, makes, self.seed)
 
-    def _remote_run(self, spec: EpisodeSpec, processes: AgentProcesses) -> _Run:
-        """Run an episode in a process of its own, until that process is lost."""
-        run = _Run()
-        agent = RemoteAgent(processes, self._name, self._backend.decision, self._seed)
+    def _remote_run(self, spec: EpisodeSpec, processes: AgentProcesses) -> tuple[list[StageRecord], float | None]:
+        """Run an episode in a process of its own, until that is lost; return the records, and its memory in MB."""
+        records, memory_mb = [], None
+        agent = RemoteAgent(processes, self.name, self.backend.decision, self.seed)
         for record in self._episode(agent, spec):
-            run.records.append(record)
+            records.append(record)
             if record.error is not None and record.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
                 break
-            run.memory_mb = (agent.memory_mb if record.num_rounds else None) or run.memory_mb
+            memory_mb = (agent.memory_mb if record.num_rounds else None) or memory_mb
         agent.close()
-        return run
+        return records, memory_mb
 
-    def _check_remote(self, run: _Run) -> Check:
-        last, error = run.records[-1], run.records[0].error
+    def _check_remote(self, records: Sequence[StageRecord]) -> Check:
+        last, error = records[-1], records[0].error
         if last.error is not None and last.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
             return Check("own process", "fail", f"stage {last.stage}: {last.error.message}")
         is_unknown = error is not None and any(part in error.message for part in ("cannot be imported", "no agent `"))
-        if error is not None and is_unknown and not run.records[0].trace:
+        if error is not None and is_unknown and not records[0].trace:
             return Check("importable", "fail", error.message.removeprefix("InvalidArgumentError: ").partition(" [")[0])
-        return Check("importable", "pass", f"a process of its own can import `{self._name}`")
+        return Check("importable", "pass", f"a process of its own can import `{self.name}`")
 
     def _probe(self, factory: Callable[..., Agent]) -> Probe:
-        return Probe(new_agent(factory, self._backend.decision.create(self._seed)))
-
-    def _run(self, probe: Probe, spec: EpisodeSpec) -> _Run:
-        """Run an episode in this process."""
-        return _Run(list(self._episode(probe, spec)))
+        return Probe(new_agent(factory, self.backend.decision.create(self.seed)))
 
     def _episode(self, agent: Agent | HostedAgent, spec: EpisodeSpec) -> Iterator[StageRecord]:
-        with closing(self._backend.simulator.create()) as simulator:
-            perception = self._backend.perception.create()
-            episode = Episode(spec, self._name, agent, simulator, perception, PROTOCOL, self._seed)
+        with closing(self.backend.simulator.create()) as simulator:
+            perception = self.backend.perception.create()
+            episode = Episode(spec, self.name, agent, simulator, perception, PROTOCOL, self.seed)
             for outcome in episode.run():
                 yield outcome.record
 
     def _compare(
-        self, factory: Callable[..., Agent], spec: EpisodeSpec, other: EpisodeSpec, first: _Run, remote: _Run | None
+        self,
+        factory: Callable[..., Agent],
+        spec: EpisodeSpec,
+        other: EpisodeSpec,
+        first: Sequence[StageRecord],
+        remote: Sequence[StageRecord] | None,
+        memory_mb: float | None,
     ) -> Iterator[Check]:
         """Run the agent again: under the same seed, in its own process, and after another task."""
         used = self._probe(factory)
-        difference = _difference(first.actions, self._run(used, spec).actions)
-        if difference is None:
-            yield Check("same seed twice", "pass", f"the same {len(first.actions)} actions")
+        difference = _difference(first, self._episode(used, spec))
+        is_steady = difference is None
+        if is_steady:
+            num = sum(len(record.trace) for record in first)
+            yield Check("same seed twice", "pass", f"the same {num} actions")
         else:
             advice = "draw from `TaskInfo.seed`, and keep nothing in modules or classes"
             yield Check("same seed twice", "fail", f"{difference}: {advice}")
-        is_steady = difference is None
         if remote is not None:
-            difference = _difference(first.actions, remote.actions)
+            difference = _difference(first, remote)
             finding = f"in a process of its own, {difference}: does it read what is not there?"
             yield _equality("own process", is_steady, difference, finding, "acts there as it does here")
-            if remote.memory_mb is not None:
-                is_large = remote.memory_mb > LARGE_MEMORY_MB
-                finding = f"{remote.memory_mb:.0f} MB in a process of its own"
-                yield Check("memory", "warn" if is_large else "pass", finding)
-        fresh = self._run(self._probe(factory), other)
-        difference = _difference(fresh.actions, self._run(used, other).actions)
+            if memory_mb is not None:
+                finding = f"{memory_mb:.0f} MB in a process of its own"
+                yield Check("memory", "warn" if memory_mb > LARGE_MEMORY_MB else "pass", finding)
+        fresh = list(self._episode(self._probe(factory), other))
+        difference = _difference(fresh, self._episode(used, other))
         finding = f"after another task, {difference}: `begin_task` must forget everything"
         yield _equality("new task", is_steady, difference, finding, "after another task it acts like a fresh agent")
 
@@ -212,10 +200,10 @@ def _is_importable(name: str, factory: Callable[..., Agent]) -> bool:
     return import_name(factory) is not None
 
 
-def _changing_tasks(backend: Backend, directory: Path) -> tuple[EpisodeSpec, EpisodeSpec]:
+def _changing_tasks(backend: Backend) -> tuple[EpisodeSpec, EpisodeSpec]:
     """Return two bundled tasks, each up to its first stage before which objects were moved."""
     found = []
-    for root in sorted(path.parent for path in directory.glob("*/task.json")):
+    for root in sorted(path.parent for path in BUNDLED_TASKS.glob("*/task.json")):
         spec = backend.tasks.create(root)
         last = next((k for k, stage in enumerate(spec.stages) if stage.transition.relocations), None)
         if last is not None:
@@ -225,13 +213,16 @@ def _changing_tasks(backend: Backend, directory: Path) -> tuple[EpisodeSpec, Epi
     return found[0], found[1]
 
 
-def _difference(first: Sequence[tuple[int, Any]], second: Sequence[tuple[int, Any]]) -> str | None:
-    """Describe the first action that differs."""
-    for (stage, before), (_, after) in zip(first, second, strict=False):
+def _difference(first: Iterable[StageRecord], second: Iterable[StageRecord]) -> str | None:
+    """Describe the first action by which two episodes differ."""
+    befores, afters = (
+        [(record.stage, entry.action) for record in records for entry in record.trace] for records in (first, second)
+    )
+    for (stage, before), (_, after) in zip(befores, afters, strict=False):
         if before != after:
             return f"in stage {stage} it answers {_shown(after)} where it answered {_shown(before)}"
-    if len(first) != len(second):
-        return f"it acts {len(second)} times where it acted {len(first)} times"
+    if len(befores) != len(afters):
+        return f"it acts {len(afters)} times where it acted {len(befores)} times"
     return None
 
 

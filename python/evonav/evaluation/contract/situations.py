@@ -28,6 +28,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.house import House
 from evonav.perception import Percept, Perception
 from evonav.sensors.observation import Detections
+from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Simulator
 
@@ -67,11 +68,11 @@ class Script:
 
 
 def check_situations(
-    backend: Backend, tasks: Path, name: str, new_agent: Callable[[], Agent | HostedAgent], seed: int
+    backend: Backend, name: str, new_agent: Callable[[], Agent | HostedAgent], seed: int
 ) -> Iterator[Check]:
     """Run an agent through all scripts, and yield a check for each situation."""
     with closing(backend.simulator.create()) as simulator:
-        for script in _scripts(backend, tasks, simulator):
+        for script in _scripts(backend, simulator):
             perception = backend.perception.create()
             episode = Episode(
                 script.spec,
@@ -119,8 +120,8 @@ def _end(record: StageRecord) -> str:
 # Scripts
 
 
-def _scripts(backend: Backend, tasks: Path, simulator: Simulator) -> Iterator[Script]:
-    small, one, large = (backend.tasks.create(tasks / name) for name in (SOFA, BATHROOM, LARGE))
+def _scripts(backend: Backend, simulator: Simulator) -> Iterator[Script]:
+    small, one, large = (backend.tasks.create(BUNDLED_TASKS / name) for name in (SOFA, BATHROOM, LARGE))
     sofa, other = small.stages[2], small.stages[0]
     simulator.reset(sofa.house_json, small.start)
     start, walk = _approach(simulator, sofa.target)
