@@ -61,6 +61,7 @@ def records(run_dir, agent):
 DRIVER = """
 import sys, json
 from dataclasses import replace
+from pathlib import Path
 from toy_run import CHEAP
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.tasks.listing import task_files
