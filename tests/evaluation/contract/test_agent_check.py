@@ -87,7 +87,7 @@ def test_a_module_beside_a_file_of_its_name_is_told(tmp_path, monkeypatch):
 def test_classes_and_objects_are_checked_too():
     for agent in (contract_breakers.Turning, contract_breakers.Turning()):
         report = evonav.check_agent(agent)
-        assert report.agent == "contract_breakers:Turning"
+        assert report.name == "contract_breakers:Turning"
         assert set(verdicts(report).values()) == {"pass", "skip"}
 
     class Local(contract_breakers.Turning):
