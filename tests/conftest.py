@@ -3,6 +3,7 @@
 import signal
 
 from hypothesis import settings
+from recorded_runs import viewed_run, write_run  # noqa: F401 - fixtures
 
 # A shell that starts pytest in the background has it, and all that the tests start, ignore interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)

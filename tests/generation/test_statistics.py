@@ -6,7 +6,7 @@ from statistics import fmean, median
 
 import pytest
 from generated_tasks import generated_tasks
-from html_nesting import check_html
+from html_page import HtmlPage
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -223,7 +223,7 @@ def test_the_page_nests_and_the_plots_are_xml(found: TaskStatistics, tmp_path: P
     pytest.importorskip("matplotlib", reason="evonav[viz] is not installed")
     page = write_dataset_report(found, tmp_path)
     text = page.read_text(encoding="utf-8")
-    check_html(text)
+    HtmlPage(text)
     for measure in found.metrics:
         if measure.raw is not None:
             assert f"<td>{measure.label.strip().replace(chr(39), '&#39;')}</td>" in text

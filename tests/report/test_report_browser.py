@@ -1,30 +1,19 @@
 """The report in headless Chromium: no word in the console, controls that work, and no text that becomes a script."""
 
-import itertools
-import json
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from browser import needs_browser, probed
+from browser import XSS_CORPUS, needs_browser, probed
 from made_up_run import WriteRun, entry, record_run, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
-from evonav.replay.pages import write_episode
-from evonav.replay.replay import RunReplay
-from evonav.replay.types import ReplayedStage
 from evonav.report import write_report
-from evonav.report.maps.stage_map import page_name
 from evonav.report.pages import run_page as html
-from evonav.tasks.listing import BUNDLED_TASKS
 
-HERE = Path(__file__).parent
-PROBE = (HERE / "report_probe.js").read_text("utf-8")
-VIEWER_PROBE = (HERE / "viewer_probe.js").read_text("utf-8")
-CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
+PROBE = (Path(__file__).parent / "report_probe.js").read_text("utf-8")
 FOREIGN = {"iframe", "object", "embed", "base", "link", "form", "video", "audio", "math", "animate", "foreignobject"}
 """Elements that the corpus brings; a report has one `iframe` of its own."""
 
@@ -97,8 +86,10 @@ def hostile_record(i: int, texts: list[str]) -> StageRecord:
 @pytest.mark.slow
 @pytest.mark.parametrize("has_policy", [True, False])
 def test_no_text_of_a_run_becomes_a_script(tmp_path: Path, has_policy: bool) -> None:
-    assert len(set(CORPUS)) >= 100
-    records = [hostile_record(i, [CORPUS[(i + k) % len(CORPUS)] for k in range(4)]) for i in range(len(CORPUS))]
+    assert len(set(XSS_CORPUS)) >= 100
+    records = [
+        hostile_record(i, [XSS_CORPUS[(i + k) % len(XSS_CORPUS)] for k in range(4)]) for i in range(len(XSS_CORPUS))
+    ]
     run_dir = record_run(tmp_path / "run", records, {record.task_id: 2 for record in records}, ["fu"])
     page = write_report(run_dir)
     text = page.read_text("utf-8")
@@ -109,50 +100,11 @@ def test_no_text_of_a_run_becomes_a_script(tmp_path: Path, has_policy: bool) -> 
     page.write_text(text, "utf-8")
     found = probed(page, PROBE, tmp_path)
     assert found["errors"] == []
-    assert found["cells"] >= len(CORPUS)
+    assert found["cells"] >= len(XSS_CORPUS)
     assert found["groups"] >= 30
     assert found["handlers"] == []
     assert found["hacked"] == 0
     assert FOREIGN.intersection(found["tags"]) == {"iframe"}
-
-
-@pytest.fixture(scope="module")
-def traced(viewed_run: Path) -> list[ReplayedStage]:
-    task_id = sorted(path.name for path in BUNDLED_TASKS.iterdir() if path.is_dir())[1]
-    return list(RunReplay(viewed_run, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
-
-
-@pytest.mark.slow
-def test_no_answer_of_a_model_becomes_a_script(traced: list[ReplayedStage], tmp_path: Path) -> None:
-    texts = itertools.cycle(CORPUS)
-    stages = []
-    for stage in traced:
-        rounds = []
-        for step in stage.rounds:
-            asked = tuple(
-                replace(
-                    question,
-                    answer=next(texts),
-                    kind=next(texts),
-                    parts=((next(texts), next(texts)), ("user", next(texts))),
-                )
-                for question in step.questions * 4
-            )
-            record = None
-            if step.record is not None:
-                changes = {"choice": next(texts), "details": {next(texts): next(texts)}}
-                record = step.record.model_copy(update=changes)
-            rounds.append(replace(step, questions=asked, record=record, note=next(texts)))
-        goal = stage.record.goal.model_copy(update={"instruction": next(texts)})
-        changes = {"goal": goal, "stop_reason": next(texts)}
-        stages.append(replace(stage, rounds=tuple(rounds), record=stage.record.model_copy(update=changes)))
-    (page,) = write_episode(stages, tmp_path / "view", budget=9, success_radius_m=2.0)
-    assert page.href == page_name(page.task_id, "fu")
-    found = probed(tmp_path / "view" / page.href, VIEWER_PROBE, tmp_path)
-    assert found["errors"] == []
-    assert len(found["rounds"]) == 3 * len(stages)
-    assert any(shown["chips"] for shown in found["rounds"])
-    assert found["handlers"] == []
 
 
 def test_the_page_carries_its_policy_first(write_run: WriteRun) -> None:

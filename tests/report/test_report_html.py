@@ -3,11 +3,11 @@ import hashlib
 import re
 import sqlite3
 import zlib
-from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from html_page import HtmlPage
 from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
@@ -26,60 +26,20 @@ from evonav.report.tables import table as tables
 from evonav.report.tables.run_metadata import reproduction
 from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
-VOID = {"meta", "input", "br", "link", "img"}
-
-
-class Page(HTMLParser):
-    """Checks that elements nest, and collects classes, ids, links and what is fetched."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.feed(path.read_text(encoding="utf-8"))
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        names = [name for name, _ in attrs]
-        assert len(names) == len(set(names)), (tag, attrs)
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def count(self, tag: str, css: str) -> int:
-        return len(self.all(tag, css))
-
-    def all(self, tag: str, css: str) -> list[dict[str, str | None]]:
-        return [a for name, a in self.elements if name == tag and css in (a.get("class") or "").split()]
-
-    def ids(self) -> list[str]:
-        return [a["id"] for _, a in self.elements if a.get("id")]  # type: ignore[misc]
-
-    def references(self) -> list[str]:
-        return [a["href"] for _, a in self.elements if a.get("href")]  # type: ignore[misc]
-
 
 def test_the_page_holds_every_stage_and_fetches_nothing(write_run: WriteRun) -> None:
     run_dir = write_run()
     path = write_report(run_dir, has_maps=True)
     assert path == run_dir / "report.html"
-    page = Page(path)
+    page = HtmlPage(path)
     assert page.count("section", "task") == 6
     assert page.count("figure", "cell") == 24
     assert page.count("figure", "success") == 6 + 11
     assert len([a for tag, a in page.elements if tag == "i" and (a.get("title") or "").startswith("stage")]) == 24
     assert len(list((run_dir / "maps").glob("*.svg"))) == 24
-    ids = page.ids()
-    assert len(ids) == len(set(ids))
-    for reference in page.references():
+    for reference in page.values("href"):
         assert reference.startswith("#")
-        assert unquote(reference[1:]) in ids
+        assert unquote(reference[1:]) in page.ids
     assert not [a for tag, a in page.elements if tag in ("script", "img", "link") and (a.get("src") or a.get("href"))]
     text = path.read_text(encoding="utf-8")
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "")
@@ -114,11 +74,11 @@ def test_a_run_without_a_stage_says_so(tmp_path: Path) -> None:
     run_dir = record_run(tmp_path / "run", [], {"task-1": 3}, ["fu"])
     text = write_report(run_dir).read_text(encoding="utf-8")
     assert "<b>Empty.</b>" in text
-    Page(run_dir / "report.html")
+    HtmlPage(run_dir / "report.html")
     (tmp_path / "bare").mkdir()
     with RunStore(tmp_path / "bare", create=True):
         pass
-    Page(write_report(tmp_path / "bare"))
+    HtmlPage(write_report(tmp_path / "bare"))
 
 
 def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
@@ -133,7 +93,7 @@ def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
     run_dir = record_run(tmp_path / "run", records, {}, [agent])
     path = write_report(run_dir, has_maps=True)
     text = path.read_text(encoding="utf-8")
-    page = Page(path)
+    page = HtmlPage(path)
     assert "<script>alert" not in text
     assert "<b>Plate" not in text
     assert "\x1b" not in text
@@ -150,7 +110,7 @@ def test_many_stages_are_packed_until_they_are_looked_at(write_run: WriteRun, mo
     sections = re.findall(r'<section class="task".*?</section>', write_report(run_dir).read_text("utf-8"), re.DOTALL)
     monkeypatch.setattr(html, "MAX_OPEN_STAGES", 23)
     path = write_report(run_dir)
-    page = Page(path)
+    page = HtmlPage(path)
     assert page.count("section", "task") == len(sections) == 6
     assert page.count("figure", "cell") == 0
     packed = re.findall(r'<script type="text/plain" class="packed">(.*?)</script>', path.read_text("utf-8"))
@@ -195,7 +155,7 @@ def test_what_moves_is_not_part_of_what_stages_share(write_run: WriteRun) -> Non
 
 
 def test_tasks_carry_what_the_filters_look_at(write_run: WriteRun) -> None:
-    page = Page(write_report(write_run()))
+    page = HtmlPage(write_report(write_run()))
     (first, second) = page.all("section", "task")[:2]
     # Of the first task each agent fails one stage, the other agent succeeding; of the second, fu fails stage 2.
     assert (first["data-failures"], first["data-disagreements"]) == ("2", "2")
@@ -216,7 +176,7 @@ def test_tasks_without_a_record_are_listed(tmp_path: Path) -> None:
     run = load_run(run_dir)
     assert dict(run.num_stages) == {"a": 2, "b": 3}
     assert run.summaries[0].counts["not_run"] == 4
-    assert Page(write_report(run_dir)).count("figure", "not_run") == 4
+    assert HtmlPage(write_report(run_dir)).count("figure", "not_run") == 4
 
 
 def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> None:
@@ -258,7 +218,7 @@ def test_places_off_the_planet_do_not_stop_a_report(tmp_path: Path) -> None:
     record = stage_record("fu", "t", 1, EndState.FAILURE)
     target = record.target.model_copy(update={"position_m": (1e9, 0.0, -1e9)})
     run_dir = record_run(tmp_path, [record.model_copy(update={"target": target})], {"t": 1}, ["fu"])
-    Page(write_report(run_dir))
+    HtmlPage(write_report(run_dir))
 
 
 def failing(record: StageRecord, counts: list[int], **changes: object) -> StageRecord:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from browser import Chromium, needs_browser
+from made_up_analysis import ARMS, PAIRS, write_analysis
 from made_up_run import WriteRun
-from test_controlled_report import ARMS, PAIRS, write_analysis
 from typer.testing import CliRunner
 
 from evonav.cli import app

@@ -3,11 +3,11 @@
 import dataclasses
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from html_page import HtmlPage
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -158,24 +158,6 @@ def test_words_count_the_moved_and_name_the_farthest(task: Task, drawing: TaskDr
     assert change_sentence(drawing.maps[1], task.oracle(1).evolution).startswith("The first stage")
 
 
-class _Page(HTMLParser):
-    """Ids, references and text of a page."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.ids: list[str] = []
-        self.refs: list[str] = []
-        self.tags: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        for name, value in attrs:
-            if name == "id":
-                self.ids.append(str(value))
-            if name in ("href", "src"):
-                self.refs.append(str(value))
-
-
 def test_a_page_needs_no_other_file_and_escapes_all_text(task: Task, tmp_path: Path) -> None:
     hostile = '<script>alert("x")</script>'
     public = tuple(stage.model_copy(update={"basic_instruction": hostile}) for stage in task.public_stages)
@@ -187,12 +169,9 @@ def test_a_page_needs_no_other_file_and_escapes_all_text(task: Task, tmp_path: P
     source = task.header.house.model_copy(update={"name": hostile})
     header = task.header.model_copy(update={"house": source})
     wild = Task(header, public, task.reference_images, task.oracle_stages, tuple(houses))
-    text = write_task_page(wild, tmp_path / "page.html").read_text(encoding="utf-8")
-    page = _Page()
-    page.feed(text)
-    assert "script" not in page.tags
-    assert len(page.ids) == len(set(page.ids))
-    for ref in page.refs:
+    page = HtmlPage(write_task_page(wild, tmp_path / "page.html"))
+    assert "script" not in {tag for tag, _ in page.elements}
+    for ref in page.values("href", "src"):
         assert ref.startswith("data:image/webp") or ref[1:] in page.ids
 
 

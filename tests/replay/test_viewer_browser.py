@@ -1,14 +1,21 @@
 """The viewer's pages in headless Chromium: they load without errors, and every control does what it says."""
 
+import itertools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from browser import needs_browser, probed
+from browser import XSS_CORPUS, needs_browser, probed
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.replay.pages import write_episode
+from evonav.replay.replay import RunReplay
+from evonav.replay.types import ReplayedStage
+from evonav.report.maps.stage_map import page_name
+from evonav.tasks.listing import BUNDLED_TASKS
 
 PROBE = (Path(__file__).parent / "viewer_probe.js").read_text("utf-8")
 
@@ -80,3 +87,42 @@ def test_an_agent_that_tells_nothing_has_a_page_too(pages: dict[str, Path], tmp_
     assert all(shown["images"] and shown["entries"] == 0 and shown["cells"] == 0 for shown in found["rounds"])
     assert all(shown["agent"] for shown in found["rounds"])
     assert all(shown["untold"] and shown["knows"] and shown["toggles"] == 0 for shown in found["rounds"])
+
+
+@pytest.fixture(scope="module")
+def traced(viewed_run: Path) -> list[ReplayedStage]:
+    task_id = sorted(path.name for path in BUNDLED_TASKS.iterdir() if path.is_dir())[1]
+    return list(RunReplay(viewed_run, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
+
+
+@pytest.mark.slow
+def test_no_answer_of_a_model_becomes_a_script(traced: list[ReplayedStage], tmp_path: Path) -> None:
+    texts = itertools.cycle(XSS_CORPUS)
+    stages = []
+    for stage in traced:
+        rounds = []
+        for step in stage.rounds:
+            asked = tuple(
+                replace(
+                    question,
+                    answer=next(texts),
+                    kind=next(texts),
+                    parts=((next(texts), next(texts)), ("user", next(texts))),
+                )
+                for question in step.questions * 4
+            )
+            record = None
+            if step.record is not None:
+                changes = {"choice": next(texts), "details": {next(texts): next(texts)}}
+                record = step.record.model_copy(update=changes)
+            rounds.append(replace(step, questions=asked, record=record, note=next(texts)))
+        goal = stage.record.goal.model_copy(update={"instruction": next(texts)})
+        changes = {"goal": goal, "stop_reason": next(texts)}
+        stages.append(replace(stage, rounds=tuple(rounds), record=stage.record.model_copy(update=changes)))
+    (page,) = write_episode(stages, tmp_path / "view", budget=9, success_radius_m=2.0)
+    assert page.href == page_name(page.task_id, "fu")
+    found = probed(tmp_path / "view" / page.href, PROBE, tmp_path)
+    assert found["errors"] == []
+    assert len(found["rounds"]) == 3 * len(stages)
+    assert any(shown["chips"] for shown in found["rounds"])
+    assert found["handlers"] == []

@@ -1,3 +1,5 @@
+"""Fixtures of recorded runs: one made up by hand, and one of agents for the viewer."""
+
 from pathlib import Path
 
 import pytest

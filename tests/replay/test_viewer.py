@@ -33,27 +33,22 @@ from evonav.tasks.listing import BUNDLED_TASKS
 
 
 @pytest.fixture(scope="module")
-def run_dir(viewed_run: Path) -> Path:
-    return viewed_run
-
-
-@pytest.fixture(scope="module")
-def task_id(run_dir: Path) -> str:
-    with RunStore(run_dir) as store:
+def task_id(viewed_run: Path) -> str:
+    with RunStore(viewed_run) as store:
         return str(*store.meta("num_stages"))
 
 
 @pytest.fixture(scope="module")
-def stages(run_dir: Path, task_id: str) -> list[ReplayedStage]:
-    return list(RunReplay(run_dir, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
+def stages(viewed_run: Path, task_id: str) -> list[ReplayedStage]:
+    return list(RunReplay(viewed_run, lambda name: BUNDLED_TASKS / name).episode("fu", task_id))
 
 
 @pytest.fixture(scope="module")
-def pages(run_dir: Path) -> Path:
-    result = CliRunner().invoke(app, ["view", str(run_dir)])
+def pages(viewed_run: Path) -> Path:
+    result = CliRunner().invoke(app, ["view", str(viewed_run)])
     assert result.exit_code == 0, result.output
-    assert str(run_dir / "view" / "index.html") in result.output
-    return run_dir / "view"
+    assert str(viewed_run / "view" / "index.html") in result.output
+    return viewed_run / "view"
 
 
 def data_of(page: Path) -> dict:
@@ -245,9 +240,9 @@ def test_pages_are_self_contained_and_models_words_are_no_markup(pages: Path, ta
 
 
 def test_the_index_keeps_earlier_pages_and_the_report_links_to_them(
-    run_dir: Path, task_id: str, tmp_path: Path
+    viewed_run: Path, task_id: str, tmp_path: Path
 ) -> None:
-    run = Path(shutil.copytree(run_dir, tmp_path / "run", ignore=shutil.ignore_patterns("view")))
+    run = Path(shutil.copytree(viewed_run, tmp_path / "run", ignore=shutil.ignore_patterns("view")))
     assert ">round by round<" not in write_report(run).read_text("utf-8")
     for agent in ("random-walk", "fu"):
         assert CliRunner().invoke(app, ["view", str(run), "--agent", agent, "--task", task_id]).exit_code == 0
@@ -277,10 +272,10 @@ def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: s
 
 
 def test_one_stage_and_pages_a_stage(
-    run_dir: Path, stages: list[ReplayedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    viewed_run: Path, stages: list[ReplayedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    arguments = ["view", str(run_dir), "--task", task_id, "--agent", "fu", "--stage", "2", "--out", str(tmp_path / "a")]
-    result = CliRunner().invoke(app, arguments)
+    asked = ["--task", task_id, "--agent", "fu", "--stage", "2", "--out", str(tmp_path / "a")]
+    result = CliRunner().invoke(app, ["view", str(viewed_run), *asked])
     assert result.exit_code == 0, result.output
     (path,) = (tmp_path / "a").glob("*_stage2.html")
     assert [stage["k"] for stage in data_of(path)["stages"]] == [2]
@@ -297,8 +292,8 @@ def test_one_stage_and_pages_a_stage(
     assert 'class="items ghost"' in text
 
 
-def test_a_replay_that_differs_is_told_on_the_page(run_dir: Path, task_id: str, tmp_path: Path) -> None:
-    with RunStore(run_dir) as store:
+def test_a_replay_that_differs_is_told_on_the_page(viewed_run: Path, task_id: str, tmp_path: Path) -> None:
+    with RunStore(viewed_run) as store:
         records = [
             record.model_copy(update={"stop_reason": "other"}) for record in store.records("random-walk", task_id)
         ]
@@ -316,7 +311,7 @@ def test_a_replay_that_differs_is_told_on_the_page(run_dir: Path, task_id: str, 
     assert "replay differs from the records" in (tmp_path / "run" / "view" / "index.html").read_text("utf-8")
 
 
-def test_wrong_usage_is_one_line(run_dir: Path, tmp_path: Path) -> None:
+def test_wrong_usage_is_one_line(viewed_run: Path, tmp_path: Path) -> None:
     from evonav.errors import EvonavError
 
     for arguments, words in (
@@ -325,6 +320,6 @@ def test_wrong_usage_is_one_line(run_dir: Path, tmp_path: Path) -> None:
         (["--agent", "nobody"], "no task has records of nobody"),
         (["--tasks", str(tmp_path)], "name the folder of the run's tasks with --tasks"),
     ):
-        result = CliRunner().invoke(app, ["view", str(run_dir), *arguments])
+        result = CliRunner().invoke(app, ["view", str(viewed_run), *arguments])
         assert isinstance(result.exception, EvonavError)
         assert words in str(result.exception)

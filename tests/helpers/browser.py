@@ -14,6 +14,8 @@ import pytest
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+XSS_CORPUS: list[str] = json.loads((Path(__file__).parent / "xss_corpus.json").read_text("utf-8"))
+"""Texts that try to become scripts."""
 
 _TOLD = ("Log.entryAdded", "Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Page.javascriptDialogOpening")
 # The browser reads its pipe as descriptor 3 and writes it as 4, which may be any of the two that it is given.

@@ -1,92 +1,27 @@
 """Reports of controlled analyses, on made-up runs whose figures can be told by hand."""
 
 import math
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from made_up_run import OLD_TABLE_M, entry, floor_plan, stage_record
+from html_page import HtmlPage
+from made_up_analysis import ARMS, PAIRS, F, S, write_analysis
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.controlled.analysis import METRICS, load_analysis, pair_tables, split_of
 from evonav.controlled.claims import claims
-from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
+from evonav.controlled.layout import Arm, run_of
 from evonav.controlled.page import controlled_plots, write_controlled_report
 from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.changes import TransitionRecord
-from evonav.evaluation.records.encoded import encode_stage
-from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import read_compared_agents
 from evonav.report.run import load_run
 from evonav.statistics import mcnemar
-from evonav.tasks.dataset import SourceFile
-from evonav.tasks.parameters import GenerationParameters
-
-S, F = EndState.SUCCESS, EndState.FAILURE
-TASKS = tuple(f"task-{i}" for i in range(6))
-PAIRS = {  # by agent: fixed, evolved
-    "fu": ([S, S, S, S, S, F], [F, F, F, S, S, F]),
-    "stage-reset": ([S, S, S, F, F, F], [S, S, F, F, F, F]),
-}
-
-
-def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
-    """Runs of made-up outcomes: by agent, a list of states for each arm."""
-    for number, arm in enumerate(arms):
-        with RunStore(run_of(folder, arm.name), create=True) as store:
-            store.set_meta("agents", list(outcomes))
-            store.set_meta("num_stages", dict.fromkeys(TASKS[:num_tasks], 2))
-            store.set_meta("config", {"protocol": {"success_radius_m": 2.0}})
-            for agent, states in outcomes.items():
-                for i, state in enumerate(states[number][:num_tasks]):
-                    for record in made_up(agent, i, state, is_evolved=number > 0, stages=stages):
-                        store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
-                        plan = floor_plan(record.task_id, 1 if number == 0 else record.stage)
-                        store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
-    record = ControlledRecord(
-        kind=kind,
-        arms=tuple(arms),
-        generator="evonav test",
-        sources=(SourceFile(name="houses", sha256="0" * 64),),
-        seed=0,
-        limit=None,
-        per_house=1,
-        allow_unknown_assets=False,
-        parameters=GenerationParameters(),
-        task_ids=TASKS[:num_tasks],
-        num_attempts=num_tasks,
-        rejections=(),
-    )
-    folder.mkdir(exist_ok=True)
-    write_controlled(record, folder)
-    return folder
-
-
-def made_up(agent, index, state, *, is_evolved, stages):
-    """The walk, and the stage that counts; where the scene evolved, the target moves in even tasks only."""
-    walk = stage_record(agent, TASKS[index], 1, S)
-    walk = walk.model_copy(update={"state": EndState.GUIDED, "spl": None, "soft_spl": None, "has_stopped": False})
-    stale = entry("Plate", (OLD_TABLE_M[0] + 0.3, 0.8, OLD_TABLE_M[2]), is_stale=True)
-    is_misled = is_evolved and state is F and agent == "fu"
-    made = [walk]
-    for stage in stages:
-        record = stage_record(agent, TASKS[index], stage, state, chosen=stale if is_misled else None)
-        update = {"house": f"house-{index}"}
-        if not is_evolved:
-            target = {"is_relocated": False, "is_relocated_now": False, "first_position_m": None}
-            update |= {"transition": TransitionRecord(), "target": record.target.model_copy(update=target)}
-        elif index % 2:
-            update["target"] = record.target.model_copy(update={"is_relocated_now": False, "is_relocated": False})
-        made.append(record.model_copy(update=update))
-    return made
-
-
-ARMS = (Arm(name="fixed", evolve_probability=0.0), Arm(name="evolved", evolve_probability=1.0))
 
 
 @pytest.fixture
@@ -136,7 +71,7 @@ def test_pairs_that_one_arm_lacks_are_left_out(tmp_path):
 
 def test_splits_go_by_the_target_its_room_and_other_rooms(pairs):
     analysis = load_analysis(pairs)
-    found = [split_of(analysis.outcomes["evolved", "fu"][task, 2]) for task in TASKS]
+    found = [split_of(analysis.outcomes["evolved", "fu"][task, 2]) for task in (f"task-{i}" for i in range(6))]
     assert found == ["target", "room", "target", "room", "target", "room"]
     one = analysis.outcomes["evolved", "fu"]["task-1", 2]
     with RunStore(run_of(pairs, "evolved")) as store:
@@ -150,11 +85,8 @@ def test_splits_go_by_the_target_its_room_and_other_rooms(pairs):
 
 def test_claims_say_what_holds_and_what_is_not_told_apart(tmp_path):
     many = 12
-    names = tuple(f"task-{i}" for i in range(many))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("test_controlled_report.TASKS", names)
-        outcomes = {"fu": ([S] * (many - 1) + [F], [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
-        folder = write_analysis(tmp_path / "many", "pairs", ARMS, outcomes, num_tasks=many)
+    outcomes = {"fu": ([S] * (many - 1) + [F], [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
+    folder = write_analysis(tmp_path / "many", "pairs", ARMS, outcomes, num_tasks=many)
     found = {claim.what: claim for claim in claims(load_analysis(folder))}
     assert found["fu minus stage-reset, Fixed"].verdict == "holds"
     assert found["stage-reset minus fu, Not Fixed"].verdict == "same direction, not significant"
@@ -169,27 +101,14 @@ def test_of_few_houses_no_claim_is_judged(tmp_path):
     assert told == {"too few houses to tell (4)"}
 
 
-class _Text(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.links, self.text = [], []
-
-    def handle_starttag(self, tag, attrs):
-        self.links += [value for name, value in attrs if name in ("href", "src") and value and value[0] != "#"]
-
-    def handle_data(self, data):
-        self.text.append(data)
-
-
 def test_the_page_holds_tables_pictures_and_every_pair(pairs):
     path = write_controlled_report(pairs)
-    page = _Text()
-    page.feed(path.read_text(encoding="utf-8"))
-    text = " ".join(page.text)
+    page = HtmlPage(path)
+    text = " ".join(page.texts)
     for words in ("Fixed / Not Fixed", "By what changed", "The paper's statements", "Highlighted pairs", "All pairs"):
         assert words in text
-    local = [link for link in page.links if not link.startswith("data:")]
-    assert len([link for link in local if link.startswith("pairs/")]) >= len(TASKS)
+    local = [link for link in page.values("href", "src") if not link.startswith(("data:", "#"))]
+    assert len([link for link in local if link.startswith("pairs/")]) >= 6
     assert all((path.parent / link).is_file() for link in local)
     for name in ("tables.md", "tables.tex", "fixed-not-fixed.svg"):
         assert (path.parent / name).stat().st_size > 100

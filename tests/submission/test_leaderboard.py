@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from browser import Chromium, needs_browser
+from browser import XSS_CORPUS, Chromium, needs_browser
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -19,9 +19,6 @@ from evonav.submission.leaderboard import Leaderboard, RankedTasks, Unranked, pa
 from evonav.submission.leaderboard_page import write_leaderboard
 from evonav.submission.pack import pack
 from evonav.tasks.listing import BUNDLED_TASKS, task_files
-
-HERE = Path(__file__).parent
-CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +113,7 @@ def test_false_actions_are_found_unless_only_scores_are_checked(
 
 def smuggling(board: Leaderboard) -> Leaderboard:
     """Return the leaderboard with markup in every text that a submitter writes."""
-    texts = iter(CORPUS * 4)
+    texts = iter(XSS_CORPUS * 4)
 
     def about() -> About:
         return About(title=next(texts), authors=next(texts), url=f"javascript://x/%0aalert(1)//{len(next(texts))}")
