@@ -139,8 +139,7 @@ readme: setup  ## renew the table and the picture of the README
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/docs/update_readme.py out/demo
-	$(BIN)/python -c "from pathlib import Path; from evonav.report import write_strip; write_strip(Path('out/demo'), \
-		'bundled-0085-5f3096-s0', ['fu', 'ftu'], Path('docs/images/episode.svg'), stages=[2, 3])"
+	$(BIN)/python scripts/docs/draw_episode.py out/demo bundled-0085-5f3096-s0 fu,ftu 2,3 docs/images/episode.svg
 
 # The site, from the repository's own pages, into out/docs.
 docs: setup  ## build the site into out/docs

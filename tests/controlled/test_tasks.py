@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.controlled.dataset import generate_controlled
-from evonav.controlled.generate import ControlledOptions, generate_arms
-from evonav.controlled.layout import read_controlled, tasks_of
+from evonav.controlled.generate import generate_arms
+from evonav.controlled.layout import ControlledOptions, read_controlled, tasks_of
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.generation import TaskRejectedError, generate_task
 from evonav.generation.validation import validate_files, validate_task
@@ -148,17 +148,16 @@ def test_a_folder_is_resumed_and_comes_out_the_same(tmp_path):
     houses = tmp_path / "houses.jsonl"
     houses.write_text("\n".join(house.to_json() for house in bundled_houses(3)) + "\n", encoding="utf-8")
     options = PAIRS.model_copy(update={"per_house": 2})
-    made = generate_controlled(houses, tmp_path / "whole", options=options)
-    assert made.num_new == 6
-    assert len(made.record.task_ids) + len(made.record.rejections) == 6
-    assert read_controlled(tmp_path / "whole") == made.record
+    record, num_new = generate_controlled(houses, tmp_path / "whole", options=options)
+    assert num_new == 6
+    assert len(record.task_ids) + len(record.rejections) == 6
+    assert read_controlled(tmp_path / "whole") == record
     for arm in ("fixed", "evolved"):
-        assert tuple(root.name for root in task_roots(tasks_of(tmp_path / "whole", arm))) == made.record.task_ids
+        assert tuple(root.name for root in task_roots(tasks_of(tmp_path / "whole", arm))) == record.task_ids
     shutil.copytree(tmp_path / "whole", tmp_path / "part")
-    shutil.rmtree(tasks_of(tmp_path / "part", "evolved") / made.record.task_ids[0])
+    shutil.rmtree(tasks_of(tmp_path / "part", "evolved") / record.task_ids[0])
     (tmp_path / "part" / "controlled.json").unlink()
-    again = generate_controlled(houses, tmp_path / "part", options=options)
-    assert again.num_new == 1
+    assert generate_controlled(houses, tmp_path / "part", options=options) == (record, 1)
     assert _bytes(tmp_path / "part") == _bytes(tmp_path / "whole")
     with pytest.raises(StoreError, match="another configuration"):
         generate_controlled(houses, tmp_path / "part", options=PAIRS)
@@ -168,9 +167,9 @@ def test_the_houses_of_tasks_give_the_same_pairs(tmp_path):
     house = next(bundled_houses(1))
     houses = tmp_path / "houses.jsonl"
     houses.write_text(house.to_json() + "\n", encoding="utf-8")
-    (loaded,) = [generate_controlled(houses, tmp_path / "of-houses", options=PAIRS, limit=1).record]
+    loaded, _ = generate_controlled(houses, tmp_path / "of-houses", options=PAIRS, limit=1)
     write_task(generate_task(next(bundled_houses(1)), seed=0, config=SMALL), tmp_path / "tasks")
-    of_tasks = generate_controlled(tmp_path / "tasks", tmp_path / "of-tasks", options=PAIRS).record
+    of_tasks, _ = generate_controlled(tmp_path / "tasks", tmp_path / "of-tasks", options=PAIRS)
     for arm in ("fixed", "evolved"):
         one, other = (
             load_task(tasks_of(tmp_path / name, arm) / record.task_ids[0])

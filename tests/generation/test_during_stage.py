@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from evonav.controlled.generate import ControlledOptions
+from evonav.controlled.layout import ControlledOptions
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.oracle import during_record, target_record
 from evonav.generation import GenerationParameters, generate_task

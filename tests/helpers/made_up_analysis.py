@@ -2,13 +2,12 @@
 
 from made_up_run import OLD_TABLE_M, entry, floor_plan, stage_record
 
-from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
+from evonav.controlled.layout import Arm, ControlledOptions, ControlledRecord, run_of, write_controlled
 from evonav.evaluation.records.changes import TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.tasks.dataset import SourceFile
-from evonav.tasks.parameters import GenerationParameters
 
 S, F = EndState.SUCCESS, EndState.FAILURE
 PAIRS = {  # by agent: fixed, evolved
@@ -32,15 +31,10 @@ def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
                         plan = floor_plan(record.task_id, 1 if number == 0 else record.stage)
                         store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
     record = ControlledRecord(
-        kind=kind,
-        arms=tuple(arms),
         generator="evonav test",
         sources=(SourceFile(name="houses", sha256="0" * 64),),
-        seed=0,
         limit=None,
-        per_house=1,
-        allow_unknown_assets=False,
-        parameters=GenerationParameters(),
+        options=ControlledOptions(kind=kind, rates=tuple(arm.evolve_probability for arm in arms)),
         task_ids=tasks,
         num_attempts=num_tasks,
         rejections=(),

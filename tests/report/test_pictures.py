@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_run import WriteRun
 from PIL import Image
 
 from evonav.drawing.files import ZOOM, write_picture
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.report import write_strip
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20" width="40" height="20">'
@@ -54,13 +52,3 @@ def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytes
         with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
             write_picture(SVG, tmp_path / f"x.{suffix}")
     assert write_picture(SVG, tmp_path / "x.svg").read_text("utf-8") == SVG
-
-
-def test_a_strip_for_a_paper(tmp_path: Path, write_run: WriteRun) -> None:
-    pytest.importorskip("resvg_py", reason="resvg is not installed")
-    pytest.importorskip("typst", reason="typst is not installed")
-    for suffix in ("svg", "png", "pdf"):
-        write_strip(write_run(suffix), None, ["fu", "ftu"], tmp_path / f"x.{suffix}")
-    (size,) = re.findall(r'viewBox="0 0 (\d+) (\d+)" width', (tmp_path / "x.svg").read_text("utf-8"))
-    with Image.open(tmp_path / "x.png") as picture:
-        assert picture.size == tuple(ZOOM * int(side) for side in size)

@@ -3,17 +3,18 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
+import draw_episode
 import pytest
 from made_up_run import NEW_TABLE_M, WriteRun, entry, floor_plan, record_run, stage_record
 
 from evonav.drawing.floor_plan import label_point
 from evonav.drawing.style import file_css, map_css
 from evonav.drawing.svg import Point, polyline, simplified, slug
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
 from evonav.report.maps.stage_map import stage_svg
-from evonav.report.maps.strip import best_highlight, write_strip
 from evonav.report.maps.trajectory import rounds as choices
+from evonav.report.pages.highlights import highlight_task
 from evonav.report.run import load_run
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -91,28 +92,21 @@ def test_a_stage_without_house_or_trace_is_still_drawn() -> None:
     assert with_class(root, "floor") == []
 
 
-def test_strip_shows_the_stages_side_by_side(write_run: WriteRun, tmp_path: Path) -> None:
-    path = write_strip(write_run(), "task-1", "fu", tmp_path / "images" / "strip.svg")
-    root = ElementTree.parse(path).getroot()
-    words = [element.text for element in with_class(root, "stage")]
-    assert words == ["Stage 1", "Stage 2"]
-    assert len(root.findall(f".//{SVG}svg")) == 2
-    assert [ring.get("r") for ring in with_class(root, "ring")] == ["150", "150", "9"]  # two maps, and the legend
+def test_the_picture_of_the_readme_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path, monkeypatch) -> None:
+    words = [str(write_run()), "task-0", "fu,ftu", "1,2", str(tmp_path / "images" / "strip.svg")]
+    monkeypatch.setattr("sys.argv", ["draw_episode.py", *words])
+    draw_episode.main()
+    root = ElementTree.parse(words[-1]).getroot()
+    assert [element.text for element in with_class(root, "stage")] == ["Stage 1", "Stage 2"]
+    assert [element.text for element in with_class(root, "ink")] == ["fu", "fu", "ftu", "ftu"]
+    assert [element.text for element in with_class(root, "verdict")[1]] == ["fu", "failure"]
+    assert len(root.findall(f".//{SVG}svg")) == 4
+    assert [ring.get("r") for ring in with_class(root, "ring")] == ["150"] * 4 + ["9"]  # four maps, and the legend
     assert "retained group in the kitchen: 2 objects moved" in "".join(root.itertext())
 
 
-def test_strip_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path) -> None:
-    path = write_strip(write_run(), "task-0", ["fu", "ftu"], tmp_path / "strip.svg", stages=[2])
-    root = ElementTree.parse(path).getroot()
-    assert [element.text for element in with_class(root, "stage")] == ["Stage 2"]
-    assert [element.text for element in with_class(root, "ink")] == ["fu", "ftu"]
-    assert [element.text for element in with_class(root, "verdict")[0]] == ["fu", "failure"]
-    assert len(root.findall(f".//{SVG}svg")) == 2
-
-
-def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:
-    # fu is misled in every stage 2; in task-0 ftu failed the stage before, so task-1 is the first that tells all.
-    assert best_highlight(load_run(write_run()), ["fu", "ftu"]) == ("task-1", [1, 2])
+def test_the_first_highlight_is_a_task_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:
+    assert highlight_task(load_run(write_run()), ["fu", "ftu"]) == "task-0"
     records = [
         stage_record("fu", task_id, 1, state, num_stages=1, chosen=entry("Plate", (2.3, 0.8, 2.0), is_stale=is_stale))
         for task_id, state, is_stale in (
@@ -122,9 +116,9 @@ def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun,
         )
     ]
     run = load_run(record_run(tmp_path / "one", records, dict.fromkeys("abc", 1), ["fu"]))
-    assert best_highlight(run, ["fu"]) == ("c", [1])
+    assert highlight_task(run, ["fu"]) == "b"
     with pytest.raises(InvalidArgumentError, match="no task has records of ftu"):
-        best_highlight(run, ["ftu"])
+        highlight_task(run, ["ftu"])
 
 
 def test_files_write_colours_out() -> None:
@@ -135,14 +129,6 @@ def test_files_write_colours_out() -> None:
     names = {frozenset(re.findall(r"--(\w+):", block)) for block in (light, dark)}
     assert len(names) == 1
     assert set(re.findall(r"var\(--(\w+)\)", rules)) <= names.pop()
-
-
-def test_strip_of_what_is_not_there_names_it(write_run: WriteRun, tmp_path: Path) -> None:
-    run_dir = write_run()
-    with pytest.raises(InvalidArgumentError, match="'task-99' by agent 'fu'"):
-        write_strip(run_dir, "task-99", "fu", tmp_path / "strip.svg")
-    with pytest.raises(StoreError, match="no run here"):
-        write_strip(tmp_path, "task-1", "fu", tmp_path / "strip.svg")
 
 
 def test_rounds_are_told_in_runs() -> None:

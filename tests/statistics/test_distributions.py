@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from evonav.statistics.distributions import chi_square_tail, fair_binomial_cdf, normal_cdf, student_quantile
+from evonav.statistics.counts import chi_square_tail, fair_binomial_cdf
+from evonav.statistics.interval import normal_cdf, student_quantile
 
 CLOSE = {"rel": 1e-12, "abs": 1e-300}
 

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from evonav.controlled.dataset import generate_controlled
-from evonav.controlled.generate import ControlledOptions
-from evonav.controlled.layout import tasks_of
+from evonav.controlled.layout import ControlledOptions, tasks_of
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate

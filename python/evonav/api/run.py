@@ -10,11 +10,12 @@ from typing import Any
 from evonav.component import optional_module
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.replay.run_pages import highlight_task, unwritten_highlights, write_pages
+from evonav.replay.run_pages import unwritten_highlights, write_pages
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import agents_of
 from evonav.report.compare.wording import comparison_table
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
+from evonav.report.pages.highlights import highlight_task
 from evonav.report.pages.run_page import write_report
 from evonav.report.run import RecordedRun
 from evonav.report.run import load_run as read_run

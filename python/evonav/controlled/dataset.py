@@ -4,13 +4,12 @@ import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
 from evonav._core import __version__
-from evonav.controlled.generate import ControlledOptions, generate_arms
-from evonav.controlled.layout import ControlledRecord, tasks_of, write_controlled
+from evonav.controlled.generate import generate_arms
+from evonav.controlled.layout import ControlledOptions, ControlledRecord, tasks_of, write_controlled
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import HOUSE_TIMEOUT_S, PARTIAL_NAME, is_complete, outcome_of, worker_of
@@ -19,7 +18,6 @@ from evonav.house.files import HouseCompletion, HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.parallel.worker import Workforce
-from evonav.records import Record
 from evonav.tasks.dataset import DatasetRecord, SourceFile, TaskEntry, write_dataset
 from evonav.tasks.files import read_house
 from evonav.tasks.listing import task_roots
@@ -27,15 +25,6 @@ from evonav.tasks.manifest import Task, TaskHeader
 from evonav.tasks.records import parse_record, read_file
 
 WORK = "evonav.controlled.dataset:make_worker"
-
-
-@dataclass(frozen=True, slots=True)
-class ControlledSummary:
-    """Result of one call."""
-
-    record: ControlledRecord
-    num_new: int
-    """Tasks made by this call, one counted for all arms."""
 
 
 def generate_controlled(
@@ -47,7 +36,7 @@ def generate_controlled(
     completion: HouseCompletion | None = None,
     workforce: Workforce | None = None,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
-) -> ControlledSummary:
+) -> tuple[ControlledRecord, int]:
     """Make the arms of a controlled analysis; called again on the same folder, make what is missing.
 
     Args:
@@ -58,6 +47,9 @@ def generate_controlled(
         completion: Completes each house as it is read; must be the folder's own, too.
         workforce: Default: this process.
         on_progress: Called with tasks done and all tasks, when it begins and after every one.
+
+    Returns:
+        What was written, and the number of tasks made by this call, one counted for all arms.
 
     Raises:
         HouseError: The houses cannot be read.
@@ -85,7 +77,7 @@ def generate_controlled(
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
         on_progress(num_before, num_all)
         if num_before < num_all:
-            settings = ArmWorkerSettings(out=str(out), options=options).model_dump_json()
+            settings = json.dumps([str(out), options.model_dump_json()])
             with open_pool(WORK, settings, workforce, timeout_s=HOUSE_TIMEOUT_S) as pool:
                 left = [index for index in range(num_all) if index not in journal.outcomes]
                 for answer in answers(pool, (_job(index, houses, options) for index in left)):
@@ -95,7 +87,7 @@ def generate_controlled(
         journal.rewrite()
         outcomes = journal.ordered_outcomes()
         record = _write(out, options, sources, limit, outcomes)
-        return ControlledSummary(record, len(outcomes) - num_before)
+        return record, len(outcomes) - num_before
 
 
 def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) -> Job:
@@ -104,22 +96,17 @@ def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) ->
     return Job(index, f"{head}\n{house.text}")
 
 
-class ArmWorkerSettings(Record):
-    """The settings of a worker."""
-
-    out: str
-    """Folder of the analysis."""
-    options: ControlledOptions
-
-
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
+
+    Args:
+        settings: JSON of the folder of the analysis, and of its options.
 
     Returns:
         See `worker_of`; a seed heads a house, beside the name.
     """
-    given = ArmWorkerSettings.model_validate_json(settings)
-    options, out = given.options, Path(given.out)
+    folder, text = json.loads(settings)
+    options, out = ControlledOptions.model_validate_json(text), Path(folder)
 
     def arms(house: House, seed: int) -> dict[Path, Task]:
         return {tasks_of(out, arm): task for arm, task in generate_arms(house, options, seed=seed).items()}
@@ -179,15 +166,10 @@ def _write(
             folder,
         )
     record = ControlledRecord(
-        kind=options.kind,
-        arms=options.arms,
         generator=f"evonav {__version__}",
         sources=sources,
-        seed=options.seed,
         limit=limit,
-        per_house=options.per_house,
-        allow_unknown_assets=options.allow_unknown_assets,
-        parameters=options.parameters,
+        options=options,
         task_ids=task_ids,
         num_attempts=num_attempts,
         rejections=rejections,

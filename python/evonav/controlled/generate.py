@@ -13,52 +13,18 @@ import dataclasses
 from collections import Counter
 from collections.abc import Sequence
 
-from evonav.controlled.layout import Arm, Kind
-from evonav.errors import InvalidArgumentError
+from evonav.controlled.layout import Arm, ControlledOptions
 from evonav.generation.pipeline import TaskRejectedError, generate_task
 from evonav.generation.result import GivenStage
 from evonav.house import House
-from evonav.records import Record
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Control, Task
 from evonav.tasks.parameters import GenerationParameters
 
 NUM_ATTEMPTS = 8
 """Draws of goals and changes before a house is given up."""
-RATES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _ANEW: tuple[RejectReason, ...] = ("no_valid_goal", "not_evolved")
 """Reasons of an arm that another draw may do without."""
-
-
-class ControlledOptions(Record):
-    """Options that decide the tasks of a house."""
-
-    kind: Kind = "pairs"
-    seed: int = 0
-    per_house: int = 1
-    """Tasks a house: the seeds that follow `seed`."""
-    rates: tuple[float, ...] = RATES
-    """Probabilities of the arms of `rates`."""
-    parameters: GenerationParameters = GenerationParameters()
-    allow_unknown_assets: bool = False
-
-    def model_post_init(self, _context: object) -> None:
-        """Check the domains of the values."""
-        if self.per_house < 1:
-            raise InvalidArgumentError(f"per_house = {self.per_house}: must be at least 1")
-        are_probabilities = all(0.0 <= rate <= 1.0 for rate in self.rates)
-        if len(set(self.rates)) < 2 or sorted(set(self.rates)) != list(self.rates) or not are_probabilities:
-            raise InvalidArgumentError(f"rates = {self.rates}: must be at least two of [0, 1], ascending")
-        if self.parameters.extensions.during_stage is not None:
-            message = "is on, but arms differ in the transitions between stages alone"
-            raise InvalidArgumentError(f"parameters.extensions.during_stage {message}")
-
-    @property
-    def arms(self) -> tuple[Arm, ...]:
-        """The ways in which every task is made."""
-        if self.kind == "pairs":
-            return (Arm(name="fixed", evolve_probability=0.0), Arm(name="evolved", evolve_probability=1.0))
-        return tuple(Arm(name=f"p{rate:.2f}", evolve_probability=rate) for rate in self.rates)
 
 
 def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dict[str, Task]:

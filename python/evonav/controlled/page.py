@@ -221,13 +221,13 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
 def _facts(analysis: Analysis) -> list[tuple[str, str]]:
     record = analysis.record
     rates = ",".join(f"{arm.evolve_probability:g}" for arm in record.arms)
-    parts = ["evonav controlled generate --houses HOUSES --out DIR", f"--seed {record.seed}"]
+    parts = ["evonav controlled generate --houses HOUSES --out DIR", f"--seed {record.options.seed}"]
     parts += [f"--limit {record.limit}"] if record.limit else []
-    parts += [f"--per-house {record.per_house}"] if record.per_house > 1 else []
+    parts += [f"--per-house {record.options.per_house}"] if record.options.per_house > 1 else []
     parts += [f"--rates {rates}"] if record.kind == "rates" else []
     return [
         ("tasks", " ".join(parts)),
         ("runs", f"evonav controlled evaluate DIR --agent {','.join(analysis.agents)}"),
         ("houses", ", ".join(f"{source.name} (sha256 {source.sha256[:12]})" for source in record.sources[:20])),
-        ("generation", record.parameters.model_dump_json()),
+        ("generation", record.options.parameters.model_dump_json()),
     ]

@@ -14,7 +14,7 @@ from evonav.generation.house_check import area_of_m2
 from evonav.house import House, HouseObject, Room
 from evonav.house.files import HouseText
 from evonav.statistics import holm
-from evonav.statistics.distributions import normal_cdf
+from evonav.statistics.interval import normal_cdf
 from evonav.world.embedded import EmbeddedSimulator
 
 ROOM_TYPES = ("Kitchen", "LivingRoom", "Bedroom", "Bathroom")

@@ -8,7 +8,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.replay.pages import write_episode, write_index
 from evonav.replay.replay import RunReplay
 from evonav.report.maps.stage_map import VIEW_DIR
-from evonav.report.pages.highlights import best_highlight, highlights_first
+from evonav.report.pages.highlights import highlights_first
 from evonav.report.pages.replays import ListedPage, listed_pages
 from evonav.report.run import RecordedRun
 from evonav.tasks.listing import BUNDLED_TASKS
@@ -53,11 +53,6 @@ def write_pages(
                 records_sha256=run.episodes_sha256[agent, task_id],
             )
     return pages, write_index(pages, out_dir, run.run_dir.resolve().name)
-
-
-def highlight_task(run: RecordedRun, agents: Sequence[str]) -> str:
-    """Return the task that shows best what these agents do: one in which memory misleads the first, not the last."""
-    return best_highlight(run, sorted(agents, key=lambda name: name not in ("fu", "stage-reset")))[0]
 
 
 def unwritten_highlights(run: RecordedRun, num: int | None) -> list[tuple[str, str]]:

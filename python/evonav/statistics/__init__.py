@@ -1,14 +1,21 @@
 """Intervals, differences and verdicts, all by house (docs/statistics.md)."""
 
-from evonav.statistics.before_after import BeforeAfter
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap, Estimate, effective_size, weighted_quantiles
 from evonav.statistics.counts import ChiSquare, chi_square, mcnemar
-from evonav.statistics.distributions import student_quantile
-from evonav.statistics.interval import Z_95, Interval, newcombe, percentile_interval, widened_tail, wilson
+from evonav.statistics.interval import (
+    Z_95,
+    Interval,
+    newcombe,
+    percentile_interval,
+    student_quantile,
+    widened_tail,
+    wilson,
+)
 from evonav.statistics.paired import (
     DETECTABLE_Z,
     LEVEL,
     MIN_CLUSTERS,
+    BeforeAfter,
     PairedEffect,
     Verdict,
     holm,

@@ -4,8 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.statistics.distributions import chi_square_tail, fair_binomial_cdf
-
 LEAST_EXPECTED = 5.0
 """Cells of a chi-square test that expect fewer are merged: below it the distribution is not a chi-square's."""
 
@@ -56,3 +54,30 @@ def mcnemar(num_only_a: int, num_only_b: int) -> float:
     """
     n, less = num_only_a + num_only_b, min(num_only_a, num_only_b)
     return min(1.0, 2 * fair_binomial_cdf(less, n)) if n else 1.0
+
+
+def chi_square_tail(num_degrees: int, statistic: float) -> float:
+    """Return the chance that a chi-square variable is above `statistic`.
+
+    Source: the finite series of Abramowitz & Stegun, 26.4.4 and 26.4.5.
+
+    Args:
+        num_degrees: Degrees of freedom, at least 1.
+        statistic: Test statistic, not negative.
+    """
+    half = statistic / 2.0
+    if half == 0.0:
+        return 1.0
+    is_odd = num_degrees % 2
+    powers = [k + 0.5 * is_odd for k in range((num_degrees - is_odd) // 2)]
+    terms = [math.exp(power * math.log(half) - half - math.lgamma(power + 1.0)) for power in powers]
+    return min(1.0, math.fsum(terms + [math.erfc(math.sqrt(half))] * is_odd))
+
+
+def fair_binomial_cdf(num_heads: int, num_tosses: int) -> float:
+    """Return the chance of at most `num_heads` heads in tosses of a fair coin, correctly rounded."""
+    ways, total = 1, 0
+    for k in range(num_heads + 1):
+        total += ways
+        ways = ways * (num_tosses - k) // (k + 1)
+    return total / (1 << num_tosses)

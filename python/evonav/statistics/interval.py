@@ -1,4 +1,8 @@
-"""95% intervals: Wilson's for a rate of counts, and percentiles of resamples, widened where there are few clusters."""
+"""95% intervals: Wilson's for a rate of counts, and percentiles of resamples, widened where there are few clusters.
+
+The distributions that intervals and tests need have closed forms, because degrees of freedom and counts are whole
+numbers here. SciPy has them, too, but it would be half of the size of an installation.
+"""
 
 import math
 from functools import cache
@@ -7,10 +11,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.statistics.distributions import normal_cdf, student_quantile
-
 Interval = tuple[float, float]
 
+TAIL_95 = 0.05
+"""Share outside of a two-sided 95% interval."""
 Z_95 = 1.959963984540054
 """Standard normal quantile that is exceeded one time in forty."""
 
@@ -72,3 +76,42 @@ def widened_tail(num_clusters: int) -> float:
     """
     widening = math.sqrt(num_clusters / (num_clusters - 1))
     return normal_cdf(-widening * student_quantile(num_clusters - 1))
+
+
+def normal_cdf(x: float) -> float:
+    """Return the chance that a standard normal variable is at most `x`."""
+    return 0.5 * math.erfc(-x / math.sqrt(2.0))
+
+
+def student_quantile(num_degrees: int) -> float:
+    """Return the quantile of Student's t with `num_degrees` that is exceeded one time in forty.
+
+    Source: the finite series of Abramowitz & Stegun, "Handbook of Mathematical Functions", 1964, 26.7.3 and 26.7.4,
+    solved by Newton's method.
+
+    Args:
+        num_degrees: Degrees of freedom, at least 1.
+    """
+    log_factor = math.lgamma((num_degrees + 1) / 2) - math.lgamma(num_degrees / 2)
+    factor = 2.0 / math.sqrt(math.pi) * math.exp(log_factor)
+    angle = math.atan(1.9 / math.sqrt(num_degrees))
+    for _ in range(100):
+        slope = factor * math.cos(angle) ** (num_degrees - 1)
+        step = (1.0 - TAIL_95 - _student_inside(angle, num_degrees)) / slope
+        angle += step
+        # The inside grows ever more slowly, so every step falls short of the solution until rounding ends it.
+        if step <= 1e-16 * angle:
+            break
+    return math.sqrt(num_degrees) * math.tan(angle)
+
+
+def _student_inside(angle: float, num_degrees: int) -> float:
+    """Return the chance that Student's t is within `tan(angle) * sqrt(num_degrees)` of 0."""
+    is_odd = num_degrees % 2
+    cos2, term = math.cos(angle) ** 2, math.cos(angle) if is_odd else 1.0
+    terms = []
+    for k in range(1 + is_odd, num_degrees, 2):
+        terms.append(term)
+        term *= cos2 * k / (k + 1)
+    series = math.sin(angle) * math.fsum(terms)
+    return 2.0 / math.pi * (angle + series) if is_odd else series

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.statistics.bootstrap import NUM_RESAMPLES, ClusterBootstrap
-from evonav.statistics.distributions import normal_cdf
-from evonav.statistics.interval import Z_95, Interval, percentile_interval
+from evonav.statistics.interval import Z_95, Interval, normal_cdf, percentile_interval
 
 LATTICE = 8192
 """Steps that a sum of gaps which are no whole numbers is divided into, at least: far finer than its own spread."""
@@ -197,3 +196,22 @@ def power(difference: float, standard_error: float) -> float:
         return 0.0 if difference == 0.0 else 1.0
     shift = abs(difference) / standard_error
     return normal_cdf(shift - Z_95) + normal_cdf(-shift - Z_95)
+
+
+@dataclass(frozen=True, slots=True)
+class BeforeAfter:
+    """One number before and now."""
+
+    name: str
+    before: float
+    now: float
+    is_worse: bool
+    """Whether it is worse by more than chance explains."""
+    is_better: bool = False
+    ci95: Interval | None = None
+    """Interval of the difference over houses, where it is known."""
+
+    def __str__(self) -> str:
+        """Return the change in words: `path, ms: 0.07 -> 0.15 (2.14 times as much)`."""
+        factor = f"{self.now / self.before:.2f} times as much" if self.before > 0 else "from nothing"
+        return f"{self.name}: {self.before:.3g} -> {self.now:.3g} ({factor})"

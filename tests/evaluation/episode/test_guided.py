@@ -206,7 +206,8 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
     from typer.testing import CliRunner
 
     from evonav.cli import app
-    from evonav.controlled.generate import ControlledOptions, generate_arms
+    from evonav.controlled.generate import generate_arms
+    from evonav.controlled.layout import ControlledOptions
     from evonav.evaluation.run.evaluate import evaluate
     from evonav.house import bundled_houses
     from evonav.tasks import write_task

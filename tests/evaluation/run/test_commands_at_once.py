@@ -8,8 +8,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.controlled.dataset import generate_controlled
-from evonav.controlled.generate import ControlledOptions
-from evonav.controlled.layout import run_of
+from evonav.controlled.layout import ControlledOptions, run_of
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.hosting.fork_server import IS_SUPPORTED
 from evonav.tasks.parameters import GenerationParameters

@@ -64,10 +64,10 @@ def make_pages(
     """Replay episodes and write their pages and the index.
 
     Args:
-        task: Id of a task; default: the best highlight.
+        task: Id of a task; default: the first highlight.
         stages: The stages to show, each on a page of its own; default: all, on one page.
     """
-    from evonav.replay.run_pages import highlight_task
+    from evonav.report.pages.highlights import highlight_task
     from evonav.report.run import load_run
 
     found = load_run(run)

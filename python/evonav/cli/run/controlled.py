@@ -83,7 +83,7 @@ def generate(
     Run again to resume.
     """
     from evonav.controlled.dataset import generate_controlled
-    from evonav.controlled.generate import ControlledOptions
+    from evonav.controlled.layout import ControlledOptions
     from evonav.generation.config import read_parameters
     from evonav.parallel.worker import Workforce
 
@@ -101,7 +101,7 @@ def generate(
         **chosen,
     )
     with interruptible(out), status("Generating tasks") as show:
-        made = generate_controlled(
+        record, num_new = generate_controlled(
             houses,
             out,
             options=options,
@@ -110,9 +110,8 @@ def generate(
             workforce=Workforce(num_workers_of(workers)),
             on_progress=lambda done, total: show(f"{done} of {total}"),
         )
-    record = made.record
     arms = ", ".join(arm.name for arm in record.arms)
-    typer.echo(f"{counted(len(record.task_ids), 'task')} in each arm ({arms}) in {out}; {made.num_new} new")
+    typer.echo(f"{counted(len(record.task_ids), 'task')} in each arm ({arms}) in {out}; {num_new} new")
     for rejection in record.rejections:
         typer.echo(f"  without: {rejection.house}: {rejection.reason}")
 
@@ -142,7 +141,7 @@ def evaluate(
     from evonav.evaluation.run.components import Backend
 
     record = read_controlled(directory)
-    given = {"simulator.allow_unknown_assets": record.allow_unknown_assets, "perception.make": perception}
+    given = {"simulator.allow_unknown_assets": record.options.allow_unknown_assets, "perception.make": perception}
     given |= {"workers": workers, "isolation": isolation, "decision.kind": decision, "decision.model": model}
     given |= {"decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
     run = settings_from(given, set_)

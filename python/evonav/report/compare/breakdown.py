@@ -157,7 +157,7 @@ def _field_grouping(compared_agents: Sequence[ComparedAgent], field: str) -> Gro
     there = [value for value in values if value is not None]
     kinds = {type(value) for value in there}
     if kinds <= {bool}:
-        return Grouping(labels, lambda row: _yes(getattr(row, field)), ["yes", "no"])
+        return Grouping(labels, lambda row: {True: "yes", False: "no"}.get(getattr(row, field)), ["yes", "no"])
     if kinds <= {int} and len(set(there)) <= 12:
         return Grouping(labels, lambda row: _text(getattr(row, field)), [str(k) for k in sorted(set(there))])
     if kinds <= {int, float}:
@@ -167,10 +167,6 @@ def _field_grouping(compared_agents: Sequence[ComparedAgent], field: str) -> Gro
         names = [f"{a:.3g} to {b:.3g}" for a, b in pairwise(edges)] or [f"{edges[0]:.3g}"]
         return Grouping(labels, lambda row: _bin(getattr(row, field), edges, names), names, "Quarters of all stages.")
     return Grouping(labels, lambda row: _text(getattr(row, field)), None)
-
-
-def _yes(value: bool | None) -> str | None:
-    return None if value is None else "yes" if value else "no"
 
 
 def _text(value: object) -> str | None:
@@ -228,14 +224,13 @@ def _brief(cell: Estimate | None, scale: float) -> str:
 def breakdown_csv(found: Sequence[Breakdown]) -> str:
     """Return one CSV row per group and agent, unrounded."""
     columns = ("by", "group", "agent", "metric", "n", "num_houses", "value", "low", "high")
-    rows = []
-    for one in found:
-        for group in one.groups:
-            for agent in one.agents:
-                cell = one.cells.get((group, agent))
-                if cell is not None:
-                    low, high = cell.ci95 or (None, None)
-                    rows.append((one.by, group, agent, one.metric, cell.n, cell.num_clusters, cell.value, low, high))
+    rows = (
+        (one.by, group, agent, one.metric, cell.n, cell.num_clusters, cell.value, *(cell.ci95 or (None, None)))
+        for one in found
+        for group in one.groups
+        for agent in one.agents
+        if (cell := one.cells.get((group, agent))) is not None
+    )
     return csv_text(columns, rows)
 
 

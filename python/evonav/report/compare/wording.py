@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from evonav.counted import counted
-from evonav.report.compare.compare import METRICS, STRATA, Comparison, Flip, Part
+from evonav.report.compare.compare import METRICS, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
 from evonav.report.tables.table import (
     INTERVALS,
@@ -15,7 +15,6 @@ from evonav.report.tables.table import (
     mode_words,
 )
 from evonav.report.tables.verdicts import VERDICTS, effect_cells, p_heading, paired_table, sentence, verdict_words
-from evonav.statistics import Interval
 
 RATES = frozenset(
     {
@@ -110,56 +109,33 @@ def _short_flips(one: Comparison) -> Table:
     return Table(f"Stages with different outcomes: {one.b} and {one.a}", columns, rows, tuple(notes))
 
 
-def part_table(one: Comparison) -> Table:
-    """Build a table of one pair, on all stages, by stratum and by mode."""
-    fields = list(one.all.effects)
-    columns, rows = _part_heads(one)
-    return Table(
-        f"{one.b} minus {one.a}",
-        (*columns, *_field_columns(fields)),
-        tuple((*row, *_field_cells(part, fields)) for row, part in zip(rows, one.parts, strict=True)),
-        (METHOD, EXPLORING, *_notes_on(fields)),
-    )
+def part_table(one: Comparison, fields: Sequence[str] = (), *, has_counts: bool = True) -> Table:
+    """Build a table of one pair, on all stages, by stratum and by mode.
 
-
-def part_tables(one: Comparison) -> list[Table]:
-    """Build the same as tables that a page is wide enough for: SR and SPL with the counts, then other metrics."""
-    fields = list(one.all.effects)
-    first = [field for field in fields if field in ("success", "spl")]
-    others = [field for field in fields if field not in first]
-    columns, rows = _part_heads(one)
-    parts = [(columns, rows, first), *((columns[:2], [row[:2] for row in rows], part) for part in _in_threes(others))]
-    return [
-        Table(
-            f"{one.b} minus {one.a}",
-            (*heads, *_field_columns(shown)),
-            tuple((*row, *_field_cells(part, shown)) for row, part in zip(lines, one.parts, strict=True)),
-            (METHOD, EXPLORING, *_notes_on(shown)) if shown is first else _notes_on(shown),
-        )
-        for heads, lines, shown in parts
-    ]
-
-
-def _in_threes(fields: Sequence[str]) -> list[Sequence[str]]:
-    return [fields[i : i + 3] for i in range(0, len(fields), 3)]
-
-
-def _part_heads(one: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the columns and rows that describe the parts themselves."""
+    Args:
+        fields: Metrics to show; default: all.
+        has_counts: Whether to show both rates, and in how many stages only one of the two succeeded.
+    """
+    fields = fields or list(one.all.effects)
     rows = []
     for part in one.parts:
         sr = part.effects["success"]
         only, rates = f"{part.num_only_b} / {part.num_only_a}", (f"{100 * x:.1f}" for x in (sr.mean_b, sr.mean_a))
-        rows.append((part.label, str(part.n), only, *rates))
-    return ("Stages", "n", "only first / second", f"SR % {one.b}", f"SR % {one.a}"), rows
+        effects = [cell for field in fields for cell in effect_cells(part.effects.get(field), scale_of(field))]
+        rows.append((part.label, str(part.n), *((only, *rates) if has_counts else ()), *effects))
+    counts = ("only first / second", f"SR % {one.b}", f"SR % {one.a}") if has_counts else ()
+    names = (name for field in fields for name in (f"{metric_name(field)} difference [95% CI]", "p"))
+    notes = (METHOD, EXPLORING) if has_counts else ()
+    columns = ("Stages", "n", *counts, *names)
+    return Table(f"{one.b} minus {one.a}", columns, tuple(rows), (*notes, *_notes_on(fields)))
 
 
-def _field_columns(fields: Sequence[str]) -> list[str]:
-    return [name for field in fields for name in (f"{metric_name(field)} difference [95% CI]", "p")]
-
-
-def _field_cells(part: Part, fields: Sequence[str]) -> list[str]:
-    return [cell for field in fields for cell in effect_cells(part.effects.get(field), scale_of(field))]
+def part_tables(one: Comparison) -> list[Table]:
+    """Build the same as tables that a page is wide enough for: SR and SPL with the counts, then other metrics."""
+    first = [field for field in one.all.effects if field in ("success", "spl")]
+    others = [field for field in one.all.effects if field not in first]
+    more = [part_table(one, others[i : i + 3], has_counts=False) for i in range(0, len(others), 3)]
+    return [part_table(one, first), *more]
 
 
 def _notes_on(fields: Iterable[str]) -> tuple[str, ...]:
@@ -218,44 +194,39 @@ def says(one: Comparison, field: str = "success") -> str:
 
 def comparison_csv(comparisons: Sequence[Comparison]) -> str:
     """Return every number, unrounded: one CSV row per pair, part and metric."""
-    columns = (
-        "a",
-        "b",
-        "part",
-        "metric",
-        "n",
-        "num_houses",
-        "mean_a",
-        "mean_b",
-        "difference",
-        "low",
-        "high",
-        "relative",
-        "relative_low",
-        "relative_high",
-        "p",
-        "p_holm",
-        "standard_error",
-        "detectable",
-        "num_only_a",
-        "num_only_b",
-        "mcnemar_p",
-        "verdict",
-    )
-    rows: list[list[object]] = []
+    rows: list[dict[str, object]] = []
     for one in comparisons:
         for part in one.parts:
             for name, effect in part.effects.items():
+                low, high = effect.ci95 or (None, None)
+                relative_low, relative_high = effect.relative_ci95 or (None, None)
                 rows.append(
-                    [
-                        *(one.a, one.b, part.key, name, effect.n, effect.num_clusters, effect.mean_a, effect.mean_b),
-                        *(effect.difference, *_two(effect.ci95), effect.relative, *_two(effect.relative_ci95)),
-                        *(effect.p, effect.adjusted_p if part is one.all else None),
-                        *(effect.standard_error, effect.detectable, part.num_only_a, part.num_only_b),
-                        *(part.mcnemar_p, effect.verdict),
-                    ]
+                    {
+                        "a": one.a,
+                        "b": one.b,
+                        "part": part.key,
+                        "metric": name,
+                        "n": effect.n,
+                        "num_houses": effect.num_clusters,
+                        "mean_a": effect.mean_a,
+                        "mean_b": effect.mean_b,
+                        "difference": effect.difference,
+                        "low": low,
+                        "high": high,
+                        "relative": effect.relative,
+                        "relative_low": relative_low,
+                        "relative_high": relative_high,
+                        "p": effect.p,
+                        "p_holm": effect.adjusted_p if part is one.all else None,
+                        "standard_error": effect.standard_error,
+                        "detectable": effect.detectable,
+                        "num_only_a": part.num_only_a,
+                        "num_only_b": part.num_only_b,
+                        "mcnemar_p": part.mcnemar_p,
+                        "verdict": effect.verdict,
+                    }
                 )
-    return csv_text(columns, rows)
+    return csv_text(list(rows[0]), [list(row.values()) for row in rows])
 
 
 def all_tables(comparisons: Sequence[Comparison]) -> list[Table]:
@@ -296,7 +267,3 @@ def _stratum(flip: Flip) -> str:
 def scale_of(field: str) -> int:
     """Return 100 for a rate, which is shown in percent, and 1 for another metric."""
     return 100 if field in RATES else 1
-
-
-def _two(interval: Interval | None) -> tuple[float | None, float | None]:
-    return (None, None) if interval is None else interval

@@ -3,46 +3,13 @@
 from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedRun, RecordedStage
 from evonav.report.tables.causes import FailureCause
 
-NUM_STAGES = 3
-"""Number of stages to show, ending with the highlighted one."""
 
-
-def best_highlight(run: RecordedRun, agents: Sequence[str]) -> tuple[str, list[int]]:
-    """Return the episode that shows the benchmark best, and the stages to show.
-
-    Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
-    then for moved targets, and for change and success on the way there. The first of equals.
-
-    Args:
-        agents: Agents whose episodes to show; the last one should succeed.
-
-    Raises:
-        InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
-    """
-    best: tuple[float, str, list[int]] | None = None
-    for task_id, last_stage in run.num_stages.items():
-        for stage in range(1, last_stage + 1):
-            shown = list(range(max(1, stage - NUM_STAGES + 1), stage + 1))
-            keys = [(agent, task_id, k) for agent in agents for k in shown]
-            if any(key not in run.outcomes for key in keys):
-                continue
-            score = _score(run, agents, task_id, shown)
-            if best is None or score > best[0]:
-                best = (score, task_id, shown)
-    if best is None:
-        there = sorted({agent for agent, _, _ in run.outcomes})
-        hint = f"it has some of {', '.join(there)}" if there else "nothing was run yet: `evonav evaluate` goes on"
-        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}; {hint}")
-    return best[1], best[2]
-
-
-def highlights_first(run: RecordedRun) -> list[tuple[str, str]]:
-    """Return agent and task of every recorded episode, the highlights first.
+def highlights_first(run: RecordedRun, agents: Sequence[str] = ()) -> list[tuple[str, str]]:
+    """Return agent and task of every recorded episode of some agents, by default of all, the highlights first.
 
     A pair shows most: in one stage, an agent that a stale entry misled, and one that succeeded. Of several such agents
     of a task those with the fewest rounds are taken, which are the quickest to run again; a task's other episodes come
@@ -52,7 +19,7 @@ def highlights_first(run: RecordedRun) -> list[tuple[str, str]]:
     rest: list[tuple[str, str]] = []
     for task_id, num_stages in run.num_stages.items():
         stages = range(1, num_stages + 1)
-        there = [agent for agent in run.agents if any((agent, task_id, k) in run.outcomes for k in stages)]
+        there = [agent for agent in agents or run.agents if any((agent, task_id, k) in run.outcomes for k in stages)]
         quickest = sorted(there, key=lambda agent: _num_rounds(run, agent, task_id))
         best: tuple[float, list[str]] = (-1.0, [])
         for stage in stages:
@@ -68,6 +35,21 @@ def highlights_first(run: RecordedRun) -> list[tuple[str, str]]:
     return [episode for _, pair in pairs for episode in pair] + rest
 
 
+def highlight_task(run: RecordedRun, agents: Sequence[str]) -> str:
+    """Return the task of the first highlight of these agents that all of them have recorded.
+
+    Raises:
+        InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
+    """
+    recorded = {(agent, task_id) for agent, task_id, _ in run.outcomes}
+    for _, task_id in highlights_first(run, agents):
+        if all((agent, task_id) in recorded for agent in agents):
+            return task_id
+    there = sorted({agent for agent, _ in recorded})
+    hint = f"it has some of {', '.join(there)}" if there else "nothing was run yet: `evonav evaluate` goes on"
+    raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}; {hint}")
+
+
 def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
     """Rate how well a stage shows the benchmark, and name the agents that show it."""
     good = [agent for agent, outcome in found.items() if outcome.row.state == EndState.SUCCESS]
@@ -78,25 +60,9 @@ def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
         return -1.0, []
     row = found[pair[0]].row
     score = 6.0 * bool(misled) + 3.0 * (len(pair) == 2) + 2.0 * row.is_relocated_now
-    return score + _is_changed(row), pair
+    return score + (row.mode not in ("first", "static")), pair
 
 
 def _num_rounds(run: RecordedRun, agent: str, task_id: str) -> int:
     keys = ((agent, task_id, stage) for stage in range(1, run.num_stages[task_id] + 1))
     return sum(run.outcomes[key].row.num_rounds for key in keys if key in run.outcomes)
-
-
-def _score(run: RecordedRun, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
-    last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
-    hero = last[-1]
-    has_success = hero.row.state == EndState.SUCCESS
-    is_misled = any(outcome.cause is FailureCause.STALE_ENTRY for outcome in last)
-    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.row.stale_path_m > 0 and has_success)
-    score += 2.0 * hero.row.is_relocated_now + 2.0 * has_success + len(stages)
-    window = [run.outcomes[agents[-1], task_id, k].row for k in stages]
-    score += sum(map(_is_changed, window))
-    return score + sum(row.state == EndState.SUCCESS for row in window)
-
-
-def _is_changed(row: StageMetrics) -> bool:
-    return row.mode not in ("first", "static")

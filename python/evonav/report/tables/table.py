@@ -38,6 +38,8 @@ STRICT_NOTE = (
     "Strict success: the agent called stop within 1 m of the target's box, with the target in view. Most agents look "
     "at an object from 1.5 m by design, so their strict rates are low."
 )
+STATES = ("success", "failure", "errored", "not_run")
+"""Ends of stages that tables count."""
 OWN_AGENT = re.compile(r"(?<![\w/.])(?:[\w.~/\\-]*\.py|[A-Za-z_][\w.]*):([A-Z]\w*)")
 """Name of an agent that is a class of a file or module, such as `./mine.py:Mine`, and the class."""
 
@@ -171,7 +173,7 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
             rate(summary.sr, summary.sr_ci95),
             rate(summary.spl, summary.spl_ci95),
             str(summary.n),
-            *(str(summary.counts.get(state, 0)) for state in ("success", "failure", "errored", "not_run")),
+            *(str(summary.counts.get(state, 0)) for state in STATES),
             f"{summary.n} of {summary.num_stages}, incomplete"
             if summary.is_incomplete
             else f"all {summary.num_stages}",
@@ -251,41 +253,19 @@ def cause_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Tabl
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
 
 
-_CSV_COLUMNS = (
-    "agent",
-    "split",
-    "n",
-    "sr",
-    "sr_low",
-    "sr_high",
-    "sr_wilson_low",
-    "sr_wilson_high",
-    "spl",
-    "spl_low",
-    "spl_high",
-    "soft_spl",
-    "success",
-    "failure",
-    "errored",
-    "not_run",
-    "num_stages",
-    "num_tasks",
-    "is_incomplete",
-)
-
-
 def summary_csv(summaries: Sequence[AgentSummary]) -> str:
     """Return every metric, unrounded: one CSV row per agent and split."""
+    ends = [f"{name}_{end}" for name in ("sr", "sr_wilson", "spl") for end in ("low", "high")]
+    totals = ("soft_spl", *STATES, "num_stages", "num_tasks")
     rows: list[list[object]] = []
     for s in summaries:
-        counts = [s.counts.get(state, 0) for state in ("success", "failure", "errored", "not_run")]
+        whole = [s.soft_spl, *(s.counts.get(state, 0) for state in STATES), s.num_stages, s.num_tasks]
         for name in ("all", *s.splits):
             part = s.rates(name)
-            ends = (*(part.sr_ci95 or (None, None)), *(part.sr_wilson95 or (None, None)))
-            totals = [s.soft_spl, *counts, s.num_stages, s.num_tasks] if name == "all" else [None] * 7
-            shown = [part.n, part.sr, *ends, part.spl, *(part.spl_ci95 or (None, None))]
-            rows.append([s.agent, name, *shown, *totals, s.is_incomplete])
-    return csv_text(_CSV_COLUMNS, rows)
+            sr, wilson, spl = (ci95 or (None, None) for ci95 in (part.sr_ci95, part.sr_wilson95, part.spl_ci95))
+            shown = whole if name == "all" else [None] * len(whole)
+            rows.append([s.agent, name, part.n, part.sr, *sr, *wilson, part.spl, *spl, *shown, s.is_incomplete])
+    return csv_text(("agent", "split", "n", "sr", *ends[:4], "spl", *ends[4:], *totals, "is_incomplete"), rows)
 
 
 def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:

@@ -1,19 +1,17 @@
-"""Draw a task as a strip, for a README or a paper: stages side by side, agents below each other."""
+"""Draws the picture of the README: `python scripts/docs/draw_episode.py RUN TASK AGENT,AGENT STAGE,STAGE FILE`."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from evonav.drawing.files import check_picture, write_picture
+from evonav.drawing.files import write_picture
 from evonav.drawing.svg import escape, join, text_lines
-from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
 from evonav.report.maps.stage_map import stage_drawing, success_radius_of, task_frame
 from evonav.report.maps.text import describe_change
-from evonav.report.pages.highlights import best_highlight
-from evonav.report.run import load_run
 from evonav.report.tables.causes import sentence
 
 PANEL_PX = 360
@@ -23,36 +21,17 @@ FOOT_PX = 50
 IMAGE_PX = 78
 
 
-def write_strip(
-    run_dir: Path, task_id: str | None, agents: str | Sequence[str], path: Path, *, stages: Sequence[int] | None = None
-) -> Path:
-    """Write a task as a strip.
-
-    Args:
-        task_id: One of its tasks; `None` for the `best_highlight` one.
-        agents: One of its agents, or several: a row each.
-        stages: Numbers of stages; default all that have a record (of the most telling task, three).
-
-    Raises:
-        InvalidArgumentError: The run has no such stage, or the file's suffix is of no format.
-        StoreError: There is no run, it cannot be read, or the file cannot be written, or not without an extra.
-    """
-    check_picture(path)
-    agents = [agents] if isinstance(agents, str) else list(agents)
-    if task_id is None:
-        task_id, default_stages = best_highlight(load_run(run_dir), agents)
-        stages = stages or default_stages
-    with RunStore(run_dir) as store:
+def main() -> None:
+    """Draws stages of a task, the agents of a run below each other."""
+    run_dir, task_id, agents, stages, path = sys.argv[1:]
+    with RunStore(Path(run_dir)) as store:
+        shown = [int(stage) for stage in stages.split(",")]
         rows = [
-            [record for record in store.records(agent, task_id) if stages is None or record.stage in stages]
-            for agent in agents
+            [record for record in store.records(agent, task_id) if record.stage in shown] for agent in agents.split(",")
         ]
         maps = {floor_plan.stage: floor_plan for floor_plan in store.floor_plans(task_id)}
-        config = store.meta("config") or {}
-    for agent, row in zip(agents, rows, strict=True):
-        if not row:
-            raise InvalidArgumentError(f"{run_dir}: no such stage of task {task_id!r} by agent {agent!r}")
-    return write_picture(strip_svg(rows, maps, success_radius_m=success_radius_of(config)), path)
+        radius_m = success_radius_of(store.meta("config") or {})
+    write_picture(strip_svg(rows, maps, success_radius_m=radius_m), Path(path))
 
 
 def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, FloorPlan], *, success_radius_m: float) -> str:
@@ -92,3 +71,7 @@ def _head(record: StageRecord, maps: Mapping[int, FloorPlan], left_px: int) -> s
         f'<g transform="translate({left_px} 0)"><text class="stage" y="27">Stage {record.stage}</text>{lines}{image}'
         f'<text class="{css}" y="{HEAD_PX - 7}">{escape(changed)}</text></g>'
     )
+
+
+if __name__ == "__main__":
+    main()
