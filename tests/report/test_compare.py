@@ -86,14 +86,15 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     def pairs(*asked: object, **options) -> list[tuple[str, str]]:
         return [(found.b, found.a) for found in compare(read_compared_agents([str(word) for word in asked]), **options)]
 
-    assert pairs(a) == [("ftu", "fu"), ("my_module:Agent", "fu"), ("my_module:Agent", "ftu")]
-    assert pairs(a) == [(pair.b, pair.a) for pair in load_run(a).pairs]  # as in the report
+    assert pairs(a) == [("ftu", "fu"), ("Agent", "fu"), ("Agent", "ftu")]
+    recorded = load_run(a)
+    assert pairs(a) == [(recorded.names[pair.b], recorded.names[pair.a]) for pair in recorded.pairs]  # as in the report
     assert pairs(a, "fu", "ftu") == [("fu", "ftu")]
     assert pairs(a, "my_module:Agent", "fu") == pairs(f"{a}:my_module:Agent", f"{a}:fu")
-    assert pairs(a, "my_module:Agent", "fu") == [("my_module:Agent", "fu")]
-    assert pairs(a, b) == [(f"a:{name}", f"b:{name}") for name in outcomes]
+    assert pairs(a, "my_module:Agent", "fu") == [("Agent", "fu")]
+    assert pairs(a, b) == [(f"a:{name}", f"b:{name}") for name in ("fu", "ftu", "Agent")]
     assert pairs(f"{a}:fu", f"{b}:ftu") == [("a:fu", "b:ftu")]
-    assert pairs(a, baseline="ftu") == [("fu", "ftu"), ("my_module:Agent", "ftu")]
+    assert pairs(a, baseline="ftu") == [("fu", "ftu"), ("Agent", "ftu")]
     for cell in ("one", "two"):
         lettered_run(tmp_path / "sweep" / "runs" / cell, outcomes)
     assert pairs(tmp_path / "sweep", "ftu", "fu") == [("two:ftu", "one:ftu"), ("two:fu", "one:fu")]

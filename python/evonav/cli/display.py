@@ -39,20 +39,18 @@ def show_tables(tables: "Iterable[Table]", *, notes: "Sequence[str]" = ()) -> No
     from rich.measure import Measurement
     from rich.text import Text
 
-    from evonav.report.tables.table import short_names
+    from evonav.report.tables.table import shortened
 
     console = Console()
-    found = list(tables)
-    names = short_names(text for table in found for row in (table.columns, *table.rows) for text in row)
+    found = shortened(tables)
     for table in found:
-        for part in in_parts(table.renamed(names), console.width):
+        for part in in_parts(table, console.width):
             shown = part.rich()
             if Measurement.get(console, console.options.update(width=10_000), shown).maximum > console.width:
                 for column, heading, texts in zip(shown.columns, part.columns, _texts(part), strict=True):
                     column.header = Text(fill(heading, max(1, *map(len, texts))))  # headings are wrapped, and no cell
             console.print(shown)
-    own = [f"{short} is {name}." for name, short in names.items()]
-    every_note = [*own, *(note for table in found for note in table.renamed(names).notes), *notes]
+    every_note = [*(note for table in found for note in table.notes), *notes]
     if every_note:
         console.print("\n".join(dict.fromkeys(every_note)), style="dim italic", markup=False, highlight=False)
 

@@ -17,7 +17,7 @@ from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import RecordedStage, load_run
 from evonav.report.tables.numbers import NONE, points
-from evonav.report.tables.table import Table
+from evonav.report.tables.table import Table, short_names
 from evonav.report.tables.verdicts import p_words
 from evonav.statistics import PairedEffect, paired_effect
 
@@ -55,6 +55,11 @@ class Analysis:
     def arms(self) -> tuple[str, ...]:
         """Their names, in order."""
         return tuple(arm.name for arm in self.record.arms)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The short names of agents that people read, by agent; see `short_names`."""
+        return {agent: agent for agent in self.agents} | short_names(self.agents)
 
     @property
     def paired_agents(self) -> tuple[str, ...]:

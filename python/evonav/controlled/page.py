@@ -35,7 +35,7 @@ from evonav.report.pages.template import page_text, picture_uri, text_of
 from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.specs import BarPlot, CurvePlot, Line, Plot, Series
 from evonav.report.plots.style import plot_css
-from evonav.report.tables.table import Table, latex_tables, markdown_tables
+from evonav.report.tables.table import Table, latex_tables, markdown_tables, shortened
 from evonav.statistics import ClusterBootstrap
 
 PAGE_NAME = "index.html"
@@ -78,10 +78,10 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
         kind=analysis.record.kind,
         record=analysis.record,
         plots=plot_elements(plots, are_even=True),
-        tables=tables,
+        tables=shortened(tables),
         highlights=_write_highlights(analysis, out) if is_pairs else [],
         pairs=_write_pairs(analysis, out) if is_pairs else [],
-        agents=analysis.agents,
+        names=analysis.names,
         facts=_facts(analysis),
     )
     return write_atomically(out / PAGE_NAME, page)
@@ -99,7 +99,7 @@ def _arm_plot(analysis: Analysis, name: str, metric: MetricOf) -> BarPlot:
     groups, arm_means = [], []
     for agent in analysis.paired_agents:
         keys = analysis.keys(agent)
-        groups.append(f"{agent}\n({len(keys)})")
+        groups.append(f"{analysis.names[agent]}\n({len(keys)})")
         bootstrap = ClusterBootstrap(analysis.houses(keys, agent))
         arm_means.append(bootstrap.column_means(analysis.values(agent, metric, keys)))
     series = tuple(Series.of(arm, [found[j] for found in arm_means]) for j, arm in enumerate(ARM_WORDS.values()))
@@ -109,7 +109,7 @@ def _arm_plot(analysis: Analysis, name: str, metric: MetricOf) -> BarPlot:
 
 def _rate_plot(analysis: Analysis, name: str, metric: MetricOf) -> CurvePlot:
     found = {agent: by_rate(analysis, agent, metric) for agent in analysis.agents}
-    lines = [Line.of(agent, by_arm) for agent, by_arm in found.items() if by_arm]
+    lines = [Line.of(analysis.names[agent], by_arm) for agent, by_arm in found.items() if by_arm]
     x_label = "probability that a transition evolves the house"
     return CurvePlot(f"{name} by evolution rate", tuple(lines), x_label, f"{name}, %")
 
@@ -213,7 +213,9 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
             }
             for one in pair
         ],
-        "rows": [(agent, [cell(i, one) for i, one in enumerate(found)]) for agent, found in by_agent.items()],
+        "rows": [
+            (analysis.names[agent], [cell(i, one) for i, one in enumerate(found)]) for agent, found in by_agent.items()
+        ],
         "commands": [f"evonav view runs/{arm} --task {key[0]}" for arm in analysis.arms],
     }
 

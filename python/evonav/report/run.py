@@ -20,6 +20,7 @@ from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.points import Point3
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import FailureCause
+from evonav.report.tables.table import short_names
 
 NOTES = ("tasks_dir", "task_digests", "sessions")
 """Entries of a run's header that do not change its records: the folder and digests of its tasks, and its commands."""
@@ -86,6 +87,11 @@ class RecordedRun:
     """The entries of the run's header that `NOTES` names, where present."""
     failures: tuple[FailureRow, ...]
     """Failed attempts, including those that were retried; not part of the records."""
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """The short names of agents that people read, by agent; see `short_names`."""
+        return {agent: agent for agent in self.agents} | short_names(self.agents)
 
     @property
     def success_radius_m(self) -> float:

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 from evonav.parallel.folders import write_atomically
 from evonav.report.pages.template import page_text, rate_bar, text_of
 from evonav.report.tables.numbers import percent, rate
-from evonav.report.tables.table import INTERVALS, SPLIT_TITLES
+from evonav.report.tables.table import INTERVALS, SPLIT_TITLES, short_names
 from evonav.submission.leaderboard import Conditions, Leaderboard, RankedAgent
 
 MAX_SHOWN = 200
@@ -60,11 +60,11 @@ def _table(board: Leaderboard, conditions: Conditions, entries: list[RankedAgent
             ("decision", short(conditions.decision)),
             *([("simulator", short(conditions.simulator))] if conditions.simulator else []),
         ],
-        "rows": [_row(entry) for entry in entries],
+        "rows": [_row(entry, short_names(other.agent for other in entries)) for entry in entries],
     }
 
 
-def _row(entry: RankedAgent) -> dict[str, object]:
+def _row(entry: RankedAgent, names: Mapping[str, str]) -> dict[str, object]:
     about, setup, rates = entry.header.about, entry.setup, entry.rates
     url = about.url if _is_web(about.url) else None
     facts = (
@@ -76,7 +76,7 @@ def _row(entry: RankedAgent) -> dict[str, object]:
         entry.file,
     )
     return {
-        "agent": short(entry.agent),
+        "agent": short(names.get(entry.agent, entry.agent)),
         "title": short(about.title or (url or "")),
         "url": url,
         "facts": [short(fact) for fact in facts if fact],

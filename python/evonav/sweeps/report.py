@@ -14,7 +14,7 @@ from evonav.report.plots.render import plot_elements
 from evonav.report.plots.specs import GroupPlot, Series
 from evonav.report.plots.style import plot_css
 from evonav.report.tables.numbers import rate, scaled
-from evonav.report.tables.table import INTERVALS, Table, markdown_tables
+from evonav.report.tables.table import INTERVALS, Table, markdown_tables, short_names, shortened
 from evonav.sweeps.summary import AXES, STATES, SweepRow
 
 
@@ -119,13 +119,14 @@ def _key(row: SweepRow) -> tuple[str, ...]:
 def _series(rows: Sequence[SweepRow], axes: Sequence[str], groups: Sequence[str], measure: str) -> tuple[Series, ...]:
     """Return the values of each agent; `measure` is `sr` or `spl`."""
     found = []
+    names = short_names(row.agent for row in rows)
     for agent in dict.fromkeys(row.agent for row in rows):
         by_group = {cell_words(row, axes): row for row in rows if row.agent == agent}
         there = [by_group.get(group) for group in groups]
         values = [None if row is None else getattr(row, measure) for row in there]
         intervals = [None if row is None else getattr(row, f"{measure}_ci95") for row in there]
         percents = tuple(None if value is None else 100 * value for value in values)
-        found.append(Series(agent, percents, tuple(map(scaled, intervals))))
+        found.append(Series(names.get(agent, agent), percents, tuple(map(scaled, intervals))))
     return tuple(found)
 
 
@@ -139,5 +140,6 @@ def write_sweep_page(out_dir: Path, name: str, rows: Sequence[SweepRow], reports
     ]
     plots = plot_elements(sweep_plots(rows), are_even=True)
     css = text_of("report.css") + plot_css()
-    text = page_text("sweep.html.j2", css, name=name, tables=sweep_tables(rows), cells=cells, plots=plots)
+    tables = shortened(sweep_tables(rows))
+    text = page_text("sweep.html.j2", css, name=name, tables=tables, cells=cells, plots=plots)
     return write_atomically(out_dir / "report.html", text)

@@ -75,14 +75,12 @@ def _print(found: "Sequence[Comparison]") -> None:
     from rich.console import Console
 
     from evonav.report.compare import wording
-    from evonav.report.tables.table import short_names
+    from evonav.report.tables.table import renamed, short_names
 
     console = Console()
     names = short_names(name for one in found for name in (one.a, one.b))
     for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
-        for name, short in names.items():
-            line = line.replace(name, short)
-        console.print(line, markup=False, highlight=False)
+        console.print(renamed(line, names), markup=False, highlight=False)
     show_tables(wording.terminal_tables(found), notes=[wording.METHOD])
 
 

@@ -82,7 +82,7 @@ def agents_of(run: RecordedRun, agents: Sequence[str] = ()) -> list[ComparedAgen
         if agent not in run.agents:
             there = ", ".join(run.agents) or "none"
             raise InvalidArgumentError(f"{run.run_dir} has no agent {agent!r}; it has {there}")
-    return [ComparedAgent(agent, run, agent) for agent in agents or run.agents]
+    return [ComparedAgent(run.names[agent], run, agent) for agent in agents or run.agents]
 
 
 def _split(argument: str) -> tuple[Path | None, str]:
@@ -104,7 +104,7 @@ def _named(compared_agents: Sequence[ComparedAgent]) -> list[ComparedAgent]:
 
     def name(compared: ComparedAgent) -> str:
         run_dir = compared.run.run_dir
-        return f"{run_dir.resolve().name if is_short else run_dir}:{compared.agent}"
+        return f"{run_dir.resolve().name if is_short else run_dir}:{compared.name}"
 
     return [replace(compared, name=name(compared)) for compared in compared_agents]
 

@@ -140,7 +140,7 @@ def _template_values(
         }
         for task_id, num_stages in run.num_stages.items()
     ]
-    headline, *others = found
+    headline, *others = tables.shortened(found)
     shown = [table for table in others if table.rows]
     plots, failures = run_plots(run, breakdowns), failure_groups(run)
     sections = [
@@ -170,7 +170,7 @@ def _template_values(
                 strict=False,
             )
         ),
-        "statements": statements(run),
+        "statements": [tables.renamed(line, run.names) for line in statements(run)],
         "overview": overview,
         "causes": [(cause.name, CAUSE_NAMES[cause]) for cause in FailureCause if cause in used],
         "facts": run_facts(run),

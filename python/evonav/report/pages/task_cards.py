@@ -50,7 +50,7 @@ def task_view(
             cell = {"state": "not_run", "outcome": "no record yet", "sentence": "This stage has no record yet."}
             return {**cell, "facts": "", "rounds": [], "svg": "", "href": None}
         below = _uses(prefix, stage) if stage in task.maps else change(record, task.maps, frame)
-        name = clean(f"Map of stage {stage} for {agent}")
+        name = clean(f"Map of stage {stage} for {run.names[agent]}")
         opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
         drawn = opening + Markup(below + course(record, frame, run.success_radius_m) + "</svg>")  # noqa: S704
         href = hrefs.get((agent, task.task_id, stage))
@@ -68,7 +68,7 @@ def task_view(
         "num_rooms": len(shared[0].rooms) if shared else 0,
         "defs": Markup(join(defs)),  # noqa: S704 - our own SVG
         "goals": goals,
-        "rows": [(agent, [cell_of(agent, stage) for stage in stages]) for agent in run.agents],
+        "rows": [(run.names[agent], [cell_of(agent, stage) for stage in stages]) for agent in run.agents],
         "data": filter_data(run, task.task_id),
     }
 

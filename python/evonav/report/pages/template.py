@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from evonav.counted import counted
 from evonav.drawing.svg import clean
+from evonav.report.tables.table import short_names
 from evonav.statistics import Interval
 
 
@@ -32,6 +33,7 @@ def page_environment() -> Environment:
         finalize=lambda value: clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
     )
     environment.globals["counted"] = counted
+    environment.filters["short_of"] = lambda agent, agents: short_names(agents).get(agent, agent)
     return environment
 
 

@@ -43,9 +43,10 @@ def run_plots(run: RecordedRun, breakdowns: Breakdowns) -> list[tuple[Plot, str]
     if len(run.pairs) > 0:
         caption = "On the stages that both scored; 95% intervals, bootstrap by house. Blue: ahead, as the table says."
         for name in ("SR", "SPL"):
+            effects = [(pair, pair.sr if name == "SR" else pair.spl) for pair in run.pairs]
             gaps = tuple(
-                Gap.of(f"{pair.b} minus {pair.a}", f"n = {pair.n}", pair.sr if name == "SR" else pair.spl)
-                for pair in run.pairs
+                Gap.of(f"{run.names[pair.b]} minus {run.names[pair.a]}", f"n = {pair.n}", effect)
+                for pair, effect in effects
             )
             plot = GapPlot(f"{name} differences, points", gaps, "the second is better", "the first is better")
             plots.append((plot, caption))

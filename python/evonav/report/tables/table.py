@@ -7,7 +7,7 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 import io
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from shutil import get_terminal_size
@@ -57,39 +57,31 @@ class Table:
 
     def markdown(self) -> str:
         """Return the table in GitHub's syntax, with its notes below."""
-        lines = [
-            _markdown_row(self.columns),
-            _markdown_row(["---"] + ["---:"] * (len(self.columns) - 1)),
-            *(
-                _markdown_row(
-                    [
-                        f"**{_markdown_text(cell)}**" if (i, j) in self.best else _markdown_text(cell)
-                        for j, cell in enumerate(row)
-                    ]
-                )
-                for i, row in enumerate(self.rows)
-            ),
-        ]
-        return "\n".join(lines + [f"\n{_markdown_text(note)}" for note in self.notes]) + "\n"
+        (shown,) = shortened([self])
+        lines = [shown.columns, ("---", *["---:"] * (len(shown.columns) - 1)), *shown._cells(_markdown_text, "**{}**")]
+        text = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+        return text + "".join(f"\n\n{_markdown_text(note)}" for note in shown.notes) + "\n"
 
     def latex(self) -> str:
         """Return a `tabular` for `booktabs`: best values bold, notes as comments, no wider than the line."""
-        lines = [f"% {_one_line(self.title)}", _NO_WIDER_THAN_THE_LINE]
-        lines += [rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
-        lines += [" & ".join(map(latex_text, self.columns)) + r" \\", r"\midrule"]
-        for i, row in enumerate(self.rows):
-            cells = [
-                rf"\textbf{{{latex_text(cell)}}}" if (i, j) in self.best else latex_text(cell)
-                for j, cell in enumerate(row)
-            ]
-            lines.append(" & ".join(cells) + r" \\")
-        lines += [r"\bottomrule", r"\end{tabular}}", "", *(f"% {_one_line(note)}" for note in self.notes)]
+        (shown,) = shortened([self])
+        head, *rows = [tuple(map(latex_text, shown.columns)), *shown._cells(latex_text, r"\textbf{{{}}}")]
+        lines = [f"% {_one_line(shown.title)}", _NO_WIDER_THAN_THE_LINE]
+        lines += [
+            rf"\begin{{tabular}}{{l{'r' * (len(head) - 1)}}}",
+            r"\toprule",
+            " & ".join(head) + r" \\",
+            r"\midrule",
+        ]
+        lines += [" & ".join(cells) + r" \\" for cells in rows]
+        lines += [r"\bottomrule", r"\end{tabular}}", "", *(f"% {_one_line(note)}" for note in shown.notes)]
         return "\n".join(lines) + "\n"
 
     def __repr__(self) -> str:
         """Return the table as text, as wide as the terminal."""
-        table, text = self.rich(), io.StringIO()
-        for column, *cells in zip(table.columns, self.columns, *self.rows, strict=True):
+        (shown,) = shortened([self])
+        table, text = shown.rich(), io.StringIO()
+        for column, *cells in zip(table.columns, shown.columns, *shown.rows, strict=True):
             column.min_width = max(len(word) for cell in cells for word in cell.split() or ("",))  # no word is broken
         console = Console(file=text, width=sys.maxsize, height=100)  # without a height, COLUMNS overrides the width
         least = Measurement.get(console, console.options, table).minimum + 2 * len(self.columns)  # with gaps
@@ -98,35 +90,22 @@ class Table:
         return "\n".join(line.rstrip() for line in text.getvalue().splitlines())
 
     def _repr_html_(self) -> str:
-        head = "".join(f"<th>{escape(column)}</th>" for column in self.columns)
-        body = "".join(
-            "<tr>"
-            + "".join(
-                f"<td><b>{escape(cell)}</b></td>" if (i, j) in self.best else f"<td>{escape(cell)}</td>"
-                for j, cell in enumerate(row)
-            )
-            + "</tr>"
-            for i, row in enumerate(self.rows)
-        )
-        notes = "".join(f"<p><small>{escape(note)}</small></p>" for note in self.notes)
+        (shown,) = shortened([self])
+        head = "".join(f"<th>{escape(column)}</th>" for column in shown.columns)
+        rows = ("".join(f"<td>{cell}</td>" for cell in cells) for cells in shown._cells(escape, "<b>{}</b>"))
+        body = "".join(f"<tr>{cells}</tr>" for cells in rows)
+        notes = "".join(f"<p><small>{escape(note)}</small></p>" for note in shown.notes)
         table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        return f"<p><b>{escape(self.title)}</b></p>{table}{notes}"
+        return f"<p><b>{escape(shown.title)}</b></p>{table}{notes}"
 
-    def renamed(self, names: Mapping[str, str]) -> "Table":
-        """Return the table with names in place of others in all of its texts."""
-
-        def text(old: str) -> str:
-            for name, new in names.items():
-                old = old.replace(name, new)
-            return old
-
-        return replace(
-            self,
-            title=text(self.title),
-            columns=tuple(map(text, self.columns)),
-            rows=tuple(tuple(map(text, row)) for row in self.rows),
-            notes=tuple(map(text, self.notes)),
-        )
+    def _cells(self, written: Callable[[str], str], stressed: str) -> list[tuple[str, ...]]:
+        """Return the rows in a format; `stressed` is the format of the best cells."""
+        return [
+            tuple(
+                stressed.format(written(cell)) if (i, j) in self.best else written(cell) for j, cell in enumerate(row)
+            )
+            for i, row in enumerate(self.rows)
+        ]
 
     def rich(self) -> RichTable:
         """Return the table for `rich.print`."""
@@ -148,20 +127,51 @@ class Table:
 
 
 def short_names(texts: Iterable[str]) -> dict[str, str]:
-    """Return the class of each agent in texts that is named by file or module, where no other has the same class."""
+    """Return the class of each agent in texts that is named by file or module, where no other has the same class.
+
+    This is the name of the agent wherever people read it; files for other programs have the whole name.
+    """
     found = {match[0]: match[1] for text in texts for match in OWN_AGENT.finditer(text)}
     classes = list(found.values())
     return {name: short for name, short in found.items() if classes.count(short) == 1}
 
 
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """Return a text with names in place of others."""
+    for name, new in names.items():
+        text = text.replace(name, new)
+    return text
+
+
+def shortened(tables: Iterable[Table]) -> list[Table]:
+    """Return tables with the short names of agents, and the whole names in notes."""
+    found = list(tables)
+    names = short_names(text for table in found for row in (table.columns, *table.rows) for text in row)
+    return [_renamed(table, names) for table in found] if names else found
+
+
+def _renamed(table: Table, names: Mapping[str, str]) -> Table:
+    texts = " ".join(text for row in (table.columns, *table.rows) for text in row)
+    return replace(
+        table,
+        title=renamed(table.title, names),
+        columns=tuple(renamed(text, names) for text in table.columns),
+        rows=tuple(tuple(renamed(text, names) for text in row) for row in table.rows),
+        notes=(
+            *(renamed(note, names) for note in table.notes),
+            *(f"{short} is {name}." for name, short in names.items() if name in texts),
+        ),
+    )
+
+
 def markdown_tables(tables: Iterable[Table]) -> str:
     """Return tables under their titles, as one Markdown text."""
-    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in shortened(tables))
 
 
 def latex_tables(tables: Iterable[Table]) -> str:
     """Return tables as LaTeX, for the package `booktabs`."""
-    return "\n".join(table.latex() for table in tables)
+    return "\n".join(table.latex() for table in shortened(tables))
 
 
 def headline(summaries: Sequence[AgentSummary]) -> Table:
@@ -291,10 +301,6 @@ def _best(values: Sequence[float | None], column: int) -> list[tuple[int, int]]:
     if len(known) < 2 or min(known) == max(known):
         return []
     return [(i, column) for i, value in enumerate(values) if value == max(known)]
-
-
-def _markdown_row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def _markdown_text(text: str) -> str:
