@@ -72,8 +72,9 @@ def generate_controlled(
     }
     out = out.resolve()
     with writing(out), closing(Journal(out, run)) as journal:
-        lost = [index for index, done in journal.outcomes.items() if not _is_whole(done, out, options)]
-        journal.drop(lost)
+        last = tasks_of(out, options.arms[-1].name)  # which is written last: if a task is there, it is in all arms
+        made = [(index, done) for index, done in journal.outcomes.items() if done.task_id is not None]
+        journal.drop([index for index, done in made if not is_complete(done, last)])
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
         on_progress(num_before, num_all)
         if num_before < num_all:
@@ -112,11 +113,6 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
         return {tasks_of(out, arm): task for arm, task in generate_arms(house, options, seed=seed).items()}
 
     return worker_of(arms)
-
-
-def _is_whole(outcome: Outcome, out: Path, options: ControlledOptions) -> bool:
-    """Return whether the tasks that the journal lists still exist."""
-    return outcome.task_id is None or is_complete(outcome, tasks_of(out, options.arms[-1].name))
 
 
 def _write(

@@ -21,11 +21,6 @@ class Crossover:
     ci95: Interval
     """Bootstrap by house; the rate twice where houses agree, or there is but one."""
 
-    @property
-    def is_found(self) -> bool:
-        """Whether there is one between never and always."""
-        return 0.0 <= self.rate <= 1.0
-
     def text(self) -> str:
         """Return the rate with its interval, `0.62 [0.31, >1]`, or that there is none, or that it is undetermined."""
         low, high = self.ci95
@@ -34,7 +29,7 @@ class Crossover:
             return f"none found: memory is ahead at every rate {interval}"
         if high < 0.0:
             return f"none found: {BASELINE} is ahead at every rate {interval}"
-        found = f"{self.rate:.2f}" if self.is_found else "none found"
+        found = f"{self.rate:.2f}" if 0.0 <= self.rate <= 1.0 else "none found"
         return f"{found}, undetermined {interval}" if low < 0.0 and high > 1.0 else f"{found} {interval}"
 
 

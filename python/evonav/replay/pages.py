@@ -23,7 +23,7 @@ from evonav.report.maps.moments import Moment, moments
 from evonav.report.maps.stage_map import page_name, task_frame
 from evonav.report.maps.text import describe_outcome
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
-from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
+from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css
 from evonav.report.pages.template import page_text, text_of
 
 INDEX_NAME = "index.html"
@@ -103,7 +103,7 @@ def _page(
     return page_text(
         "viewer.html.j2",
         viewer_css(),
-        viewer_js(),
+        text_of("viewer.js"),
         task_id=first.task_id,
         house=first.house,
         agent=first.agent,

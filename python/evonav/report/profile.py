@@ -6,7 +6,6 @@ import shutil
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import evonav
@@ -23,15 +22,6 @@ COMPONENTS = ("agent", "decision", "simulation", "perception", "evaluator")
 """Components of a stage's CPU time; the decision model's is a part of the agent's."""
 NUM_FUNCTIONS = 12
 """Functions in a table."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunProfile:
-    """The profile of a run."""
-
-    tables: tuple[Table, ...]
-    flame_graph: Path
-    """File in speedscope's format."""
 
 
 @contextmanager
@@ -51,14 +41,14 @@ def profiling(run_dir: Path) -> Iterator[None]:
         del os.environ[VARIABLE]
 
 
-def write_profile(run_dir: Path) -> RunProfile:
-    """Write the flame graph and the tables of a run that `profiling` sampled."""
+def write_profile(run_dir: Path) -> tuple[list[Table], Path]:
+    """Write the profile of a run that `profiling` sampled; return its tables, and its flame graph's path."""
     folder = run_dir / FOLDER
     samples = read_samples(folder / SAMPLES_NAME)
-    tables = (component_table(run_dir), *map(function_table, samples))
+    tables = [component_table(run_dir), *map(function_table, samples)]
     flame_graph = write_atomically(folder / FLAME_GRAPH_NAME, json.dumps(speedscope(samples, run_dir.name)))
     write_atomically(folder / TABLES_NAME, markdown_tables(tables))
-    return RunProfile(tables, flame_graph)
+    return tables, flame_graph
 
 
 def component_table(run_dir: Path) -> Table:
@@ -102,17 +92,11 @@ def _place(frame: Frame) -> str:
     if not frame.file:
         return NONE
     file = Path(frame.file)
-    for folder in (
-        Path(evonav.__file__).parent.parent,
-        *(parent for parent in file.parents if _holds_packages(parent)),
-    ):
+    packages = [one for one in file.parents if one.name == "site-packages" or one.name.startswith("python3.")]
+    for folder in (Path(evonav.__file__).parent.parent, *packages):
         if file.is_relative_to(folder):
             return f"{file.relative_to(folder)}:{frame.line}"
     return f"{file.name}:{frame.line}"
-
-
-def _holds_packages(folder: Path) -> bool:
-    return folder.name == "site-packages" or folder.name.startswith("python3.")
 
 
 def speedscope(samples: Sequence[Samples], name: str) -> dict[str, object]:

@@ -123,12 +123,12 @@ def _round_findings(record: StageRecord, protocol: ProtocolConfig) -> Iterator[s
     stops = [number for number, entry in enumerate(trace, start=1) if entry.action.kind == "stop"]
     if len(trace) > budget or stops not in ([], [len(trace)]) or not (stops or len(trace) == budget):
         yield f"{len(trace)} rounds and stops in {stops[:3]}: it ends with the first stop, or after {budget} rounds"
+    reach_m = {"navigate_to": protocol.max_travel_m, "move": protocol.waypoint_m}
     for entry in trace:
-        is_walk = entry.action.kind == "navigate_to"
         hop_m = max((math.dist(a, b) for a, b in pairwise(entry.path_m)), default=0.0)
-        if hop_m > protocol.waypoint_m + SLACK_M or _length_m(entry) > _reach_m(entry, protocol) + SLACK_M:
+        if hop_m > protocol.waypoint_m + SLACK_M or _length_m(entry) > reach_m.get(entry.action.kind, 0.0) + SLACK_M:
             yield f"round {entry.round}: the path jumps, or is longer than a round allows"
-        if is_walk and record.sensing.motion == "actions":
+        if entry.action.kind == "navigate_to" and record.sensing.motion == "actions":
             yield f"round {entry.round}: an agent of single actions walks"
 
 
@@ -176,10 +176,6 @@ def _score_findings(record: StageRecord, start_m: Point2, end_m: Point2, protoco
 
 def _plain(value: object) -> object:
     return value.value if isinstance(value, EndState) else value
-
-
-def _reach_m(entry: RoundRecord, protocol: ProtocolConfig) -> float:
-    return {"navigate_to": protocol.max_travel_m, "move": protocol.waypoint_m}.get(entry.action.kind, 0.0)
 
 
 def _length_m(entry: RoundRecord) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
 from evonav.parallel.folders import write_atomically
@@ -80,14 +79,10 @@ def _row(entry: RankedAgent, names: Mapping[str, str]) -> dict[str, object]:
         "title": short(about.title or (url or "")),
         "url": url,
         "facts": [short(fact) for fact in facts if fact],
-        "rates": [(rate(rates[name], rates[f"{name}_ci95"]), _bar(rates, name)) for name in ("sr", "spl")],
+        "rates": [(rate(*ends), rate_bar(*ends)) for ends in ((rates[n], rates[f"{n}_ci95"]) for n in ("sr", "spl"))],
         "splits": [percent(rates["splits"].get(name, {}).get("sr")) for name in _SPLITS],
         "sha256": entry.sha256,
     }
-
-
-def _bar(rates: Mapping[str, Any], name: str) -> object:
-    return rate_bar(rates[name], rates[f"{name}_ci95"])
 
 
 def short(text: str, length: int = MAX_SHOWN) -> str:

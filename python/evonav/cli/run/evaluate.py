@@ -270,9 +270,9 @@ def print_profile(out: Path) -> None:
     """Write the profile of a run, and print its tables."""
     from evonav.report.profile import write_profile
 
-    profile = write_profile(out)
-    show_tables(profile.tables)
-    typer.echo(f"flame graph, for https://www.speedscope.app: {profile.flame_graph}")
+    tables, flame_graph = write_profile(out)
+    show_tables(tables)
+    typer.echo(f"flame graph, for https://www.speedscope.app: {flame_graph}")
 
 
 def exit_if_incomplete(summaries: "list[AgentSummary]") -> None:

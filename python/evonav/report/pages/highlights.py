@@ -1,5 +1,6 @@
 """Find the episodes of a run that show the benchmark best: memory misleads one agent and not another."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
@@ -15,12 +16,17 @@ def highlights_first(run: RecordedRun, agents: Sequence[str] = ()) -> list[tuple
     of a task those with the fewest rounds are taken, which are the quickest to run again; a task's other episodes come
     after all pairs.
     """
+    num_rounds: Counter[tuple[str, str]] = Counter()
+    for (agent, task_id, _), outcome in run.outcomes.items():
+        num_rounds[agent, task_id] += outcome.row.num_rounds
     pairs: list[tuple[float, list[tuple[str, str]]]] = []
     rest: list[tuple[str, str]] = []
     for task_id, num_stages in run.num_stages.items():
         stages = range(1, num_stages + 1)
-        there = [agent for agent in agents or run.agents if any((agent, task_id, k) in run.outcomes for k in stages)]
-        quickest = sorted(there, key=lambda agent: _num_rounds(run, agent, task_id))
+        there = [
+            (num_rounds[agent, task_id], agent) for agent in agents or run.agents if (agent, task_id) in num_rounds
+        ]
+        quickest = [agent for _, agent in sorted(there, key=itemgetter(0))]
         best: tuple[float, list[str]] = (-1.0, [])
         for stage in stages:
             found = {
@@ -61,8 +67,3 @@ def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
     row = found[pair[0]].row
     score = 6.0 * bool(misled) + 3.0 * (len(pair) == 2) + 2.0 * row.is_relocated_now
     return score + (row.mode not in ("first", "static")), pair
-
-
-def _num_rounds(run: RecordedRun, agent: str, task_id: str) -> int:
-    keys = ((agent, task_id, stage) for stage in range(1, run.num_stages[task_id] + 1))
-    return sum(run.outcomes[key].row.num_rounds for key in keys if key in run.outcomes)

@@ -54,12 +54,7 @@ def viewer_css() -> Markup:
     return text_of("report.css") + map_css() + text_of("viewer.css")
 
 
-def viewer_js() -> Markup:
-    """Return the script of an episode's page."""
-    return text_of("viewer.js")
-
-
 def page_code() -> str:
     """Return a digest of the style, the script and the templates of an episode's page."""
-    templates = text_of("page.html.j2") + text_of("viewer.html.j2")
-    return hashlib.sha256((viewer_css() + viewer_js() + templates).encode()).hexdigest()
+    others = "".join(map(text_of, ("viewer.js", "page.html.j2", "viewer.html.j2")))
+    return hashlib.sha256((viewer_css() + others).encode()).hexdigest()

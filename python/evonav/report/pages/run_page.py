@@ -9,19 +9,18 @@ from markupsafe import Markup
 
 from evonav.drawing.style import map_css
 from evonav.drawing.svg import slug
-from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_name, stage_svg
 from evonav.report.maps.text import describe_outcome
 from evonav.report.pages.highlights import highlights_first
-from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
+from evonav.report.pages.replays import listed_pages, viewer_css
 from evonav.report.pages.task_cards import filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, rate_bar, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import Breakdowns, run_breakdowns, run_plots
 from evonav.report.plots.style import plot_css
-from evonav.report.run import RecordedRun, RecordedStage, RecordedTask, load_run
+from evonav.report.run import RecordedRun, RecordedStage, load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
@@ -112,17 +111,12 @@ def _tasks(
     }
     macros: Any = page_environment().get_template("macros.html.j2").module
     for i, task in enumerate(run.tasks()):
-        if map_dir is not None:
-            _write_maps(run, task, map_dir)
+        for record in task.records.values() if map_dir is not None else ():
+            drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
+            write_atomically(map_dir / map_name(record), drawn)
         view = task_view(run, task, f"h{i}", hrefs)
         section = macros.task_section(view)
         yield view, packed(section) if is_packed else section, is_packed
-
-
-def _write_maps(run: RecordedRun, task: RecordedTask, map_dir: Path) -> None:
-    for record in task.records.values():
-        drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
-        write_atomically(map_dir / map_name(record), drawn)
 
 
 def _template_values(
@@ -160,7 +154,7 @@ def _template_values(
         "run": run,
         "name": run.run_dir.resolve().name,
         "headline": headline,
-        "bars": [_bars(summary) for summary in run.summaries],
+        "bars": [(rate_bar(s.sr, s.sr_ci95), rate_bar(s.spl, s.spl_ci95)) for s in run.summaries],
         "others": shown,
         "sections": sections,
         "plots": list(
@@ -179,7 +173,7 @@ def _template_values(
         "digests": task_digests(run),
         "css": css,
         "js": js,
-        "policy": policy((css, viewer_css()), (js, viewer_js())),
+        "policy": policy((css, viewer_css()), (js, text_of("viewer.js"))),
         "legend": legend(),
     }
 
@@ -191,8 +185,3 @@ def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
     row = outcome.row
     why = f": {CAUSE_NAMES[outcome.cause]}" if outcome.cause is not None and row.is_scored else ""
     return (row.state, f"{outcome.category}, {describe_outcome(row)}{why}")
-
-
-def _bars(summary: AgentSummary) -> list[Markup]:
-    """Draw SR and SPL with their intervals on a scale of 0 to 100%."""
-    return [rate_bar(summary.sr, summary.sr_ci95), rate_bar(summary.spl, summary.spl_ci95)]

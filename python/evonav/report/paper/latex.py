@@ -1,15 +1,14 @@
 """Write the paper's Tables 1 and 2 with a run's numbers as LaTeX in the paper's layout, the paper's numbers in grey."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from typing import Literal, NamedTuple
 
 from evonav.counted import counted
 from evonav.evaluation.metrics.navigation import Rates
 from evonav.report.paper.tables import NUM_STAGES, PAPER, PaperResult, Perception
 from evonav.report.run import RecordedRun
 from evonav.report.tables.numbers import rate
-from evonav.report.tables.table import latex_text
+from evonav.report.tables.table import latex_text, short_names
 
 NAMES = {
     "unigoal": "UniGoal",
@@ -24,16 +23,25 @@ SETTINGS: dict[Perception, str] = {"gt": "GT", "prediction": "Prediction"}
 PREAMBLE = r"% Needs \usepackage{array,booktabs,multirow,xcolor}."
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
+class _Line(NamedTuple):
     """A line of a table: one measure of every agent."""
 
     name: str
-    ours: Mapping[str, Rates]
-    measure: str
-    """`sr` or `spl`."""
-    paper: Mapping[str, float]
-    num_paper: int
+    split: str = "all"
+    measure: Literal["sr", "spl"] = "sr"
+
+    def ours(self, run: RecordedRun | None) -> dict[str, Rates]:
+        """Return the rates of a run's agents that have the measure."""
+        found = {} if run is None else {one.agent: one.rates(self.split) for one in run.summaries}
+        return {agent: rates for agent, rates in found.items() if getattr(rates, self.measure) is not None}
+
+    def papers(self, known: PaperResult) -> float:
+        """Return the paper's value."""
+        return known.sr(self.split) if self.measure == "sr" else known.spl
+
+
+MAIN = (_Line(r"SR $\uparrow$"), _Line(r"SPL $\uparrow$", measure="spl"))
+RELOCATION = (_Line("Relocated", "relocated"), _Line("Not Relocated", "not_relocated"))
 
 
 def paper_latex(runs: Mapping[Perception, RecordedRun]) -> str:
@@ -42,64 +50,41 @@ def paper_latex(runs: Mapping[Perception, RecordedRun]) -> str:
     Args:
         runs: Runs by perception; agents that the paper lacks come last, settings without a run show the paper alone.
     """
-    agents = list(dict.fromkeys(agent for run in runs.values() for agent in run.agents))
-    main: dict[Perception, list[_Row]] = {}
-    relocation: dict[Perception, list[_Row]] = {}
-    for setting in SETTINGS:
-        row = partial(_row, runs.get(setting), PAPER[setting])
-        main[setting] = [row(r"SR $\uparrow$"), row(r"SPL $\uparrow$", measure="spl")]
-        relocation[setting] = [row("Relocated", "relocated"), row("Not Relocated", "not_relocated")]
     sizes = latex_text("; ".join(f"{SETTINGS[setting]}: {_run_size(run)}" for setting, run in runs.items()))
-    grey = "Grey: as published."
+    main = rf"\textbf{{Main results}} of evaluated baselines and heuristic strategies. {sizes}. Grey: as published."
+    relocation = rf"\textbf{{Impact of target relocation}} on the success rate (SR). {sizes}. Grey: as published."
     return "\n".join(
         [
             PREAMBLE,
             *(f"% evonav paper: {run.run_dir.as_posix()}".replace("\n", " ") for run in runs.values()),
-            *_table(
-                main,
-                agents,
-                "Setting",
-                "Metric",
-                rf"\textbf{{Main results}} of evaluated baselines and heuristic strategies. {sizes}. {grey}",
-                "tab:main-results",
-            ),
+            *_table(runs, MAIN, ("Setting", "Metric"), main, "tab:main-results"),
             "",
-            *_table(
-                relocation,
-                agents,
-                "Perception",
-                "Target Status",
-                rf"\textbf{{Impact of target relocation}} on the success rate (SR). {sizes}. {grey}",
-                "tab:relocation-results",
-            ),
+            *_table(runs, RELOCATION, ("Perception", "Target Status"), relocation, "tab:relocation-results"),
             "",
         ]
     )
 
 
 def _table(
-    settings: Mapping[Perception, Sequence[_Row]],
-    agents: Sequence[str],
-    first: str,
-    second: str,
-    caption: str,
-    label: str,
+    runs: Mapping[Perception, RecordedRun], rows: Sequence[_Line], heads_of: tuple[str, str], caption: str, label: str
 ) -> list[str]:
+    agents = dict.fromkeys(agent for run in runs.values() for agent in run.agents)
+    names = NAMES | {agent: latex_text(name) for agent, name in short_names(agents).items()}
     groups = [
         ("Evaluated Baselines", BASELINES),
         ("Heuristic Strategies", HEURISTICS),
         ("Other Agents", tuple(agent for agent in agents if agent not in NAMES)),
     ]
     groups = [(title, members) for title, members in groups if members]
-    heads, rules, names, start = [], [], [], 3
+    heads, rules, shown, start = [], [], [], 3
     columns = "ll"
     for title, members in groups:
         # Beside each of the paper's agents stands, in grey, what the paper has.
         widths = [2 if member in NAMES else 1 for member in members]
         heads.append(rf"\multicolumn{{{sum(widths)}}}{{c}}{{\textbf{{{title}}}}}")
         rules.append(rf"\cmidrule(lr){{{start}-{start + sum(widths) - 1}}}")
-        names += [
-            rf"\multicolumn{{2}}{{c}}{{{NAMES[member]}}}" if member in NAMES else latex_text(member)
+        shown += [
+            rf"\multicolumn{{2}}{{c}}{{{NAMES[member]}}}" if member in NAMES else names.get(member, latex_text(member))
             for member in members
         ]
         columns += "".join(r"c>{\color{gray}}c" if width == 2 else "c" for width in widths)
@@ -114,62 +99,44 @@ def _table(
         r"\setlength{\tabcolsep}{3pt}",
         rf"\begin{{tabular}}{{@{{}}{columns}@{{}}}}",
         r"\toprule",
-        rf"\multirow{{2}}{{*}}{{\textbf{{{first}}}}} & \multirow{{2}}{{*}}{{\textbf{{{second}}}}} & "
-        + " & ".join(heads)
-        + r" \\",
+        " & ".join([*(rf"\multirow{{2}}{{*}}{{\textbf{{{head}}}}}" for head in heads_of), *heads]) + r" \\",
         "".join(rules),
-        "& & " + " & ".join(names) + r" \\",
+        "& & " + " & ".join(shown) + r" \\",
     ]
-    for setting, rows in settings.items():
+    for setting, title in SETTINGS.items():
         lines.append(r"\midrule")
         for i, row in enumerate(rows):
-            lines += _comments(setting, row, order)
-            head = rf"\multirow{{{len(rows)}}}{{*}}{{\textbf{{{SETTINGS[setting]}}}}}" if i == 0 else ""
-            lines.append(" & ".join([head, row.name, *_cells(row, order)]) + r" \\")
+            ours = row.ours(runs.get(setting))
+            lines += _comments(title, row, {agent: ours[agent] for agent in order if agent in ours})
+            head = rf"\multirow{{{len(rows)}}}{{*}}{{\textbf{{{title}}}}}" if i == 0 else ""
+            values = {agent: getattr(rates, row.measure) for agent, rates in ours.items()}
+            published = {agent: row.papers(known) for agent, known in PAPER[setting].items()}
+            lines.append(" & ".join([head, row.name, *_cells(values, published, order)]) + r" \\")
     return [*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}"]
 
 
-def _cells(row: _Row, order: Sequence[str]) -> list[str]:
-    values = {agent: _value(row.ours[agent], row.measure) for agent in order if agent in row.ours}
-    known = [value for value in values.values() if value is not None]
-    best = max(known, default=None) if len(known) > 1 else None
-    best_paper = max(row.paper.values())
+def _cells(values: Mapping[str, float], published: Mapping[str, float], order: Sequence[str]) -> list[str]:
+    """Return ours and, beside it, the paper's value of each agent; the best of both are bold."""
+    best, best_published = max(values.values()) if len(values) > 1 else None, max(published.values())
     cells = []
     for agent in order:
         value = values.get(agent)
         text = "--" if value is None else f"{100 * value:.1f}"
         cells.append(rf"\textbf{{{text}}}" if value is not None and value == best else text)
         if agent in NAMES:
-            theirs = f"{100 * row.paper[agent]:.1f}"
-            cells.append(rf"\textbf{{{theirs}}}" if row.paper[agent] == best_paper else theirs)
+            theirs = f"{100 * published[agent]:.1f}"
+            cells.append(rf"\textbf{{{theirs}}}" if published[agent] == best_published else theirs)
     return cells
 
 
-def _comments(setting: Perception, row: _Row, order: Sequence[str]) -> list[str]:
-    lines = []
-    for agent in order:
-        found = row.ours.get(agent)
-        if found is not None and found.n:
-            interval = found.sr_ci95 if row.measure == "sr" else found.spl_ci95
-            name = row.name.split(" $", maxsplit=1)[0]
-            lines.append(
-                f"% {SETTINGS[setting]}, {name}, {' '.join(agent.split())}: "
-                f"{rate(_value(found, row.measure), interval)}, n = {found.n}"
-                + (f"; paper n = {row.num_paper}" if agent in NAMES else "")
-            )
-    return lines
-
-
-def _row(
-    run: RecordedRun | None, paper: Mapping[str, PaperResult], name: str, split: str = "all", *, measure: str = "sr"
-) -> _Row:
-    ours = {} if run is None else {summary.agent: summary.rates(split) for summary in run.summaries}
-    theirs = {agent: known.sr(split) if measure == "sr" else known.spl for agent, known in paper.items()}
-    return _Row(name, ours, measure, theirs, NUM_STAGES[split])
-
-
-def _value(found: Rates, measure: str) -> float | None:
-    return found.sr if measure == "sr" else found.spl
+def _comments(setting: str, row: _Line, ours: Mapping[str, Rates]) -> list[str]:
+    name = row.name.partition(" $")[0]
+    return [
+        f"% {setting}, {name}, {' '.join(agent.split())}: "
+        f"{rate(getattr(found, row.measure), getattr(found, f'{row.measure}_ci95'))}, n = {found.n}"
+        + (f"; paper n = {NUM_STAGES[row.split]}" if agent in NAMES else "")
+        for agent, found in ours.items()
+    ]
 
 
 def _run_size(run: RecordedRun) -> str:

@@ -37,7 +37,10 @@ def reweighted_table(runs: Sequence[RecordedRun], mix: str, perception: Percepti
         InvalidArgumentError: The mix is unknown, or has none of the houses.
         StoreError: A run cannot be read.
     """
-    num_rooms = {task: count for run in runs for task, count in _num_rooms(run).items()}
+    num_rooms: dict[str, int] = {}
+    for run in runs:
+        with RunStore(run.run_dir) as store:  # 0 where a house's map is not recorded
+            num_rooms |= dict.fromkeys(run.num_stages, 0) | store.num_rooms()
     tasks = list(num_rooms)
     weighting = reweight(mix, list(num_rooms.values()), [None] * len(tasks))
     by_agent: dict[str, list[StageMetrics]] = {}
@@ -64,12 +67,6 @@ def reweighted_table(runs: Sequence[RecordedRun], mix: str, perception: Percepti
         "bootstrap over houses within each number of rooms."
     )
     return Table(f"Reweighted to the rooms of {mix}", columns, tuple(rows), (note,))
-
-
-def _num_rooms(run: RecordedRun) -> dict[str, int]:
-    """Return the number of rooms of each task's house; 0 where its map is not recorded."""
-    with RunStore(run.run_dir) as store:
-        return dict.fromkeys(run.num_stages, 0) | store.num_rooms()
 
 
 def _estimate(

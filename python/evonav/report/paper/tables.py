@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.evaluation.agent_order import PAPER_ORDER
-from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, rates
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.report.run import RecordedRun, RecordedStage
-from evonav.report.tables.numbers import NONE, number, percent, points, rate
-from evonav.report.tables.table import INTERVALS, Table
+from evonav.report.tables.numbers import NONE, number, percent, points, rate, with_interval
+from evonav.report.tables.table import INTERVALS, Table, rates_text
 from evonav.report.tables.verdicts import VERDICTS, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, Interval, newcombe, power, wilson
 
@@ -146,7 +146,11 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
         known, moved, unmoved = paper.get(s.agent), s.rates("relocated").sr, s.rates("not_relocated").sr
         gap = None if known is None else known.sr("relocated") - known.sr("not_relocated")
         ours = None if moved is None or unmoved is None else moved - unmoved
-        cells = [cell for split in ("relocated", "not_relocated") for cell in (_theirs(known, split), _ours(s, split))]
+        cells = [
+            cell
+            for split in ("relocated", "not_relocated")
+            for cell in (_theirs(known, split), rates_text(s.rates(split)))
+        ]
         rows.append((s.agent, *cells, *(number(value, scale=100, is_signed=True) for value in (gap, ours))))
     columns = (
         "Agent",
@@ -174,7 +178,7 @@ def _far_table(run: RecordedRun) -> Table:
             moved_m = _moved_m(outcome) if key[0] == agent else None
             if moved_m is not None:
                 (far if moved_m > FAR_M else near).append(outcome.row)
-        rows.append((agent, _with_interval(rates(far)), _with_interval(rates(near))))
+        rows.append((agent, rates_text(rates(far)), rates_text(rates(near))))
     note = (
         "SR % of the moved targets of Table 2, by the distance on the ground plane from the place in stage 1. An "
         f"agent that stops at the old place of a target that moved less than the success radius of {FAR_M:g} m may "
@@ -193,7 +197,7 @@ def _moved_m(outcome: RecordedStage) -> float | None:
 
 
 def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
-    rows = tuple((s.agent, _theirs(paper.get(s.agent), "stage_1"), _ours(s, "stage_1")) for s in summaries)
+    rows = tuple((s.agent, _theirs(paper.get(s.agent), "stage_1"), rates_text(s.rates("stage_1"))) for s in summaries)
     note = (
         "SR %. The paper does not print these rates; they are its overall counts minus the counts of moved and not "
         f"moved targets (n = {NUM_STAGES['stage_1']}). At stage 1 fu and stage-reset are the same program, and ftu "
@@ -239,7 +243,7 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
         rows.append(
             (
                 f"{pair.b} minus {pair.a}",
-                f"{100 * theirs:+.1f}{_ends(their_ends)}",
+                with_interval(theirs, their_ends, scale=100, is_signed=True),
                 points(pair.sr),
                 p_words(pair.sr.adjusted_p),
                 points(pair.spl),
@@ -264,10 +268,6 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
     return Table("Differences between agents", columns, tuple(rows), notes)
 
 
-def _ends(interval: Interval | None) -> str:
-    return "" if interval is None else f" [{100 * interval[0]:+.1f}, {100 * interval[1]:+.1f}]"
-
-
 def _is_in(value: float, interval: Interval | None) -> str:
     return NONE if interval is None else "yes" if interval[0] <= value <= interval[1] else "no"
 
@@ -276,11 +276,3 @@ def _theirs(known: PaperResult | None, split: str = "all") -> str:
     if known is None:
         return NONE
     return rate(known.sr(split), wilson(known.num_successes(split), NUM_STAGES[split]))
-
-
-def _ours(summary: AgentSummary, split: str) -> str:
-    return _with_interval(summary.rates(split))
-
-
-def _with_interval(part: Rates) -> str:
-    return NONE if part.sr is None else f"{rate(part.sr, part.sr_ci95)}, n = {part.n}"

@@ -7,7 +7,6 @@ from typing import Literal
 from evonav.counted import counted
 from evonav.evaluation.metrics.belief import belief_summary
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.evaluation.records.changes import DURING_STRATA
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import TABLED, Breakdowns
@@ -24,21 +23,13 @@ def run_tables(run: RecordedRun, breakdowns: Breakdowns) -> list[tables.Table]:
         tables.headline(run.summaries),
         paired_table([(pair.a, pair.b, pair.sr, pair.spl, pair.num_only_a, pair.num_only_b) for pair in run.pairs]),
         tables.stage_table(run.rows_by_agent()),
-        tables.relocation_table(run.summaries),
-        tables.mode_table(run.summaries),
-        *_during_tables(run),
+        *tables.split_tables(run.summaries),
         tables.cause_table(run.cause_counts()),
         effort_table(run),
         belief_table(run),
         failure_table(run),
         *(breakdown_table(breakdowns[key]) for key in TABLED if key in breakdowns),
     ]
-
-
-def _during_tables(run: RecordedRun) -> list[tables.Table]:
-    """Return the table of SR by what changed during the stage, if the run's tasks have such changes."""
-    has_changes = any(name in summary.splits for summary in run.summaries for name in DURING_STRATA)
-    return [tables.during_table(run.summaries)] if has_changes else []
 
 
 def effort_table(run: RecordedRun) -> tables.Table:

@@ -228,22 +228,29 @@ SPLIT_TITLES = {
 """The splits of `AgentSummary`, in reading order."""
 
 
-def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
-    """Build the table of SR on stage 1 and on the paper's two strata of the later stages."""
-    names = ("stage_1", "relocated", "not_relocated")
-    note = "Moved: the target had moved since stage 1, at any time. Both columns are of stages 2 and later."
-    return _split_table("By whether the target moved", summaries, names, (note,))
+SPLIT_TABLES = {
+    "By whether the target moved": (
+        ("stage_1", "relocated", "not_relocated"),
+        "Moved: the target had moved since stage 1, at any time. Both columns are of stages 2 and later.",
+    ),
+    "By evolution before the stage": (tuple(MODES), "Stages 2 and later."),
+    "By change during the stage": (
+        DURING_STRATA,
+        "A change during the stage that had not come when the agent stopped is no change during it.",
+    ),
+}
+"""Tables of SR by splits of the stages: title, splits, and a note."""
 
 
-def during_table(summaries: Sequence[AgentSummary]) -> Table:
-    """Build the table of SR by what changed during the stage; without columns if no task has such changes."""
-    note = "A change during the stage that had not come when the agent stopped is no change during it."
-    return _split_table("By change during the stage", summaries, DURING_STRATA, (note,))
-
-
-def mode_table(summaries: Sequence[AgentSummary]) -> Table:
-    """Build the table of SR by the kind of the transition before the stage."""
-    return _split_table("By evolution before the stage", summaries, tuple(MODES), ("Stages 2 and later.",))
+def split_tables(summaries: Sequence[AgentSummary]) -> list[Table]:
+    """Build the tables of SR by split, without columns for splits that no agent has; the last only if there is one."""
+    tables = []
+    for title, (wanted, note) in SPLIT_TABLES.items():
+        names = [name for name in wanted if any(name in summary.splits for summary in summaries)]
+        if names or wanted is not DURING_STRATA:
+            cells = {s.agent: [s.rates(name) for name in names] for s in summaries}
+            tables.append(_rates_table(title, [SPLIT_TITLES[name] for name in names], cells, (note,)))
+    return tables
 
 
 def stage_table(rows: Mapping[str, Sequence[RecordMetrics]]) -> Table:
@@ -278,20 +285,15 @@ def summary_csv(summaries: Sequence[AgentSummary]) -> str:
     return csv_text(("agent", "split", "n", "sr", *ends[:4], "spl", *ends[4:], *totals, "is_incomplete"), rows)
 
 
-def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:
-    names = [name for name in names if any(name in summary.splits for summary in summaries)]
-    cells = {s.agent: [s.rates(name) for name in names] for s in summaries}
-    return _rates_table(title, [SPLIT_TITLES[name] for name in names], cells, notes)
-
-
 def _rates_table(
     title: str, titles: Sequence[str], cells: Mapping[str, Sequence[Rates]], notes: tuple[str, ...]
 ) -> Table:
-    rows = tuple((agent, *map(_rate_cell, row)) for agent, row in cells.items())
+    rows = tuple((agent, *map(rates_text, row)) for agent, row in cells.items())
     return Table(title, ("Agent", *titles), rows, ("SR % [95% CI], n stages.", *notes))
 
 
-def _rate_cell(part: Rates) -> str:
+def rates_text(part: Rates) -> str:
+    """Return a success rate with its interval and the number of stages."""
     return NONE if part.n == 0 else f"{rate(part.sr, part.sr_ci95)}, n = {part.n}"
 
 

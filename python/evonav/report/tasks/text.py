@@ -46,7 +46,13 @@ def stage_facts(floor_plan: FloorPlan, oracle: OracleStage) -> list[tuple[str, s
         where = "the target moves" if oracle.during.is_target_relocated else "the target stays"
         sentence = change_sentence(floor_plan, oracle.during.evolution)
         facts.append((f"during the stage, round {oracle.during.round}", f"{sentence} {where.capitalize()}."))
-    for name, ids in _lists(evolution):
+    lists = {
+        "found no place": evolution.unmoved_ids,
+        "would have cut something off": evolution.blocking_ids,
+        "stand closer than usual": evolution.crowded_ids,
+        "rearranged": evolution.rearranged_ids,
+    }
+    for name, ids in lists.items():
         if ids:
             facts.append((name, ", ".join(f"{nouns.get(i, '')} {i}".strip() for i in ids)))
     if evolution.room_weights:
@@ -62,7 +68,11 @@ def change_sentence(floor_plan: FloorPlan, evolution: Evolution) -> str:
         text += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
     if evolution.outcome == "evolved" and evolution.mode is not None:
         room = room_namer(floor_plan)(evolution.room_id or "")
-        text = f"{mode_words(evolution.mode).capitalize()} in the {room}: {_moved_text(evolution)}."
+        moved = f"{counted(len(evolution.changes), 'object')} moved"
+        if evolution.changes:
+            farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
+            moved += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
+        text = f"{mode_words(evolution.mode).capitalize()} in the {room}: {moved}."
     extra = [
         (len(evolution.additions), "came"),
         (len(evolution.removals), "went"),
@@ -102,21 +112,3 @@ def room_namer(floor_plan: FloorPlan) -> Callable[[str], str]:
         number = room.room_id.rsplit("|", 1)[-1]
         names[room.room_id] = noun_of(room.room_type) + (f" {number}" if types[room.room_type] > 1 else "")
     return lambda room_id: names.get(room_id, room_id)
-
-
-def _moved_text(evolution: Evolution) -> str:
-    """Describe how many objects moved, and how far."""
-    text = f"{counted(len(evolution.changes), 'object')} moved"
-    if evolution.changes:
-        farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
-        text += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
-    return text
-
-
-def _lists(evolution: Evolution) -> list[tuple[str, tuple[str, ...]]]:
-    return [
-        ("found no place", evolution.unmoved_ids),
-        ("would have cut something off", evolution.blocking_ids),
-        ("stand closer than usual", evolution.crowded_ids),
-        ("rearranged", evolution.rearranged_ids),
-    ]
