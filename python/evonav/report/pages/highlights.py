@@ -23,10 +23,8 @@ def highlights_first(run: RecordedRun, agents: Sequence[str] = ()) -> list[tuple
     rest: list[tuple[str, str]] = []
     for task_id, num_stages in run.num_stages.items():
         stages = range(1, num_stages + 1)
-        there = [
-            (num_rounds[agent, task_id], agent) for agent in agents or run.agents if (agent, task_id) in num_rounds
-        ]
-        quickest = [agent for _, agent in sorted(there, key=itemgetter(0))]
+        there = [agent for agent in agents or run.agents if (agent, task_id) in num_rounds]
+        quickest = sorted(there, key=lambda agent: num_rounds[agent, task_id])
         best: tuple[float, list[str]] = (-1.0, [])
         for stage in stages:
             found = {
