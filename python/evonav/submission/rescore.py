@@ -35,10 +35,12 @@ from evonav.world.simulator import Action, Frame, Simulator
 
 
 class RecordedAgent:
-    """Answer with the recorded actions of an episode."""
+    """Answer with the recorded actions and explanations of an episode."""
 
     def __init__(self, records: Mapping[int, StageRecord]) -> None:
-        """Replay an episode, given its stages by number."""
+        """Replay an episode, given its stages by number; an agent that noted no memory explained nothing."""
+        explains = any(record.memory_at_end is not None for record in records.values())
+        self.explain = self._explanation if explains else None
         self.sensors = SensorConfig()
         self._records = records
         self._record: StageRecord | None = None
@@ -63,16 +65,7 @@ class RecordedAgent:
         self._num_acted += 1
         return _action_of(trace[self._num_acted - 1].action)
 
-    @property
-    def _here(self) -> StageRecord:
-        assert self._record is not None  # the protocol begins with begin_stage
-        return self._record
-
-
-class ExplainingRecordedAgent(RecordedAgent):
-    """Answer also with the recorded explanation."""
-
-    def explain(self) -> Explanation:
+    def _explanation(self) -> Explanation:
         """Return the recorded explanation of the round, with the entries at the stage's end."""
         if self._num_acted == 0:
             return Explanation(objects=self._entries)
@@ -90,6 +83,11 @@ class ExplainingRecordedAgent(RecordedAgent):
     def _entries(self) -> Sequence[EntryBelief]:
         return [_belief_of(entry) for entry in self._here.entries]
 
+    @property
+    def _here(self) -> StageRecord:
+        assert self._record is not None  # the protocol begins with begin_stage
+        return self._record
+
 
 class _Blind:
     """A perception that detects nothing."""
@@ -104,15 +102,15 @@ class _Blind:
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
         """Return frames without detections."""
-        return [Percept(_nothing(frame), frame.depth_m, frame.pose) for frame in frames]
+        found = []
+        for frame in frames:
+            masks = np.full(frame.depth_m.shape, -1, dtype=np.int32)
+            nothing = Detections(masks=masks, labels=(), confidences=np.zeros(0, np.float32))
+            found.append(Percept(nothing, frame.depth_m, frame.pose))
+        return found
 
     def text_feature(self, text: str) -> None:
         """Return no feature."""
-
-
-def _nothing(frame: Frame) -> Detections:
-    masks = np.full(frame.depth_m.shape, -1, dtype=np.int32)
-    return Detections(masks=masks, labels=(), confidences=np.zeros(0, np.float32))
 
 
 def rescore(
@@ -123,8 +121,7 @@ def rescore(
     Yields:
         A stage, and how its record differs from the result of its actions; no differences for a true record.
     """
-    has_no_entries = all(record.memory_at_end is None for record in records.values())
-    agent = RecordedAgent(records) if has_no_entries else ExplainingRecordedAgent(records)
+    agent = RecordedAgent(records)
     for outcome in Episode(case, records[1].agent, agent, simulator, _Blind(), protocol, seed=0).run():
         stage = outcome.record.stage
         yield (

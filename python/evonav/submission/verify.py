@@ -57,8 +57,6 @@ class PackVerdict:
     """The header; `None` if it is not readable."""
     is_rescored: bool
     """True if the actions were executed again; otherwise scores only agree with the traces."""
-    num_required: int = 0
-    """Number of tasks that were required, and whose actions were executed again."""
     summary: Mapping[str, Any] | None = None
     """The scores of the required tasks, computed from the records; `None` if they were not read to their end."""
     digests: Mapping[str, str] = field(default_factory=dict)
@@ -206,13 +204,13 @@ def _verdict(
     ]
     if not all(check.is_passed for check in checks):
         unread = PackCheck("file", True, _shown(f"the header; the records of {agents} were not read"))
-        return PackVerdict((unread, *checks), header, False, len(required))
+        return PackVerdict((unread, *checks), header, False)
     records = _Records(path, header, known)
     num_records = sum(map(len, records.rows.values()))
     checks.insert(0, PackCheck("file", True, _shown(f"records: {num_records}, agents: {agents}")))
     checks.append(records.complete.check("complete", "every stage once, and scored"))
     if not all(check.is_passed for check in checks):
-        return PackVerdict(tuple(checks), header, False, len(required))
+        return PackVerdict(tuple(checks), header, False)
     checks.append(records.targets.check("targets", "houses, goals, targets and changes are those of the tasks"))
     follows = "lengths, distances, success and SPL follow from the recorded paths"
     checks.append(records.paths.check("paths", follows))
@@ -223,7 +221,7 @@ def _verdict(
     chosen = {agent: [row for row in mine if row.task_id in set(required)] for agent, mine in records.rows.items()}
     num_stages = sum(task.num_stages for task in header.tasks if task.task_id in set(required))
     summary = packed_summary(chosen, num_stages)
-    return PackVerdict(tuple(checks), header, replay is not None, len(required), summary, records.digests)
+    return PackVerdict(tuple(checks), header, replay is not None, summary, records.digests)
 
 
 def verdict_json(verdict: PackVerdict) -> dict[str, Any]:

@@ -94,12 +94,12 @@ def verify(
     if as_json:
         typer.echo(json.dumps(verdict_json(verdict), indent=2, sort_keys=True))
     else:
-        _print(file, verdict)
+        _print(file, verdict, limit)
     if not verdict.is_accepted:
         raise typer.Exit(EXIT_REJECTED)
 
 
-def _print(file: Path, verdict: "PackVerdict") -> None:
+def _print(file: Path, verdict: "PackVerdict", limit: int | None) -> None:
     from evonav.report.tables.table import Table
     from evonav.submission.packed_setup import packed_setup
 
@@ -109,8 +109,8 @@ def _print(file: Path, verdict: "PackVerdict") -> None:
         ((check.name, *marks[check.is_passed], check.detail) for check in verdict.checks),
     )
     num_tasks = 0 if verdict.submission is None else len(verdict.submission.tasks)
-    if verdict.is_accepted and verdict.num_required < num_tasks:
-        typer.echo(f"verified {verdict.num_required} of {counted(num_tasks, 'task')}; without --limit, all")
+    if verdict.is_accepted and limit is not None and limit < num_tasks:
+        typer.echo(f"verified {limit} of {counted(num_tasks, 'task')}; without --limit, all")
     if verdict.is_accepted and verdict.submission is not None:
         isolation = packed_setup(verdict.submission).isolation
         typer.echo(f"isolation of agents, as the run notes it: {isolation or 'not noted'}")
