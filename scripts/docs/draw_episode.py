@@ -9,8 +9,16 @@ from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.maps.sheet import instruction_lines, panel, panel_height_px, reference_image, sheet
-from evonav.report.maps.stage_map import stage_drawing, success_radius_of, task_frame
+from evonav.report.maps.stage_map import (
+    instruction_lines,
+    panel,
+    panel_height_px,
+    reference_image,
+    sheet,
+    stage_drawing,
+    success_radius_of,
+    task_frame,
+)
 from evonav.report.maps.text import describe_change
 from evonav.report.tables.causes import sentence
 

@@ -14,10 +14,9 @@ from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.compare.selection import read_compared_agents
-from evonav.report.plots.run_plots import run_breakdowns, run_plots
 from evonav.report.plots.specs import CurvePlot
 from evonav.report.run import load_run
-from evonav.report.tables.run_tables import run_tables
+from evonav.report.tables.run_tables import run_breakdowns, run_plots, run_tables
 
 
 @pytest.fixture

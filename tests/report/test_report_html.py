@@ -19,11 +19,11 @@ from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
 from evonav.report import write_report
 from evonav.report.pages import run_page as html
-from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables
 from evonav.report.tables.run_metadata import reproduction
+from evonav.report.tables.run_tables import run_breakdowns
 from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 

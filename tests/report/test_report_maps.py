@@ -14,7 +14,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
 from evonav.report.maps.stage_map import stage_svg
 from evonav.report.maps.trajectory import rounds as choices
-from evonav.report.pages.highlights import highlight_task
+from evonav.report.pages.replays import highlight_task
 from evonav.report.run import load_run
 
 SVG = "{http://www.w3.org/2000/svg}"

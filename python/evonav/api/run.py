@@ -15,7 +15,7 @@ from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import agents_of
 from evonav.report.compare.wording import comparison_table
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
-from evonav.report.pages.highlights import highlight_task
+from evonav.report.pages.replays import highlight_task
 from evonav.report.pages.run_page import write_report
 from evonav.report.run import RecordedRun
 from evonav.report.run import load_run as read_run

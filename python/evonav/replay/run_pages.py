@@ -8,8 +8,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.replay.pages import write_episode, write_index
 from evonav.replay.replay import RunReplay
 from evonav.report.maps.stage_map import VIEW_DIR
-from evonav.report.pages.highlights import highlights_first
-from evonav.report.pages.replays import ListedPage, listed_pages
+from evonav.report.pages.replays import ListedPage, highlights_first, listed_pages
 from evonav.report.run import RecordedRun
 from evonav.tasks.listing import BUNDLED_TASKS
 

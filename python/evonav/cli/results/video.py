@@ -121,7 +121,7 @@ def _replayed(
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
     from evonav.replay.run_pages import task_path
-    from evonav.report.pages.highlights import highlights_first
+    from evonav.report.pages.replays import highlights_first
     from evonav.report.run import load_run
 
     wanted = set(numbers_of("--stage", stage)) or None

@@ -67,7 +67,7 @@ def make_pages(
         task: Id of a task; default: the first highlight.
         stages: The stages to show, each on a page of its own; default: all, on one page.
     """
-    from evonav.report.pages.highlights import highlight_task
+    from evonav.report.pages.replays import highlight_task
     from evonav.report.run import load_run
 
     found = load_run(run)

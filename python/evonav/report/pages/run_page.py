@@ -13,18 +13,16 @@ from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_name, stage_svg
 from evonav.report.maps.text import describe_outcome
-from evonav.report.pages.highlights import highlights_first
-from evonav.report.pages.replays import listed_pages, viewer_css
+from evonav.report.pages.replays import highlights_first, listed_pages, viewer_css
 from evonav.report.pages.task_cards import filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, rate_bar, text_of
 from evonav.report.plots.render import plot_elements
-from evonav.report.plots.run_plots import Breakdowns, run_breakdowns, run_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.run import RecordedRun, RecordedStage, load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
-from evonav.report.tables.run_tables import run_tables, statements
+from evonav.report.tables.run_tables import Breakdowns, run_breakdowns, run_plots, run_tables, statements
 
 MAX_OPEN_STAGES = 400
 """Recorded stages up to which maps stand in the page as they are; beyond, each task is packed until it is looked at."""
