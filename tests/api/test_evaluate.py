@@ -80,9 +80,9 @@ def test_a_run_shows_tables_and_pages(run: evonav.Run, tmp_path: Path) -> None:
 
 def test_two_agents_are_compared_by_class_name(run: evonav.Run) -> None:
     found = run.compare("RandomWalk", "stay-still")
-    assert found.title == "evonav.agents.baselines:RandomWalk minus stay-still, n = 4"
+    assert found.title == "RandomWalk minus stay-still, n = 4"
     spl = dict(zip(found.columns, found.rows[1], strict=True))
-    less = float(spl["evonav.agents.baselines:RandomWalk"]) - float(spl["stay-still"])
+    less = float(spl["RandomWalk"]) - float(spl["stay-still"])
     assert float(spl["difference [95% CI]"].split(" ")[0]) == pytest.approx(less, abs=0.1)
     with pytest.raises(InvalidArgumentError, match="no agent 'Locale'; did you mean `Local`"):
         run.compare("Locale", "RandomWalk")

@@ -47,16 +47,15 @@ def compare(
     from evonav.report.compare.compare import compare as compare_agents
     from evonav.report.compare.compare import comparison_json
     from evonav.report.compare.page import comparison_page, comparison_plot
-    from evonav.report.compare.selection import read_compared_agents
+    from evonav.report.compare.selection import name_notes, read_compared_agents
 
-    found = compare_agents(
-        read_compared_agents(runs), metrics=listed(measure), baseline=baseline, allow_differences=allow_differences
-    )
+    compared = read_compared_agents(runs)
+    found = compare_agents(compared, metrics=listed(measure), baseline=baseline, allow_differences=allow_differences)
     content = json.dumps(comparison_json(found), indent=1) + "\n"
     if as_json:
         typer.echo(content, nl=False)
     else:
-        _print(found)
+        _print(found, name_notes(compared))
     write_files(
         out,
         {
@@ -70,18 +69,16 @@ def compare(
     )
 
 
-def _print(found: "Sequence[Comparison]") -> None:
+def _print(found: "Sequence[Comparison]", notes: "Sequence[str]") -> None:
     """Print what the comparison says, in sentences and tables, and then the notes."""
     from rich.console import Console
 
     from evonav.report.compare import wording
-    from evonav.report.tables.table import renamed, short_names
 
     console = Console()
-    names = short_names(name for one in found for name in (one.a, one.b))
     for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
-        console.print(renamed(line, names), markup=False, highlight=False)
-    show_tables(wording.terminal_tables(found), notes=[wording.METHOD])
+        console.print(line, markup=False, highlight=False)
+    show_tables(wording.terminal_tables(found), notes=[*notes, wording.METHOD])
 
 
 def breakdown(
@@ -105,7 +102,7 @@ def breakdown(
     Each rate has its number of stages and a 95% interval over houses.
     """
     from evonav.report.compare import breakdown as made
-    from evonav.report.compare.selection import read_compared_agents
+    from evonav.report.compare.selection import name_notes, read_compared_agents
     from evonav.report.plots.render import check_plot
     from evonav.report.tables.table import latex_tables, markdown_tables
 
@@ -116,7 +113,7 @@ def breakdown(
     found = [made.breakdown(compared, name, measure) for name in listed(by) or made.STANDARD]
     found = [one for one in found if one.groups]
     tables = [made.breakdown_table(one) for one in found]
-    show_tables(made.breakdown_table(one, is_brief=True) for one in found)
+    show_tables((made.breakdown_table(one, is_brief=True) for one in found), notes=name_notes(compared))
     write_files(
         out,
         {

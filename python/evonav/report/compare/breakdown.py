@@ -139,8 +139,12 @@ def _grouping(compared_agents: Sequence[ComparedAgent], by: str) -> Grouping:
         note = "Stages of the task before this one: how long memory has grown, and could grow stale."
         return Grouping("earlier stages", lambda row: str(row.stage - 1), names, note)
     if by == "room-count":
-        counts = _room_counts(compared_agents)
-        names = [_room_group(k) for k in ROOM_EDGES]
+        counts: dict[str, int] = {}
+        for run_dir in dict.fromkeys(compared.run.run_dir for compared in compared_agents):
+            with RunStore(run_dir) as store:
+                counts |= store.num_rooms()
+        names = [str(a) if b == a + 1 else f"{a}-{b - 1}" for a, b in pairwise(ROOM_EDGES)]
+        names.append(f"{ROOM_EDGES[-1]} and more")
         return Grouping("rooms", lambda row: _bin(counts.get(row.task_id), ROOM_EDGES, names), names)
     return _field_grouping(compared_agents, by.replace("-", "_"))
 
@@ -177,21 +181,6 @@ def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> s
     if value is None:
         return None
     return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
-
-
-def _room_counts(compared_agents: Sequence[ComparedAgent]) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    for run in {compared.run.run_dir: compared.run for compared in compared_agents}.values():
-        with RunStore(run.run_dir) as store:
-            counts |= store.num_rooms()
-    return counts
-
-
-def _room_group(first: int) -> str:
-    following = [edge for edge in ROOM_EDGES if edge > first]
-    if not following:
-        return f"{first} and more"
-    return str(first) if following[0] == first + 1 else f"{first}-{following[0] - 1}"
 
 
 def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:

@@ -85,6 +85,12 @@ def agents_of(run: RecordedRun, agents: Sequence[str] = ()) -> list[ComparedAgen
     return [ComparedAgent(run.names[agent], run, agent) for agent in agents or run.agents]
 
 
+def name_notes(compared_agents: Sequence[ComparedAgent]) -> list[str]:
+    """Return a note on each agent that tables show by its class."""
+    names = {one.agent: one.run.names[one.agent] for one in compared_agents}
+    return [f"{short} is {agent}." for agent, short in names.items() if short != agent]
+
+
 def _split(argument: str) -> tuple[Path | None, str]:
     """Split a folder and the agent after its colon; an agent's name may contain colons, slashes and dots itself."""
     if Path(argument).is_dir():

@@ -69,13 +69,7 @@ def relocation_arrows(
 
 def rounds(trace: Sequence[RoundRecord]) -> list[str]:
     """Describe decision rounds, runs of the same choice together: `frontier 3 x4`."""
-    runs: list[tuple[str, int]] = []
-    for entry in trace:
-        choice = _choice(entry)
-        if runs and runs[-1][0] == choice:
-            runs[-1] = (choice, runs[-1][1] + 1)
-        else:
-            runs.append((choice, 1))
+    runs = [(choice, len(list(same))) for choice, same in itertools.groupby(map(_choice, trace))]
     return [choice if count == 1 else f"{choice} ×{count}" for choice, count in runs]
 
 
@@ -91,13 +85,12 @@ def _is_carried(
 ) -> bool:
     """Return whether an object lay on (or in) a larger moved object and still does."""
     area_m2 = _area_m2(now.get(relocation.object_id))
-    for other in relocations:
-        old, new = before.get(other.object_id), now.get(other.object_id)
-        if old is None or new is None:
-            continue
-        if _area_m2(new) > area_m2 and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new):
-            return True
-    return False
+    moved = [(before.get(other.object_id), now.get(other.object_id)) for other in relocations]
+    return any(
+        _area_m2(new) > area_m2 and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new)
+        for old, new in moved
+        if old is not None and new is not None
+    )
 
 
 def _is_over(point_m: Sequence[float], item: ObjectFootprint) -> bool:
@@ -192,15 +185,8 @@ def _legs(trace: Sequence[RoundRecord]) -> list[list[RoundRecord]]:
     """Group rounds that are drawn as one: those of the same choice, of an agent whose rounds are single actions."""
     if len(trace) <= MANY_ROUNDS:
         return [[entry] for entry in trace]
-    legs: list[list[RoundRecord]] = []
-    for entry in trace:
-        last = legs[-1][-1] if legs else None
-        is_same = last is not None and _choice(last) == _choice(entry)
-        if last is not None and is_same and _time(last, len(trace) - 1) == _time(entry, len(trace) - 1):
-            legs[-1].append(entry)
-        else:
-            legs.append([entry])
-    return legs
+    runs = itertools.groupby(trace, lambda entry: (_choice(entry), _time(entry, len(trace) - 1)))
+    return [list(same) for _, same in runs]
 
 
 def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame) -> tuple[str, float]:

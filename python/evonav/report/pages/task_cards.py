@@ -115,19 +115,17 @@ def _facts(record: StageRecord) -> str:
 
 def filter_data(run: RecordedRun, task_id: str) -> dict[str, str]:
     """Return the `data-*` attributes of a task that the page's filters use."""
-    keys = [(agent, task_id, stage) for agent in run.agents for stage in range(1, run.num_stages[task_id] + 1)]
+    stages = range(1, run.num_stages[task_id] + 1)
+    keys = [(agent, task_id, stage) for agent in run.agents for stage in stages]
     outcomes = {key: run.outcomes[key] for key in keys if key in run.outcomes}
     states = {key: outcome.row.state for key, outcome in outcomes.items()}
-    num_disagreements = 0
-    for stage in range(1, run.num_stages[task_id] + 1):
-        found = {states.get((agent, task_id, stage)) for agent in run.agents}
-        num_disagreements += EndState.SUCCESS.value in found and len(found) > 1
+    ends = [{states.get((agent, task_id, stage)) for agent in run.agents} for stage in stages]
     causes = sorted({outcome.cause.name for outcome in outcomes.values() if outcome.cause is not None})
     categories = {outcome.category.lower() for outcome in outcomes.values()}
     return {
         "task": slug(task_id),
         "failures": str(sum(state != EndState.SUCCESS for state in states.values())),
-        "disagreements": str(num_disagreements),
+        "disagreements": str(sum(EndState.SUCCESS.value in end and len(end) > 1 for end in ends)),
         "causes": " ".join(causes),
         "words": " ".join([task_id.lower(), *sorted(categories)]),
     }

@@ -1,7 +1,7 @@
 """Draw plots with matplotlib: one function a kind of plot, and the room that each kind needs."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from evonav.drawing.svg import clean
@@ -9,7 +9,6 @@ from evonav.report.plots.specs import (
     BarPlot,
     ConfusionPlot,
     CurvePlot,
-    Gap,
     GapPlot,
     GroupPlot,
     Line,
@@ -68,18 +67,7 @@ def draw(panel: "SubFigure", plot: Plot) -> None:
     width_in = panel.bbox.width / panel.get_figure(root=True).dpi
     panel.suptitle(clean(plot.title), x=0.12 / width_in, ha="left", fontsize=LARGE, fontweight="bold", color=INK)
     axes = panel.subplots()
-    if isinstance(plot, GapPlot):
-        _draw_gaps(axes, plot)
-    elif isinstance(plot, ConfusionPlot):
-        _draw_confusions(axes, plot)
-    elif isinstance(plot, CurvePlot):
-        _draw_curves(axes, plot)
-    elif isinstance(plot, ScatterPlot):
-        _draw_dots(axes, plot)
-    elif isinstance(plot, BarPlot):
-        _draw_bars(axes, plot)
-    else:
-        _draw_groups(axes, plot)
+    _DRAWING[type(plot)](axes, plot)
     handles, names = axes.get_legend_handles_labels()
     if isinstance(plot, BarPlot):
         # Bars first, then what they are compared with.
@@ -96,7 +84,17 @@ def draw(panel: "SubFigure", plot: Plot) -> None:
 def _draw_gaps(axes: "Axes", plot: GapPlot) -> None:
     axes.axvline(0, color=SOFT, linewidth=0.8)
     for i, gap in enumerate(plot.gaps):
-        _draw_gap(axes, i, gap)
+        colour = COLOURS[0] if gap.is_emphasised else SOFT
+        if gap.interval is not None:
+            axes.plot(gap.interval, (i, i), color=colour)
+        _mark(axes, gap.value, i, colour, f"{gap.name}: {_value_text(gap.value, gap.interval, is_signed=True)}")
+        place: dict[str, Any] = {
+            "xycoords": ("axes fraction", "data"),
+            "va": "center",
+            "color": SOFT,
+            "fontsize": SMALL,
+        }
+        axes.annotate(clean(gap.detail), (1.02, i), **place)
     names = axes.set_yticks(range(len(plot.gaps)), [clean(gap.name) for gap in plot.gaps])
     for tick, gap in zip(names, plot.gaps, strict=True):
         tick.label1.set_fontweight("bold" if gap.is_emphasised else "normal")
@@ -116,15 +114,6 @@ def _draw_gaps(axes: "Axes", plot: GapPlot) -> None:
             color=SOFT,
             fontsize=SMALL,
         )
-
-
-def _draw_gap(axes: "Axes", row: int, gap: Gap) -> None:
-    colour = COLOURS[0] if gap.is_emphasised else SOFT
-    if gap.interval is not None:
-        axes.plot(gap.interval, (row, row), color=colour)
-    _mark(axes, gap.value, row, colour, f"{gap.name}: {_value_text(gap.value, gap.interval, is_signed=True)}")
-    place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "color": SOFT, "fontsize": SMALL}
-    axes.annotate(clean(gap.detail), (1.02, row), **place)
 
 
 def _draw_groups(axes: "Axes", plot: GroupPlot) -> None:
@@ -341,3 +330,13 @@ def _longest(texts: Iterable[str]) -> int:
 
 def _short(name: str) -> str:
     return clean(name if len(name) <= MAX_NAME else f"{name[: MAX_NAME - 1]}…")
+
+
+_DRAWING: dict[type[Plot], Callable[["Axes", Any], None]] = {
+    BarPlot: _draw_bars,
+    ConfusionPlot: _draw_confusions,
+    CurvePlot: _draw_curves,
+    GapPlot: _draw_gaps,
+    GroupPlot: _draw_groups,
+    ScatterPlot: _draw_dots,
+}

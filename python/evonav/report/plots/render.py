@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from markupsafe import Markup
@@ -57,10 +57,11 @@ def plot_elements(plots: Sequence[Plot], *, are_even: bool = False) -> list[Mark
 def _even_sizes(plots: Sequence[Plot]) -> list[tuple[float, float]]:
     sizes = [size_in(plot) for plot in plots]
     width_in = max([EVEN_WIDTH_IN, *(width for width, _ in sizes)])
-    heights_in: dict[bool, float] = {}
-    for plot, (_, height) in zip(plots, sizes, strict=True):
-        heights_in[isinstance(plot, GapPlot)] = max(height, heights_in.get(isinstance(plot, GapPlot), 0.0))
-    return [(width_in, heights_in[isinstance(plot, GapPlot)]) for plot in plots]
+    kinds = [isinstance(plot, GapPlot) for plot in plots]
+    heights_in = {
+        kind: max(height for one, (_, height) in zip(kinds, sizes, strict=True) if one is kind) for kind in kinds
+    }
+    return [(width_in, heights_in[kind]) for kind in kinds]
 
 
 def check_plot(path: Path) -> None:
@@ -87,15 +88,15 @@ def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
         StoreError: matplotlib is not installed, or the file cannot be written.
     """
     check_plot(path)
-    suffix = path.suffix.lower()
+    suffix, sizes = path.suffix.lower(), list(map(size_in, plots))
     if suffix == ".svg":
-        data = (_svg(plots, list(map(size_in, plots)), columns, f"<style>{plot_css()}</style>") + "\n").encode()
-    else:
+        return write_atomically(path, _svg(plots, sizes, columns, f"<style>{plot_css()}</style>") + "\n")
+    drawn = BytesIO()
+    with _figure(plots, sizes, columns) as figure:
         # Without dates, the same plots are the same file.
         metadata = {"CreationDate": None} if suffix == ".pdf" else {}
-        with _figure(plots, list(map(size_in, plots)), columns) as figure:
-            data = _saved(figure, format=suffix[1:], dpi=200, metadata=metadata)
-    return write_atomically(path, data)
+        figure.savefig(drawn, format=suffix[1:], dpi=200, metadata=metadata)
+    return write_atomically(path, drawn.getvalue())
 
 
 @contextmanager
@@ -119,15 +120,11 @@ def _figure(plots: Sequence[Plot], sizes: Sequence[tuple[float, float]], columns
         yield figure
 
 
-def _saved(figure: "Figure", **options: Any) -> bytes:  # noqa: ANN401 - options of matplotlib
-    buffer = BytesIO()
-    figure.savefig(buffer, **options)
-    return buffer.getvalue()
-
-
 def _svg(plots: Sequence[Plot], sizes: Sequence[tuple[float, float]], columns: int, style: str) -> str:
+    drawn = BytesIO()
     with _figure(plots, sizes, columns) as figure:
-        root = ElementTree.fromstring(_saved(figure, format="svg", metadata={"Date": None}))  # noqa: S314 - our own
+        figure.savefig(drawn, format="svg", metadata={"Date": None})
+    root = ElementTree.fromstring(drawn.getvalue())  # noqa: S314 - our own
     tooltips: list[str] = []
     content = "".join(_element(child, tooltips) for child in root)
     width = _PX_PER_POINT * float(root.attrib["viewBox"].split()[2])
