@@ -214,13 +214,6 @@ def test_a_row_that_is_no_record_is_an_error_that_names_the_run(write_run: Write
         write_report(run_dir)
 
 
-def test_places_off_the_planet_do_not_stop_a_report(tmp_path: Path) -> None:
-    record = stage_record("fu", "t", 1, EndState.FAILURE)
-    target = record.target.model_copy(update={"position_m": (1e9, 0.0, -1e9)})
-    run_dir = record_run(tmp_path, [record.model_copy(update={"target": target})], {"t": 1}, ["fu"])
-    HtmlPage(write_report(run_dir))
-
-
 def failing(record: StageRecord, counts: list[int], **changes: object) -> StageRecord:
     """The record with a counter of failed decisions, cumulative over the task, in each of its rounds."""
     trace = tuple(

@@ -80,10 +80,6 @@ class Submission(Record):
     summary: dict[str, Any]
     """The claimed scores: `summary.json` of these agents."""
 
-    def to_json(self) -> str:
-        """Return the header as one line of JSON."""
-        return self.model_dump_json()
-
 
 _Line = TypeVar("_Line", Submission, StageRecord)
 

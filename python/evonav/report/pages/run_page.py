@@ -109,9 +109,10 @@ def _tasks(
     }
     macros: Any = page_environment().get_template("macros.html.j2").module
     for i, task in enumerate(run.tasks()):
-        for record in task.records.values() if map_dir is not None else ():
-            drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
-            write_atomically(map_dir / map_name(record), drawn)
+        if map_dir is not None:
+            for record in task.records.values():
+                drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
+                write_atomically(map_dir / map_name(record), drawn)
         view = task_view(run, task, f"h{i}", hrefs)
         section = macros.task_section(view)
         yield view, packed(section) if is_packed else section, is_packed
