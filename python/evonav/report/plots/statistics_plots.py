@@ -57,7 +57,7 @@ def _plot(
         groups=one.names[:most],
         series=tuple(series),
         x_label=x_label,
-        references=tuple(map(_percentage, references)),
+        references=tuple(None if share is None else 100 * share for share in references),
         band=band,
         band_label="the paper's median",
         notes=notes,
@@ -123,10 +123,6 @@ def _series(name: str, shares: Sequence[float], intervals: Sequence[Interval | N
     percentages = tuple(100 * share for share in shares)
     ends = tuple(scaled(end) for end in intervals)
     return Series(name, percentages, ends or (None,) * len(percentages))
-
-
-def _percentage(share: float | None) -> float | None:
-    return None if share is None else 100 * share
 
 
 def _percent(estimate: Estimate | None) -> str:
