@@ -88,20 +88,12 @@ def test_an_honest_pack_is_accepted(packed: Path, tasks: list[TaskFile]) -> None
     assert verdict.is_accepted, verdict.checks
 
 
-def earlier_round(row: Row) -> None:
-    row["during"]["round"] += 1
+def during(**fields: Any) -> Callable[[Row], None]:
+    def forge(row: Row) -> None:
+        row["during"] |= fields
+        rescored(row)
 
-
-def claimed_not_reached(row: Row) -> None:
-    row["during"] |= {
-        "at_round": None,
-        "target_position_m": None,
-        "is_target_relocated": False,
-        "path_before_m": None,
-        "reference_after_m": None,
-        "skipped_ids": [],
-    }
-    rescored(row)
+    return forge
 
 
 def another_move(row: Row) -> None:
@@ -114,27 +106,25 @@ def no_change(row: Row) -> None:
 
 
 def target_at_the_end(row: Row) -> None:
-    end = row["terminal"]
-    row["during"]["target_position_m"] = [end["x_m"], 0.5, end["z_m"]]
-    rescored(row)
+    during(target_position_m=[row["terminal"]["x_m"], 0.5, row["terminal"]["z_m"]])(row)
 
 
-def stranger_in_the_way(row: Row) -> None:
-    row["during"]["skipped_ids"] = ["nobody"]
-
-
-def shorter_path_before(row: Row) -> None:
-    row["during"]["path_before_m"] += 0.5
-
-
+NOT_REACHED = {
+    "at_round": None,
+    "target_position_m": None,
+    "is_target_relocated": False,
+    "path_before_m": None,
+    "reference_after_m": None,
+    "skipped_ids": [],
+}
 FORGERIES: dict[str, tuple[Callable[[Row], None], str]] = {
-    "another round": (earlier_round, "during is another than the task's"),
-    "not reached": (claimed_not_reached, r"during\.at_round"),
+    "another round": (during(round=40), "during is another than the task's"),
+    "not reached": (during(**NOT_REACHED), r"during\.at_round"),
     "another move": (another_move, "during is another than the task's"),
     "no change": (no_change, "during is another than the task's"),
     "target at the end": (target_at_the_end, r"during\.target_position_m"),
-    "a stranger in the way": (stranger_in_the_way, r"during\.skipped_ids"),
-    "another path before": (shorter_path_before, r"during\.path_before_m"),
+    "a stranger in the way": (during(skipped_ids=["nobody"]), r"during\.skipped_ids"),
+    "another path before": (during(path_before_m=0.125), r"during\.path_before_m"),
 }
 
 

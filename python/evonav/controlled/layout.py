@@ -80,7 +80,7 @@ class ControlledRecord(Record):
 
     @property
     def kind(self) -> Kind:
-        """What the arms differ in."""
+        """Kind of difference between the arms."""
         return self.options.kind
 
     @property
