@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scripted_model import Scripted
+from scripted_model import going
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
@@ -16,9 +16,7 @@ from evonav.memory import ObjectMap
 
 
 def test_fail_then_update_asks_once_an_arrival_and_goes_on_until_the_budget_ends():
-    model = Scripted(
-        lambda question: "no" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0"
-    )
+    model = going(verify="no")
     (record,) = run(FailThenUpdate(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=12))
     counters = record.trace[-1].counters
     assert not record.has_stopped
@@ -68,9 +66,7 @@ def test_fail_then_update_deletes_nothing_where_something_hides_the_place():
 
 @pytest.mark.parametrize("meaning", ["yes", "no"])
 def test_verification_without_an_answer_is_taken_for_yes_or_no(meaning):
-    model = Scripted(
-        lambda question: "perhaps" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0"
-    )
+    model = going(verify="perhaps")
     agent = FailThenUpdate(FailThenUpdateConfig(unanswered_means=meaning), model)
     (record,) = run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=12))
     counters = record.trace[-1].counters
@@ -84,10 +80,7 @@ def test_verification_without_an_answer_is_taken_for_yes_or_no(meaning):
 
 @pytest.mark.parametrize(("views", "num_views"), [("facing", 1), ("all", 3)])
 def test_verification_is_asked_at_arrival_alone_on_the_facing_view_or_on_all(views, num_views):
-    model = Scripted(
-        lambda question: "yes" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0",
-        needs_images=True,
-    )
+    model = going(verify="yes", needs_images=True)
     agent = FailThenUpdate(FailThenUpdateConfig(verify_views=views), model)
     (record,) = run(agent, stage_case(1, "Mug|1"))
     verified = [question for question in model.questions if question.kind == "verify"]
@@ -100,12 +93,9 @@ def test_verification_is_asked_at_arrival_alone_on_the_facing_view_or_on_all(vie
 
 
 def test_what_was_rejected_and_came_up_again_can_be_hidden_for_the_rest_of_the_stage():
-    def answer(question):
-        return "no" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0"
-
     def rejections(limit):
         """How many entries were rejected by stage, and how many of them were offered again in theirs."""
-        model = Scripted(answer)
+        model = going(verify="no")
         agent = FailThenUpdate(FailThenUpdateConfig(hide_after_rejections=limit), model)
         run(agent, stage_case(1, "Mug|1"), stage_case(2, "Mug|1"), protocol=ProtocolConfig(max_rounds=40))
         rejected, num_again = {1: [], 2: []}, 0

@@ -11,20 +11,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.run.components import check_agent_names
 
-FORGETFUL = (
-    "fu",
-    "stage-reset",
-    "ftu",
-    "pro",
-    "evolving",
-    "dynamem",
-    "dualmap",
-    "khronos-fu",
-    "vlfm",
-    "onemap",
-    "3d-mem",
-    "msgnav",
-)
+FORGETFUL = sorted(set(BUILT_IN) - {"unigoal", "stay-still", "random-walk"})
 
 
 def test_agents_with_object_entries_of_ours_take_a_rule() -> None:

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from cup_views import a_view
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
-from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
+from evonav.sensors.observation import MapFrame, Observation
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -13,10 +14,8 @@ from evonav.world.simulator import Intrinsics
 def view_of(free=(), blocked=()):
     """A view that saw these cells."""
     cells = [np.array(sorted(part), np.int32).reshape(-1, 2) for part in (free, blocked)]
-    nothing = Detections(np.full((2, 2), -1, np.int32), (), np.zeros(0, np.float32))
-    pose = Pose(0.05, 1.5, 0.05, 0.0)
-    depth_m = np.full((2, 2), np.inf, np.float32)
-    return View(pose, Intrinsics(2, 2, 1.0), depth_m, nothing, VisibleOccupancy(*cells))
+    pose, depth_m = Pose(0.05, 1.5, 0.05, 0.0), np.full((2, 2), np.inf)
+    return a_view(depth_m, pose=pose, free=cells[0], blocked=cells[1], intrinsics=Intrinsics(2, 2, 1.0))
 
 
 def saw(*views):

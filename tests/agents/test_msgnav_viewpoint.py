@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from cup_views import a_view
 
 from evonav.agents.msgnav.viewpoint import visible_viewpoint
 from evonav.memory import ObjectMap
-from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -54,10 +55,5 @@ def view_of(points_m):
     rows = np.floor(100.0 - (points_m[:, 1] - 1.0) / distance_m * 100.0).astype(int)
     depth_m[rows.min() : rows.max(), cols.min() : cols.max()] = distance_m
     masks[rows.min() : rows.max(), cols.min() : cols.max()] = 0
-    return View(
-        pose=Pose(0.0, 1.0, 2.0, np.pi, 0.0),
-        intrinsics=Intrinsics(200, 200, np.pi / 2),
-        depth_m=depth_m,
-        detections=Detections(masks, ("Screen",), np.ones(1, np.float32)),
-        occupancy=VisibleOccupancy(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32)),
-    )
+    pose, intrinsics = Pose(0.0, 1.0, 2.0, np.pi, 0.0), Intrinsics(200, 200, np.pi / 2)
+    return a_view(depth_m, masks, ("Screen",), pose=pose, intrinsics=intrinsics)

@@ -91,14 +91,6 @@ def test_what_names_no_candidate_is_invalid(text):
     assert caught.value.text == text
 
 
-def test_every_choice_can_be_said_and_is_in_the_schema():
-    choices = SHOWN.choices()
-    assert len(choices) == 5
-    assert [SHOWN.parse(SHOWN.answer_text(choice)) for choice in choices] == choices
-    assert SHOWN.answer_schema()["enum"] == [SHOWN.answer_text(choice) for choice in choices]
-    assert SHOWN.alternatives(choices[2]) == [*choices[:2], *choices[3:]]
-
-
 def test_the_prompt_shows_the_heading_view_then_snapshots_with_crops_then_frontiers():
     (turn,) = SHOWN.prompt().turns
     shades = [int(part.pixels[0, 0, 0]) for part in turn.parts if isinstance(part, Picture)]
@@ -131,15 +123,6 @@ def test_the_prefilter_wants_a_name_or_none():
         with pytest.raises(AnswerError) as caught:
             prefilter().parse(text)
         assert caught.value.fault == "invalid"
-
-
-@given(st.lists(st.sampled_from(CLASSES), unique=True))
-def test_prefilter_answers_can_be_said(names):
-    question, answer = prefilter(), tuple(names)
-    assert question.parse(question.answer_text(answer)) == answer
-    assert answer not in question.alternatives(answer)
-    for other in question.alternatives(answer):
-        assert question.parse(question.answer_text(other)) == other
 
 
 def test_rules_keep_the_classes_that_the_instruction_speaks_of_then_those_of_its_room():

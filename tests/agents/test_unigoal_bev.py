@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from cup_views import a_view
 from numpy.typing import NDArray
 
 from evonav.agents.unigoal.bev import BevConfig, BevMap
 from evonav.errors import InvalidArgumentError
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.sensors.observation import Detections, View, VisibleOccupancy
+from evonav.sensors.observation import View
 from evonav.world.camera import unproject
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -35,9 +36,7 @@ def floor_and_box(yaw_rad: float, horizon_rad: float, box: tuple[float, float, f
             ends = np.stack([(low - (0.0, CAMERA_M, 0.0)) / rays, (high - (0.0, CAMERA_M, 0.0)) / rays])
             enter, leave = ends.min(axis=0).max(axis=-1), ends.max(axis=0).min(axis=-1)
             depth = np.where((enter < leave) & (enter > 0), np.minimum(depth, enter), depth)
-    nothing = np.empty((0, 2), np.int32)
-    found = Detections(np.full((300, 300), -1, np.int32), (), np.empty(0, np.float32))
-    return View(camera, INTRINSICS, depth.astype(np.float32), found, VisibleOccupancy(nothing, nothing))
+    return a_view(depth, pose=camera, intrinsics=INTRINSICS)
 
 
 def where(cells: NDArray[np.bool_], bev: BevMap) -> NDArray[np.float64]:
@@ -64,16 +63,6 @@ def test_a_table_is_an_obstacle_where_it_stands(yaw_deg: float, horizon_deg: flo
     assert bev.cells[free] == (FREE if horizon_deg else UNKNOWN)
     assert bev.cells[0, 0] == UNKNOWN
     assert bev.cells[tuple(np.argwhere(bev.core.obstacles)[0])] == BLOCKED
-
-
-def test_a_table_that_was_moved_away_stays_on_the_map() -> None:
-    bev = BevMap((0.0, 0.0), 0)
-    bev.integrate(floor_and_box(0.0, 0.5, (-0.4, 0.4, 1.6, 2.4)))
-    before = bev.core.obstacles
-    bev.integrate(floor_and_box(0.0, 0.5, None))
-    assert before.any()
-    assert np.array_equal(bev.core.obstacles, before)
-    assert bev.core.explored[before].all()
 
 
 def test_categories_count_points_among_the_obstacles_and_keep_their_maximum() -> None:

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cup_views import a_view
 from toy_house import ToySimulator, house_json
 
 from evonav.agents.unigoal.bev import BevMap
 from evonav.agents.unigoal.goals import Glimpse, GoalWatch, largest_detection
 from evonav.agents.unigoal.planner import UniGoalPlanner
-from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.vocabulary import MAP_CATEGORIES
 from evonav.world.pose import Pose
 
@@ -24,9 +24,7 @@ def look(labels, boxes, pose=START):
     masks = np.full(frame.depth_m.shape, -1, np.int32)
     for index, (rows, cols) in enumerate(boxes):
         masks[slice(*rows), slice(*cols)] = index
-    found = Detections(masks, tuple(labels), np.ones(len(labels), np.float32))
-    nothing = np.empty((0, 2), np.int32)
-    return View(frame.pose, frame.intrinsics, frame.depth_m, found, VisibleOccupancy(nothing, nothing))
+    return a_view(frame.depth_m, masks, tuple(labels), pose=frame.pose, intrinsics=frame.intrinsics)
 
 
 LEFT, RIGHT = ((30, 40), (2, 14)), ((30, 50), (40, 62))

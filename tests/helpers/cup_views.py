@@ -14,12 +14,14 @@ WALL_M = 5.0
 NOTHING = np.empty((0, 2), np.int32)
 
 
-def a_view(depth_m, masks=None, labels=(), *, pose=None, free=NOTHING, blocked=NOTHING, features=None):
+def a_view(
+    depth_m, masks=None, labels=(), *, pose=None, free=NOTHING, blocked=NOTHING, features=None, intrinsics=INTRINSICS
+):
     """A view 1.575 m above the floor, looking along +z."""
     masks = np.full(depth_m.shape, -1, np.int32) if masks is None else masks
     found = Detections(masks, labels, np.ones(len(labels), np.float32), features)
     occupancy = VisibleOccupancy(np.asarray(free, np.int32), np.asarray(blocked, np.int32))
-    return View(pose or Pose(0.0, 1.575, 0.0, 0.0, 0.0), INTRINSICS, depth_m.astype(np.float32), found, occupancy)
+    return View(pose or Pose(0.0, 1.575, 0.0, 0.0, 0.0), intrinsics, depth_m.astype(np.float32), found, occupancy)
 
 
 def a_cup(label="Cup", col=20):

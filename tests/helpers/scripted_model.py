@@ -35,6 +35,16 @@ class Scripted(DecisionModel):
         return Reply(question.parse(text), text)
 
 
+def going(*, needs_images: bool = False, **said: str) -> Scripted:
+    """Return a model that goes to the first object, else to the first frontier; on other kinds it says the words."""
+
+    def script(question: Question[Any]) -> str:
+        words = said.get(question.kind)
+        return words or ("Object 0" if question.objects else "Frontier 0")  # type: ignore[attr-defined]
+
+    return Scripted(script, needs_images=needs_images)
+
+
 def scripted(**said: str | Callable[[Question[Any]], str]) -> Scripted:
     """Return the text matcher, but for questions of the kinds given: words, or a function of the question."""
     rules = TextMatch()

@@ -40,16 +40,26 @@ def belief_of(agent):
     )
 
 
-def rounds_of(agent, *stages):
-    """Return the records, and each round's stage, belief, explanation and action."""
+def noted(agent):
+    """Return a list to which each round of an agent is added: stage, observation, action, and what it then believes."""
     rounds, numbers = [], []
     act, begin_stage = agent.act, agent.begin_stage
 
     def noting(observation):
-        action = act(observation)
-        rounds.append((numbers[-1], belief_of(agent), agent.explain(), action))
+        action, said = act(observation), agent.explain()
+        belief = belief_of(agent)
+        rounds.append(
+            SimpleNamespace(stage=numbers[-1], observation=observation, action=action, belief=belief, said=said)
+        )
         return action
 
     agent.act = noting
     agent.begin_stage = lambda stage: numbers.append(stage.stage) or begin_stage(stage)
-    return run(agent, *stages), rounds
+    return rounds
+
+
+def rounds_of(agent, *stages, **options):
+    """Return the records, and each round's stage, belief, explanation and action."""
+    rounds = noted(agent)
+    records = run(agent, *stages, **options)
+    return records, [(one.stage, one.belief, one.said, one.action) for one in rounds]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from evonav_studies.early_stop import EarlyStopConfig, FailThenUpdateEarlyStop
-from scripted_model import Scripted
+from scripted_model import going
 from toy_episode import rounds_of, run
 from toy_house import moved_table_stages, stage_case
 
@@ -20,13 +20,8 @@ from evonav.tasks.language import COLOURS
 from evonav.tasks.public import Goal
 
 
-def first_that_is_offered(question, **said):
-    """Say what is given for kinds of questions; else go to the first object, or frontier."""
-    return said.get(question.kind) or ("Object 0" if question.objects else "Frontier 0")
-
-
 def test_an_object_that_contradicts_the_goal_is_set_aside_and_stays_in_memory():
-    model = Scripted(lambda question: first_that_is_offered(question, verify="yes", identity="no"))
+    model = going(verify="yes", identity="no")
     agent = FailThenUpdateIdentity(decision=model)
     records, told = rounds_of(agent, stage_case(1, "Fridge|1"), stage_case(2, "Fridge|1"))
     by_stage = {stage: [d for number, _, d, _ in told if number == stage] for stage in (1, 2)}
@@ -49,7 +44,7 @@ def test_an_object_that_contradicts_the_goal_is_set_aside_and_stays_in_memory():
 
 
 def test_what_was_set_aside_comes_back_when_nothing_else_is_left():
-    model = Scripted(lambda question: first_that_is_offered(question, verify="yes", identity="no"))
+    model = going(verify="yes", identity="no")
     (record,) = run(FailThenUpdateIdentity(decision=model), stage_case(1, "Mug|1"))
     rounds_left = [q.num_rounds_left for q in model.questions if q.kind == "choose"]
     kinds = [question.kind for question in model.questions]
@@ -61,7 +56,7 @@ def test_what_was_set_aside_comes_back_when_nothing_else_is_left():
 
 
 def test_fail_then_update_asks_nothing_about_identity():
-    model = Scripted(lambda question: first_that_is_offered(question, verify="yes"))
+    model = going(verify="yes")
     (record,) = run(FailThenUpdate(decision=model), stage_case(1, "Mug|1"))
     assert "identity" not in {question.kind for question in model.questions}
     assert "set_aside" not in record.trace[-1].counters

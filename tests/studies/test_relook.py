@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cup_views import a_view
 from evonav_studies.relook import FailThenUpdateRelook, RelookConfig, place_from_another_side, places_around
 from hypothesis import given
 from hypothesis import strategies as st
-from scripted_model import Scripted
+from scripted_model import going
 from toy_episode import run
 from toy_house import moved_table_stages, stage_case
 
@@ -17,9 +18,8 @@ from evonav.agents.navigator import NavigationTarget, Navigator, NavigatorConfig
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
-from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
-from evonav.world.simulator import Intrinsics
 
 FRAME = MapFrame(rows=40, cols=40, cell_m=0.1, corner_m=(-1.0, 3.0))
 MIDDLE_M = (1.0, 5.0)
@@ -94,11 +94,9 @@ def knowing_a_mug():
     depth_m, masks = np.full((60, 60), np.inf, np.float32), np.full((60, 60), -1, np.int32)
     depth_m[20:40, 20:40], masks[20:40, 20:40] = 2.0 + np.linspace(0, 0.3, 20, dtype=np.float32), 0
     free = np.ascontiguousarray(np.argwhere(np.ones((60, 60))), np.int32)
-    occupancy = VisibleOccupancy(free, np.zeros((0, 2), np.int32))
-    found = Detections(masks, ("Mug",), np.ones(1, np.float32))
-    pose, intrinsics = Pose(0.0, 1.575, 0.0, 0.0, 0.0), Intrinsics(60, 60, math.pi / 2)
-    navigator.objects.update(View(pose, intrinsics, depth_m, found, occupancy))
-    navigator.explorer.map.integrate(occupancy, (0.0, 0.0))
+    view = a_view(depth_m, masks, ("Mug",), free=free)
+    navigator.objects.update(view)
+    navigator.explorer.map.integrate(view.occupancy, (0.0, 0.0))
     (entry,) = navigator.objects.entries
     return navigator, entry
 
@@ -245,10 +243,7 @@ def test_no_second_look_is_begun_that_the_rounds_left_do_not_allow():
 
 
 def test_the_question_is_asked_once_and_shows_both_looks():
-    model = Scripted(
-        lambda question: "yes" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0",
-        needs_images=True,
-    )
+    model = going(verify="yes", needs_images=True)
     agent = FailThenUpdateRelook(decision=model)
     hide_arrivals(agent, 1, 1)
     (record,) = run(agent, stage_case(1, "Mug|1"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cup_views import GONE, a_cup
 from scripted_model import scripted
-from toy_episode import run
+from toy_episode import rounds_of, run
 from toy_house import OBJECTS, stage_case
 
 from evonav.agents.rivals.dualmap import AbstractMap, DualMap, DualMapConfig, main_plane_m
@@ -120,20 +120,6 @@ def test_a_new_goal_begins_a_new_local_map():
     assert watching.known == ([], ["Sofa"])
 
 
-def told_by(agent, *stages):
-    """Return the records of an episode with images of 120 pixels, and the stage and diagnostics of each round."""
-    told, numbers = [], []
-    act, begin_stage = agent.act, agent.begin_stage
-
-    def noting(observation):
-        action = act(observation)
-        told.append((numbers[-1], agent.explain()))
-        return action
-
-    agent.act, agent.begin_stage = noting, lambda goal: numbers.append(goal.stage) or begin_stage(goal)
-    return run(agent, *stages, size_px=120), told
-
-
 def mug_on_table(**moves):
     """The mug is seen on the table in stage 1, and is the goal of stage 3."""
     return (
@@ -145,23 +131,24 @@ def mug_on_table(**moves):
 
 def test_it_goes_to_the_anchor_on_which_the_goal_lay_and_finds_it_there():
     agent = DualMap()
-    records, told = told_by(agent, *mug_on_table())
+    records, told = rounds_of(agent, *mug_on_table(), size_px=120)
     assert records[-1].state == "success"
     contents = {one.label: [content.label for content in one.contents] for one in agent._abstract.anchors.values()}
     assert "Mug" in contents["DiningTable"]
-    last = [diagnostics for stage, diagnostics in told if stage == 3]
+    last = [said for stage, _, said, _ in told if stage == 3]
     assert last[-1].counters["anchors_failed"] == 0
 
 
 def test_a_failed_anchor_is_ignored_for_this_goal_and_open_again_for_the_next():
     away = {"Mug|1": (4.6, 1.07, 4.6)}  # on the dresser, in the other room
     agent = DualMap()
-    _, rounds = told_by(agent, *mug_on_table(**away), stage_case(4, "Fridge|1", moves=away, before=away))
-    told = {stage: diagnostics.details.get("failed_anchors", []) for stage, diagnostics in rounds}
+    stages = (*mug_on_table(**away), stage_case(4, "Fridge|1", moves=away, before=away))
+    _, rounds = rounds_of(agent, *stages, size_px=120)
+    told = {stage: said.details.get("failed_anchors", []) for stage, _, said, _ in rounds}
     table_id = next(key for key, one in agent._abstract.anchors.items() if one.label == "DiningTable")
     assert table_id in told[3]
     assert told[4] == []
-    chosen = [diagnostics.choice for stage, diagnostics in rounds if stage == 3]
+    chosen = [said.choice for stage, _, said, _ in rounds if stage == 3]
     assert any(choice.startswith(("frontier", "object")) for choice in chosen)
 
 

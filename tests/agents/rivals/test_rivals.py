@@ -36,7 +36,7 @@ def test_it_runs_with_rules_that_look(name):
     assert [record.state for record in records] == ["success"] * 2
 
 
-@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("name", [*RIVALS, "pro"])
 def test_equal_seeds_give_equal_rounds(name):
     def told():
         _, rounds = rounds_of(new_agent(agent_factory(name)), *moved_table_stages())
