@@ -104,19 +104,18 @@ class ViewStore:
         detections = view.detections
         boxes = boxes_of(detections)
         named = [tuple(row) for row in colour_shares(view).tolist()] if self._names_colours else [None] * len(boxes)
-        around = self._layouts(view, boxes) if self._keeps_layouts else [None] * len(boxes)
+        around: Sequence[Layout | None] = [None] * len(boxes)
+        if self._keeps_layouts:
+            if view.rgb is None:
+                raise InvalidArgumentError("view.rgb is None: ask for colours with `SensorConfig(needs_rgb=True)`")
+            middles_px = [((left + right) / 2.0, (top + bottom) / 2.0) for _, (left, top, right, bottom) in boxes]
+            around = layouts(view.rgb, middles_px)
         return tuple(
             Seen(entry_id, label, confidence, area_px, box_px, colours, layout)
             for entry_id, label, confidence, (area_px, box_px), colours, layout in zip(
                 entry_ids, detections.labels, detections.confidences.tolist(), boxes, named, around, strict=True
             )
         )
-
-    def _layouts(self, view: View, boxes: Sequence[tuple[int, Box]]) -> Sequence[Layout]:
-        if view.rgb is None:
-            raise InvalidArgumentError("view.rgb is None: ask for colours with `SensorConfig(needs_rgb=True)`")
-        middles_px = [((left + right) / 2.0, (top + bottom) / 2.0) for _, (left, top, right, bottom) in boxes]
-        return layouts(view.rgb, middles_px)
 
     def follow(self, merged: Mapping[int, int] | Sequence[tuple[int, int]]) -> None:
         """Record that entries were absorbed by others; pairs are those of `ObjectUpdate.merged`."""

@@ -238,20 +238,17 @@ TIME_TOLERANCE = 1.25
 _EPSILON = 1e-9
 
 
-def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASELINE) -> list[BeforeAfter]:
+def against(now: BenchmarkResult, before: BenchmarkResult) -> list[BeforeAfter]:
     """Compare a result with an earlier one, memory by memory.
 
     A figure is worse if the interval of its difference lies on the bad side of zero. A time counts only relative to the
     baseline of its own run, and only beyond `TIME_TOLERANCE`; without the baseline in both results, times are left out.
 
-    Args:
-        baseline: Name of the memory that times are divided by.
-
     Returns:
         All figures that both results have, of the memories in both.
     """
     found: list[BeforeAfter] = []
-    bases = [one.memories.get(baseline) for one in (now, before)]
+    bases = [one.memories.get(BASELINE) for one in (now, before)]
     for memory, streams in now.memories.items():
         if (earlier := before.memories.get(memory)) is None:
             continue
@@ -259,7 +256,7 @@ def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASEL
         ours, theirs = paired(streams, earlier)
         if ours:
             found += _figures(memory, ours, theirs)
-        if bases[0] is not None and bases[1] is not None and memory != baseline:
+        if bases[0] is not None and bases[1] is not None and memory != BASELINE:
             found += _times(memory, ratios(ours, bases[0]), ratios(theirs, bases[1]))
     return found
 
@@ -267,7 +264,7 @@ def against(now: BenchmarkResult, before: BenchmarkResult, baseline: str = BASEL
 def _failures(memory: str, now: Streams, before: Streams) -> Iterator[BeforeAfter]:
     both = {stream.stream for stream in now} & {stream.stream for stream in before}
     old, new = (sum(one.stream in both and one.failure is not None for one in streams) for streams in (before, now))
-    yield BeforeAfter(f"{memory}: failed_streams", old, new, new > old, new < old)
+    yield BeforeAfter(f"{memory}: failed_streams", old, new, new > old)
 
 
 def _figures(memory: str, ours: Streams, theirs: Streams) -> Iterator[BeforeAfter]:
@@ -294,8 +291,6 @@ def _difference(
     assert old.value is not None
     if new.value == old.value:  # also of two infinite ones
         return BeforeAfter(name, old.value, new.value, is_worse=False)
-    ci95 = new.minus(old).ci95
-    low, high = ci95 if ci95 is not None else (new.value - old.value,) * 2
-    is_up, is_down = is_large and low > _EPSILON, is_large and high < -_EPSILON
-    is_worse, is_better = (is_down, is_up) if is_higher_better else (is_up, is_down)
-    return BeforeAfter(name, old.value, new.value, is_worse, is_better, ci95)
+    low, high = new.minus(old).ci95 or (new.value - old.value,) * 2
+    is_worse = is_large and (high < -_EPSILON if is_higher_better else low > _EPSILON)
+    return BeforeAfter(name, old.value, new.value, is_worse)

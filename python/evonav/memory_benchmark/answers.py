@@ -61,11 +61,6 @@ class CheckedEntries:
         return self.numbers[:, :3]
 
     @property
-    def sizes_m(self) -> NDArray[np.float64]:
-        """`(N, 3)` edges of the boxes."""
-        return self.numbers[:, 3:6]
-
-    @property
     def p_present(self) -> NDArray[np.float64]:
         """`(N,)` probabilities that the objects are still there, NaN where the memory does not say."""
         column: NDArray[np.float64] = self.numbers[:, 7]

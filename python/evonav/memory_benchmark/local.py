@@ -2,12 +2,11 @@
 
 import base64
 import json
-import os
+import mmap
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -149,14 +148,9 @@ def _get(memory: object, name: str) -> object:
 def resident_bytes() -> int | None:
     """Return the resident memory of this process; `None` where the system does not report it."""
     try:
-        return int(Path("/proc/self/statm").read_bytes().split()[1]) * _page_bytes()
+        return int(Path("/proc/self/statm").read_bytes().split()[1]) * mmap.PAGESIZE
     except (OSError, IndexError, ValueError):
         return None
-
-
-@cache
-def _page_bytes() -> int:
-    return os.sysconf("SC_PAGE_SIZE")
 
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:

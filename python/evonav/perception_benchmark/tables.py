@@ -23,15 +23,78 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
     tables = [
         _headline(found),
         _differences(found),
-        _parts(found),
+        _table(
+            "Places and labels apart",
+            _overall(found),
+            {
+                "located": ("located", {}),
+                "label right": ("labelled", {}),
+                "mean IoU": ("iou", {}),
+                "places alone": ("ap50_located", {}),
+            },
+            "In %. Located: objects at whose place something is told (IoU 0.5), whatever its label. Label right, mean "
+            "IoU: of those. Places alone: AP50 if all labels were right.",
+        ),
         *(_by_group(found, by, name) for by, name in (("distance", "distance"), ("size", "size in the image"))),
-        _by_outline(found),
+        _table(
+            "Recall by how much is in the way",
+            ((one.perception, {name: of["recall"] for name, of in one.groups["outline"].items()}) for one in found),
+            {name: (name, WITH_N) for name in found[0].groups["outline"]},
+            "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border.",
+        ),
         _categories(found, MAX_CATEGORIES if is_brief else None),
         _confusions(found, MAX_CONFUSIONS if is_brief else 4 * MAX_CONFUSIONS),
-        _memory(found),
-        _staleness(found),
-        _beliefs(found),
-        _features(found),
+        _table(
+            "The memory of objects that comes of it",
+            ((one.perception, one.memory) for one in found),
+            {
+                "entries": ("entries", {"scale": 1}),
+                "objects seen": ("seen", {"scale": 1}),
+                "precision %": ("memory_precision", {}),
+                "recall %": ("memory_recall", {}),
+                "error m": ("position_error_m", TWO_DIGITS),
+                "surplus %": ("surplus", {}),
+                "wrong label %": ("wrong_label", {}),
+                "phantoms %": ("phantoms", {}),
+            },
+            "After the first house's tour, a house. Precision: an object of the entry's label stands within 0.3 m of "
+            "it; recall: of objects seen from at most 3.5 m. Error: middle to middle, of entries with their object's "
+            "label.",
+            "Surplus: entries beyond an object's first, per object; wrong label: of entries with an object; phantoms: "
+            "most of the entry's detections were of no object.",
+        ),
+        _table(
+            "Stale entries in the next house",
+            ((one.perception, one.memory) for one in found if one.memory["stale_at_start"].n),
+            {"as it begins": ("stale_at_start", WITH_N), "after its tour": ("stale_after_tour", WITH_N)},
+            "Entries that were right in the house before and are not in this one; in % of all entries (n).",
+        ),
+        _table(
+            "Confidence, depth and pose",
+            _overall(found),
+            {
+                "ECE %": ("ece", {}),
+                "depth error %": ("depth_relative", {}),
+                "depth RMSE m": ("depth_rmse_m", THREE_DIGITS),
+                "depth lost %": ("depth_lost", {}),
+                "offset m": ("pose_offset_m", THREE_DIGITS),
+                "turn °": ("pose_turn_deg", TWO_DIGITS),
+            },
+            "ECE: mean gap between confidence and precision, in tenths of confidence. Depth error: mean of |error| / "
+            "depth.",
+        ),
+        _table(
+            "Cosines of features",
+            _overall([one for one in found if one.cosines]),
+            {
+                "same object": ("cosine_same_object", THREE_DIGITS),
+                "same category": ("cosine_same_category", THREE_DIGITS),
+                "other": ("cosine_other", THREE_DIGITS),
+                "its perception": ("cosine_text_own", THREE_DIGITS),
+                "other words": ("cosine_text_other", THREE_DIGITS),
+                "nearest word right %": ("text_right", WITH_N),
+            },
+        ),
     ]
     return [table for table in tables if table.rows]
 
@@ -84,21 +147,6 @@ def _differences(found: Sequence[Scores]) -> Table:
     )
 
 
-def _parts(found: Sequence[Scores]) -> Table:
-    return _table(
-        "Places and labels apart",
-        _overall(found),
-        {
-            "located": ("located", {}),
-            "label right": ("labelled", {}),
-            "mean IoU": ("iou", {}),
-            "places alone": ("ap50_located", {}),
-        },
-        "In %. Located: objects at whose place something is told (IoU 0.5), whatever its label. Label right, mean IoU: "
-        "of those. Places alone: AP50 if all labels were right.",
-    )
-
-
 def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
     rows = tuple(
         (one.perception, measure, *(estimate_text(group[measure], has_n=True) for group in one.groups[by].values()))
@@ -110,15 +158,6 @@ def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
         "precision: by the detection's own, as perceived."
     )
     return Table(f"By {quantity}", ("perception", "", *found[0].groups[by]), rows, (note,))
-
-
-def _by_outline(found: Sequence[Scores]) -> Table:
-    return _table(
-        "Recall by how much is in the way",
-        ((one.perception, {name: of["recall"] for name, of in one.groups["outline"].items()}) for one in found),
-        {name: (name, WITH_N) for name in found[0].groups["outline"]},
-        "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border.",
-    )
 
 
 def _categories(found: Sequence[Scores], most: int | None) -> Table:
@@ -151,68 +190,6 @@ def _confusions(found: Sequence[Scores], most: int) -> Table:
     note = f"The most frequent. {INTERVALS}"
     columns = ("perception", "object", "told as", "times", "of the objects %")
     return Table("What is taken for what", columns, tuple(rows), (note,))
-
-
-def _memory(found: Sequence[Scores]) -> Table:
-    return _table(
-        "The memory of objects that comes of it",
-        ((one.perception, one.memory) for one in found),
-        {
-            "entries": ("entries", {"scale": 1}),
-            "objects seen": ("seen", {"scale": 1}),
-            "precision %": ("memory_precision", {}),
-            "recall %": ("memory_recall", {}),
-            "error m": ("position_error_m", TWO_DIGITS),
-            "surplus %": ("surplus", {}),
-            "wrong label %": ("wrong_label", {}),
-            "phantoms %": ("phantoms", {}),
-        },
-        "After the first house's tour, a house. Precision: an object of the entry's label stands within 0.3 m of it; "
-        "recall: of objects seen from at most 3.5 m. Error: middle to middle, of entries with their object's label.",
-        "Surplus: entries beyond an object's first, per object; wrong label: of entries with an object; phantoms: most "
-        "of the entry's detections were of no object.",
-    )
-
-
-def _staleness(found: Sequence[Scores]) -> Table:
-    return _table(
-        "Stale entries in the next house",
-        ((one.perception, one.memory) for one in found if one.memory["stale_at_start"].n),
-        {"as it begins": ("stale_at_start", WITH_N), "after its tour": ("stale_after_tour", WITH_N)},
-        "Entries that were right in the house before and are not in this one; in % of all entries (n).",
-    )
-
-
-def _beliefs(found: Sequence[Scores]) -> Table:
-    return _table(
-        "Confidence, depth and pose",
-        _overall(found),
-        {
-            "ECE %": ("ece", {}),
-            "depth error %": ("depth_relative", {}),
-            "depth RMSE m": ("depth_rmse_m", THREE_DIGITS),
-            "depth lost %": ("depth_lost", {}),
-            "offset m": ("pose_offset_m", THREE_DIGITS),
-            "turn °": ("pose_turn_deg", TWO_DIGITS),
-        },
-        "ECE: mean gap between confidence and precision, in tenths of confidence. Depth error: mean of |error| / "
-        "depth.",
-    )
-
-
-def _features(found: Sequence[Scores]) -> Table:
-    return _table(
-        "Cosines of features",
-        _overall([one for one in found if one.cosines]),
-        {
-            "same object": ("cosine_same_object", THREE_DIGITS),
-            "same category": ("cosine_same_category", THREE_DIGITS),
-            "other": ("cosine_other", THREE_DIGITS),
-            "its perception": ("cosine_text_own", THREE_DIGITS),
-            "other words": ("cosine_text_other", THREE_DIGITS),
-            "nearest word right %": ("text_right", WITH_N),
-        },
-    )
 
 
 def perception_csv(found: Sequence[Scores]) -> str:

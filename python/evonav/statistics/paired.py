@@ -207,9 +207,6 @@ class BeforeAfter:
     now: float
     is_worse: bool
     """Whether it is worse by more than chance explains."""
-    is_better: bool = False
-    ci95: Interval | None = None
-    """Interval of the difference over houses, where it is known."""
 
     def __str__(self) -> str:
         """Return the change in words: `path, ms: 0.07 -> 0.15 (2.14 times as much)`."""

@@ -11,8 +11,6 @@ from evonav.memory_benchmark.streams.visits import generator_of, walk_in
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.embedded import EmbeddedSimulator
 
-CHECKPOINTS = (50, 100, 200, 400, 800)
-"""Numbers of objects at which a memory is measured."""
 GAP_M = 5.0
 """Free space between two houses, more than the range of evidence."""
 MAX_TOURS = 200
@@ -36,9 +34,7 @@ def growth(spec: StreamSpec, houses: list[House]) -> StreamPlan:
 
     An object is seen at the first frame in which ground-truth perception reports it in the range of evidence.
     """
-    plan, seen = StreamPlan([], [], []), set[str]()
-    goals = sorted({goal for goal in CHECKPOINTS if goal < spec.max_objects} | {spec.max_objects})
-    right_m = 0.0
+    plan, seen, right_m = StreamPlan([], []), set[str](), 0.0
     simulator = EmbeddedSimulator(spec.camera, allow_unknown_assets=spec.allow_unknown_assets)
     for number, house in enumerate(cycle(houses)):
         house_json = house.to_json()
@@ -53,10 +49,8 @@ def growth(spec: StreamSpec, houses: list[House]) -> StreamPlan:
             frame = simulator.render(pose, rgb=False)
             least_px = _GROUND_TRUTH.min_px(frame)
             seen |= {prefix + one for one, px in visible_px(frame, simulator.objects).items() if px >= least_px}
-            while goals and len(seen) >= goals[0]:
-                plan.checkpoints.append((goals.pop(0), len(plan.frames) - 1))
-            if not goals:
-                break
-        if not goals or len(plan.scenes) > MAX_TOURS:
+            if len(seen) >= spec.max_objects:
+                return plan
+        if len(plan.scenes) > MAX_TOURS:
             break
     return plan

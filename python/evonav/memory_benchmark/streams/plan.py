@@ -58,8 +58,6 @@ class StreamPlan:
 
     scenes: list[PlannedScene]
     frames: list[PlannedFrame]
-    checkpoints: list[tuple[int, int]]
-    """Numbers of objects of S7, each with the index of the frame at which so many have been seen."""
 
     def add(self, scene: int, visit: int, poses: Iterable[Pose]) -> None:
         """Add frames of a scene, at the rate of the camera; a new visit comes after a pause."""

@@ -106,7 +106,7 @@ def visits(spec: StreamSpec, house: House) -> StreamPlan:
         HouseError: The house does not change at any attempt.
     """
     houses = houses_of_visits(spec, house)
-    plan, at = StreamPlan([PlannedScene(house_json) for house_json in houses], [], []), None
+    plan, at = StreamPlan([PlannedScene(house_json) for house_json in houses], []), None
     for number, house_json in enumerate(houses):
         poses = list(islice(walk_in(spec, house_json, at, f"visit {number + 1}"), spec.frames_a_visit))
         plan.add(number, number + 1, poses)
@@ -130,7 +130,7 @@ def during_visit(spec: StreamSpec, house: House) -> StreamPlan:
     num_frames = 2 * spec.frames_a_visit
     poses = list(islice(walk_in(spec, before, None, "before"), int(LATEST * num_frames) + 1))
     at = _moment(spec, before, after, poses, int(EARLIEST * num_frames))
-    plan = StreamPlan([PlannedScene(before), PlannedScene(after)], [], [])
+    plan = StreamPlan([PlannedScene(before), PlannedScene(after)], [])
     plan.add(0, 1, poses[:at])
     plan.add(1, 1, islice(walk_in(spec, after, poses[at], "after"), num_frames - at))
     return plan

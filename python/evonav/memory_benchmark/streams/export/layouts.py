@@ -71,7 +71,6 @@ class StreamFile(Record):
     """SHA-256 of the stream as it was before depth was rounded, see `evonav.memory_benchmark.truth.Digest`."""
     layout: LayoutName
     num_frames: NonNegativeInt
-    has_rgb: bool
     depth_scale: PositiveFloat
     world: str = WORLD
     info: StreamInfo

@@ -87,7 +87,6 @@ def _written(stream: Stream, folder: Path, name: LayoutName, oracle: Path) -> St
         digest=digest,
         layout=name,
         num_frames=len(lines),
-        has_rgb=bool(lines) and lines[0].rgb is not None,
         depth_scale=layout.depth_scale,
         info=info,
     )
