@@ -76,7 +76,6 @@ NUM_COLUMNS = len(_FIELDS)
 """Columns of `CheckedEntries.numbers`."""
 _NUM_GIVEN = 7
 """Columns that every entry has."""
-_NAN = math.nan
 
 
 def read_entries(answer: object) -> CheckedEntries:
@@ -174,15 +173,9 @@ def read_num_bytes(answer: object, num_entries: int) -> int:
 
 
 def _row(entry: Any) -> tuple[Any, ...]:  # noqa: ANN401 - of a memory, so unchecked
-    p, first_s, last_s = entry.p_present, entry.first_seen_s, entry.last_seen_s
-    return (
-        *entry.centre_m,
-        *entry.size_m,
-        entry.confidence,
-        _NAN if p is None else p,
-        _NAN if first_s is None else first_s,
-        _NAN if last_s is None else last_s,
-    )
+    optional = (entry.p_present, entry.first_seen_s, entry.last_seen_s)
+    given = (math.nan if value is None else value for value in optional)
+    return *entry.centre_m, *entry.size_m, entry.confidence, *given
 
 
 def _first_of_wrong_type(answer: Sequence[object]) -> MemoryFailedError:

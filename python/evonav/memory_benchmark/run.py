@@ -122,17 +122,15 @@ def host(memory: MemorySource, settings: MeasureSettings) -> HostedMemory:
     """
     if isinstance(memory, HostedMemory):
         return memory
-    component: Component[Memory] | None = Component(memory) if isinstance(memory, str) else None
+    if isinstance(memory, str):
+        memory = Component(memory)
     if isinstance(memory, Component):
-        component = memory
-    if component is None:
-        if settings.own_process:
-            raise InvalidArgumentError("own_process: a function cannot be sent to a process; name it by `module:name`")
-        assert callable(memory)
-        return LocalMemory(memory)
-    if settings.own_process is False:
-        return LocalMemory(component.create)
-    return RemoteMemory(component, timeout_s=settings.timeout_s)
+        if settings.own_process is False:
+            return LocalMemory(memory.create)
+        return RemoteMemory(memory, timeout_s=settings.timeout_s)
+    if settings.own_process:
+        raise InvalidArgumentError("own_process: a function cannot be sent to a process; name it by `module:name`")
+    return LocalMemory(memory)
 
 
 class _StreamRun:

@@ -69,7 +69,7 @@ class Judge:
     seen: set[PlaceKey] = field(default_factory=set)
     clocks: Clocks = field(default_factory=lambda: Clocks(0, 0.0, 0.0))
     num_changes_of: Counter[str] = field(default_factory=Counter)
-    _scene: _Scene | None = None
+    _scene: _Scene = field(default_factory=lambda: _Scene([], BodyBoxes(()), []))
     _frame: MemoryFrame | None = None
     _stale: BodyBoxes = field(default_factory=lambda: BodyBoxes(()))
     _stale_changes: list[TrackedChange] = field(default_factory=list)
@@ -81,10 +81,9 @@ class Judge:
     def look(self, frame: MemoryFrame, truth: FrameTruth) -> None:
         """Take a frame, before the memory's answer to it."""
         self._advance(frame)
-        if self._scene is None or truth.objects is not self._scene.objects:
+        if truth.objects is not self._scene.objects:
             self._change_scene(frame.index, truth.objects)
         scene = self._scene
-        assert scene is not None
         seen_ids = {one for one in truth.detected_ids if one and truth.visible_px.get(one, 0) >= EVIDENCE_PX}
         self.seen.update(scene.keys[index] for one in seen_ids if (index := scene.index_of.get(one)) is not None)
         for one in self.tracked:
@@ -96,7 +95,6 @@ class Judge:
     def believe(self, entries: CheckedEntries) -> None:
         """Take the memory's entries after the last frame."""
         scene = self._scene
-        assert scene is not None, "a frame comes first"
         self._digest.update(entries.ids.tobytes() + entries.numbers.tobytes() + "\0".join(entries.labels).encode())
         is_object = np.array([label not in STRUCTURE_TYPES for label in entries.labels], np.bool_)
         is_believed = is_object & ~(entries.p_present < BELIEVED_P)
@@ -117,7 +115,7 @@ class Judge:
     def end_visit(self) -> None:
         """Judge the visit that is over."""
         scene, counts = self._scene, self.counts
-        if scene is None or self._answer is None:
+        if self._answer is None:
             return
         entries, num_believed, num_right = self._answer
         self._take_belief(entries)
@@ -152,7 +150,6 @@ class Judge:
     def labels_to_ask(self) -> list[str]:
         """Return the labels of objects that stand where they were seen, sorted: what a memory can be asked for."""
         scene = self._scene
-        assert scene is not None, "a frame comes first"
         return sorted(
             {
                 body.category
@@ -164,7 +161,6 @@ class Judge:
     def take_places(self, label: str, places: Sequence[FoundPlace]) -> None:
         """Take the answer to `locate(label, k)`, the best place first."""
         scene = self._scene
-        assert scene is not None, "a frame comes first"
         of_label = [one for one in self.tracked if one.change.label == label]
         is_known = all(
             (one.old_key is None or one.is_evident or not one.is_open)
@@ -186,7 +182,6 @@ class Judge:
 
     def _take_belief(self, entries: CheckedEntries) -> None:
         scene, p = self._scene, entries.p_present
-        assert scene is not None
         given = [
             index for index in np.flatnonzero(~np.isnan(p)).tolist() if entries.labels[index] not in STRUCTURE_TYPES
         ]
@@ -209,10 +204,10 @@ class Judge:
 
     def _change_scene(self, frame: int, objects: Sequence[SceneObject]) -> None:
         before = self._scene
-        if before is not None and self._answer is not None:  # in the middle of a visit
+        if self._answer is not None:  # in the middle of a visit
             self._take_snapshot(before)
         new = [one for one in enumerate(self.changes) if one[1].frame <= frame][len(self.tracked) :]
-        remembered = {} if before is None else dict(zip(before.keys, before.num_matched.tolist(), strict=True))
+        remembered = dict(zip(before.keys, before.num_matched.tolist(), strict=True))
         boxes = BodyBoxes(objects)
         for index, change in new:
             for earlier in self.tracked:
@@ -232,21 +227,19 @@ class Judge:
         self._stale = BodyBoxes([one.change.before for one in self._stale_changes if one.change.before is not None])
         self._believed_old = frozenset()
         scene = _Scene(objects, boxes, [(body.id, self.num_changes_of[body.id]) for body in boxes.bodies])
-        if before is not None:
-            source = {key: index for index, key in enumerate(before.keys)}
-            pairs = [(source[key], index) for index, key in enumerate(scene.keys) if key in source]
-            old, now = np.array(pairs, np.intp).reshape(-1, 2).T
-            for name in ("num_matched", "is_covered", "was_remembered", "is_lost"):
-                getattr(scene, name)[now] = getattr(before, name)[old]
-            is_gone = np.ones(len(before.boxes), np.bool_)
-            is_gone[old] = False
-            if self._answer is not None:  # in the middle of a visit: between two, they are counted already
-                self._close_standing(is_gone)
+        source = {key: index for index, key in enumerate(before.keys)}
+        pairs = [(source[key], index) for index, key in enumerate(scene.keys) if key in source]
+        old, now = np.array(pairs, np.intp).reshape(-1, 2).T
+        for name in ("num_matched", "is_covered", "was_remembered", "is_lost"):
+            getattr(scene, name)[now] = getattr(before, name)[old]
+        is_gone = np.ones(len(before.boxes), np.bool_)
+        is_gone[old] = False
+        if self._answer is not None:  # in the middle of a visit: between two, they are counted already
+            self._close_standing(is_gone)
         self._scene = scene
 
     def _close_standing(self, of: NDArray[np.bool_]) -> None:
         scene, counts = self._scene, self.counts
-        assert scene is not None
         was_remembered, is_lost = scene.was_remembered & of, scene.is_lost & of
         counts.standing += int(was_remembered.sum())
         counts.false_forgets += int(is_lost.sum())
@@ -255,7 +248,6 @@ class Judge:
     def _believe_changes(self, entries: CheckedEntries, unmatched: NDArray[np.intp]) -> None:
         """Note which left places have an entry, and which new places have one."""
         scene = self._scene
-        assert scene is not None
         labels = [entries.labels[index] for index in unmatched.tolist()]
         rows, places, distances_m = self._stale.pairs(labels, entries.centres_m[unmatched])
         latest = np.full(len(labels), NONE, np.intp)
@@ -281,7 +273,7 @@ class Judge:
     def _judge_arrival(self, one: TrackedChange) -> None:
         if not one.is_current or not one.is_seen:
             return
-        num_matched = 0 if self._scene is None else self._scene.num_entries_of(one.change.object_id)
+        num_matched = self._scene.num_entries_of(one.change.object_id)
         if one.change.kind == "added" and not one.is_arrival_judged:
             one.is_arrival_judged = True
             self.counts.additions += 1

@@ -16,7 +16,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import EMBEDDED, Backend
 from evonav.parallel.folders import check_same_run, write_atomically, writing
-from evonav.perception import Percept, Perception, StageScene
+from evonav.perception import Perception, StageScene
 from evonav.perception_benchmark.matching import TrueObjects, true_objects
 from evonav.perception_benchmark.memory import JudgedMemory
 from evonav.perception_benchmark.picture import side_by_side
@@ -36,7 +36,7 @@ from evonav.report.measurements import finished
 from evonav.sensors.observation import Detections
 from evonav.tasks.listing import TaskFile
 from evonav.world.pose import Pose
-from evonav.world.simulator import Frame, Simulator
+from evonav.world.simulator import Simulator
 
 WORK = "evonav.perception_benchmark.benchmark:make_worker"
 TASK_TIMEOUT_S = 3600.0
@@ -155,21 +155,18 @@ def _begun(
     there = read_header(out)
     options = {spec.name: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
     digests = {task.task_id: task.digest for task in tasks}
-    perceptions = [spec.name for spec in specs]
     if there is not None:
         check_same_run(there.identity, identity, out)
         for name, known in there.options.items():
             check_same_run({name: known}, {name: options.get(name, known)}, out)
-        perceptions = [*there.perceptions, *(name for name in perceptions if name not in there.perceptions)]
         options = {**there.options, **options}
         for task_id, digest in digests.items():
             if there.digests.get(task_id, digest) != digest:
-                for name in there.perceptions:
+                for name in there.options:
                     record_path(out, name, task_id).unlink(missing_ok=True)
         digests = {**there.digests, **digests}
     return PerceptionHeader(
         identity=identity,
-        perceptions=perceptions,
         options=options,
         models={} if there is None else there.models,
         tasks=[task.task_id for task in tasks],
@@ -221,7 +218,8 @@ def measure_task(
     Raises:
         EvonavError: The simulator, the perception or the object map fails.
     """
-    rows, memory, best = Rows(), JudgedMemory(), _BestView()
+    rows, memory = Rows(), JudgedMemory()
+    best: tuple[Pose, Any, TrueObjects, Detections, Matched] | None = None
     states: list[MemoryState] = []
     houses = [stage.house_json for stage in case.stages]
     changed = [
@@ -248,12 +246,19 @@ def measure_task(
                 percept = scored_percept(frame, reported)
                 matched = rows.add(stage, frame, percept, truth, objects)
                 memory.look(frame, percept, truth)
-                if has_picture and stage == 1:
-                    best.offer(pose, truth, percept, matched, frame)
+                if has_picture and stage == 1 and (best is None or truth.num_wanted > best[2].num_wanted):
+                    best = pose, frame.rgb, truth, percept.detections, matched
             if number in checkpoints:
                 states.append(memory.state(checkpoints[number]))
             alive()
         num_views.append(sum(map(len, places)))
+    picture = None
+    if best is not None:
+        pose, rgb = best[:2]
+        if rgb is None:
+            simulator.reset(houses[0], case.start)
+            rgb = simulator.render(pose, rgb=True, instances=False).rgb
+        picture = side_by_side(rgb, *best[2:])
     return TaskRecord(
         task_id=case.task_id,
         digest="",
@@ -268,26 +273,5 @@ def measure_task(
         pose=rows.pose,
         features=rows.features(perception.text_feature),
         memory=states,
-        picture=best.drawn(case, simulator),
+        picture=picture,
     )
-
-
-@dataclass(slots=True)
-class _BestView:
-    """The view that shows the most objects."""
-
-    pose: Pose | None = None
-    parts: tuple[TrueObjects, Detections, Matched] | None = None
-    rgb: Any = None
-
-    def offer(self, pose: Pose, truth: TrueObjects, percept: Percept, matched: Matched, frame: Frame) -> None:
-        if self.parts is None or truth.num_wanted > self.parts[0].num_wanted:
-            self.pose, self.parts, self.rgb = pose, (truth, percept.detections, matched), frame.rgb
-
-    def drawn(self, case: EpisodeSpec, simulator: Simulator) -> str | None:
-        if self.pose is None or self.parts is None:
-            return None
-        if self.rgb is None:
-            simulator.reset(case.stages[0].house_json, case.start)
-            self.rgb = simulator.render(self.pose, rgb=True, instances=False).rgb
-        return side_by_side(self.rgb, *self.parts)

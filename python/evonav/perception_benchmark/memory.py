@@ -44,13 +44,7 @@ class JudgedMemory:
 
     def look(self, frame: Frame, percept: Percept, truth: TrueObjects) -> None:
         """Add a view to the memory."""
-        view = View(
-            pose=percept.pose,
-            intrinsics=frame.intrinsics,
-            depth_m=percept.depth_m,
-            detections=percept.detections,
-            occupancy=NO_OCCUPANCY,
-        )
+        view = View(percept.pose, frame.intrinsics, percept.depth_m, percept.detections, NO_OCCUPANCY)
         sources = main_objects(truth, percept.detections).tolist()
         done = self.map.update(view)
         for entry_id, source in zip(done.entry_ids, sources, strict=True):

@@ -159,10 +159,8 @@ class PerceptionHeader(MeasurementRecord):
 
     identity: dict[str, Any]
     """Settings that records of one folder share."""
-    perceptions: list[str]
-    """Perceptions, in the order in which they were first requested."""
     options: dict[str, dict[str, Any]]
-    """Import path and keywords, by perception."""
+    """Import path and keywords by perception, in the order in which they were first requested."""
     models: dict[str, dict[str, Any]] = {}
     """Hashes of weights and versions of libraries, by perception that has some."""
     tasks: list[str]
@@ -201,11 +199,11 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
             read_model(TaskRecord, record_path(folder, perception, task), "delete it and run the command again")
             for task in tasks
         ]
-        for perception in header.perceptions
+        for perception in header.options
     }
 
 
 def complete_tasks(folder: Path, header: PerceptionHeader) -> list[str]:
     """Return the tasks last requested that have a record of every perception."""
-    names = header.perceptions
+    names = header.options
     return [task for task in header.tasks if all(record_path(folder, name, task).exists() for name in names)]
