@@ -85,8 +85,12 @@ def test_an_object_that_moved_during_a_stage_has_been_relocated_in_later_ones(ch
 
 def test_with_the_extension_off_a_task_is_what_it_was(house: House) -> None:
     off, never = task_of(house), task_of(house, during_stage={"probability": 0.0, "rounds": [2, 9]})
+    assert off.header.parameters.extensions.during_stage is None
     assert off.contents == never.contents
     assert all(off.oracle(stage).during is None for stage in range(1, off.num_stages + 1))
+    for name, data in off.contents.items():
+        told = [line.strip() for line in data.splitlines() if b"during" in line]
+        assert told == ([b'"during": null'] if name.startswith("oracle/") else []), name
 
 
 def test_the_first_stage_and_its_goal_do_not_depend_on_it(house: House, changing: Task) -> None:
