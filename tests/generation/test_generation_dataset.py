@@ -64,7 +64,7 @@ def test_limit_takes_the_first_houses_that_give_a_task(house_file, clean_folder,
         for workers in (0, 3)
     ]
     assert_same(tmp_path / "0", tmp_path / "3")
-    every = [outcome["task_id"] for outcome in journal_of(clean_folder) if "task_id" in outcome]
+    every = [outcome["task"]["task_id"] for outcome in journal_of(clean_folder) if "task" in outcome]
     assert [root.name for root in summaries[1].roots] == every[:num_tasks]
     assert summaries[1].num_houses == 7
     assert sum(1 for path in (tmp_path / "3").glob("*/task.json")) == num_tasks
@@ -99,7 +99,7 @@ def test_a_run_interrupted_after_every_house_ends_as_one_that_was_not(house_file
 
 def test_progress_ends_at_the_whole(house_file, tmp_path):
     news = []
-    generate_dataset(house_file, tmp_path, options=OPTIONS, workforce=local(2), on_progress=news.append)
+    generate_dataset(house_file, tmp_path, options=OPTIONS, on_progress=news.append)
     assert [one.num_houses for one in news] == list(range(11))
     assert (news[-1].num_tasks, news[-1].num_rejected, news[-1].num_failed) == (8, 2, 0)
     assert news[-1].share == 1.0

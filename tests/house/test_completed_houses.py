@@ -145,6 +145,7 @@ def test_one_bundled_house_is_named_by_its_number():
     (house,) = stream_houses("bundled:3")
     assert house.name == "bundled:3"
     assert [one.name for one in stream_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
+    assert next(stream_houses("bundled")) == next(bundled_houses())
     with pytest.raises(HouseError, match="bundled has fewer houses"):
         list(stream_houses("bundled:1000"))
     with pytest.raises(HouseError, match="where N is a number from 1"):

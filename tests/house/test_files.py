@@ -8,10 +8,12 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 import pytest
+from build_houses import fallen_ids, unreached_rooms
 from recorded_data import data_path, needs_data
 
 from evonav.errors import HouseError, InvalidArgumentError
 from evonav.house import House, bundled_houses, stream_houses
+from evonav.world.embedded import EmbeddedSimulator
 
 RECORDED = [
     "ram81-procthor-100k-history",
@@ -29,12 +31,16 @@ def houses() -> list[House]:
     return list(bundled_houses(3))
 
 
-def test_bundled_houses_have_several_rooms_and_are_complete() -> None:
-    bundled = list(bundled_houses())
-    assert len(bundled) >= 24
-    assert all(2 <= len(house.rooms) <= 10 for house in bundled)
-    assert bundled[0].name == "bundled:1"
-    assert all(entry.category for house in bundled for entry in house.objects)
+def test_bundled_houses_are_complete_every_room_is_reached_and_nothing_has_fallen() -> None:
+    simulator, num_houses = EmbeddedSimulator(), 0
+    for num_houses, house in enumerate(bundled_houses(), start=1):
+        assert house.name == f"bundled:{num_houses}"
+        assert 2 <= len(house.rooms) <= 10
+        assert all(entry.category for entry in house.objects)
+        simulator.reset(house.to_json())
+        assert not unreached_rooms(simulator, house), house.name
+        assert not fallen_ids(simulator, house), house.name
+    assert num_houses >= 24
 
 
 @pytest.mark.parametrize("suffix", [".json", ".json.gz", ".jsonl", ".jsonl.gz"])
@@ -139,6 +145,7 @@ def test_bundled_houses_survive_reading_and_writing() -> None:
         check_reading_and_writing(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", [pytest.param(source, marks=needs_data(source)) for source in RECORDED])
 def test_recorded_houses_survive_reading_and_writing(source: str) -> None:
     check_reading_and_writing(data_path(source))
@@ -177,8 +184,3 @@ def test_incomplete_houses_are_read_or_refused() -> None:
                 list(stream_houses(path))
         else:
             assert len(list(stream_houses(path))) == 1
-
-
-def test_the_word_bundled_stands_for_the_bundled_houses() -> None:
-    assert [house.name for house in stream_houses("bundled", 2)] == ["bundled:1", "bundled:2"]
-    assert next(stream_houses("bundled")) == next(bundled_houses())

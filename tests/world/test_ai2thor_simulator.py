@@ -117,6 +117,7 @@ def _assert_same_frames(one: Frame, other: Frame) -> None:
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_episodes_are_the_same_by_both_routes(tmp_path: Path) -> None:
     """Whole records of all three heuristics, and the images at every third pose they decided at."""
     tasks = task_files(BUNDLED_TASKS, 1)
@@ -163,19 +164,24 @@ def test_a_house_that_is_refused_leaves_a_simulator_that_works(simulator: Ai2Tho
     assert pid_of(simulator) == pid
 
 
+ASKED: list[Callable[[Any], object]] = [
+    lambda simulator: simulator.render(),
+    lambda simulator: simulator.reset(HOUSE),
+    lambda simulator: simulator.shortest_path((1.0, 0.0, 1.0), (2.0, 0.0, 2.0)),
+]
+
+
 @pytest.mark.parametrize(
-    ("number", "how"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGTERM, "exit code 143"), (signal.SIGSTOP, "hangs")]
-)
-@pytest.mark.parametrize(
-    "ask",
+    ("number", "how", "ask"),
     [
-        lambda simulator: simulator.render(),
-        lambda simulator: simulator.reset(HOUSE),
-        lambda simulator: simulator.shortest_path((1.0, 0.0, 1.0), (2.0, 0.0, 2.0)),
+        *((signal.SIGKILL, "SIGKILL", ask) for ask in ASKED),
+        (signal.SIGSTOP, "hangs", ASKED[0]),
+        pytest.param(signal.SIGTERM, "exit code 143", ASKED[0], marks=pytest.mark.slow),
+        *(pytest.param(signal.SIGSTOP, "hangs", ask, marks=pytest.mark.slow) for ask in ASKED[1:]),
     ],
 )
 def test_a_lost_process_is_reported_and_replaced(number: int, how: str, ask: Callable[[Any], object]) -> None:
-    simulator = Ai2ThorSimulator(SimulatorConfig(width_px=64, height_px=64), replace(OURS, timeout_s=3.0))
+    simulator = Ai2ThorSimulator(SimulatorConfig(width_px=64, height_px=64), OURS.model_copy(update={"timeout_s": 3.0}))
     try:
         start = simulator.reset(HOUSE)
         pid = pid_of(simulator)
@@ -210,6 +216,7 @@ def test_nothing_is_left_after_closing(tmp_path: Path, monkeypatch: pytest.Monke
     assert len(list(Path("/proc/self/fd").iterdir())) <= before
 
 
+@pytest.mark.slow
 def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Path) -> None:
     """A simulator that is killed in the middle: the records are those of a run in which nothing happened."""
     whole = RunConfig(backend=compare_simulators.THOR, protocol=ProtocolConfig(max_rounds=6))
@@ -225,23 +232,13 @@ def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Pat
         assert [(lost.stage, lost.is_retried) for lost in other.failures()] == [(2, True)]
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_nothing_outlives_an_evaluation_that_is_killed(tmp_path: Path, number: int) -> None:
     temporary = tmp_path / "temporary"
     temporary.mkdir()
-    command = [
-        "-m",
-        "evonav",
-        "evaluate",
-        "--simulator",
-        "ai2thor",
-        "--set",
-        "simulator.executable=evonav",
-        "--limit",
-        "1",
-    ]
+    options = "--simulator ai2thor --set simulator.executable=evonav --limit 1 --agent ftu --workers 1"
     evonav = subprocess.Popen(
-        [sys.executable, *command, "--agent", "ftu", "--workers", "1", "--out", str(tmp_path / "run")],
+        [sys.executable, "-m", "evonav", "evaluate", *options.split(), "--out", str(tmp_path / "run")],
         env=os.environ | {"TMPDIR": str(temporary)},
         stderr=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

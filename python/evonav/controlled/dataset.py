@@ -73,7 +73,7 @@ def generate_controlled(
     out = out.resolve()
     with writing(out), closing(Journal(out, run)) as journal:
         last = tasks_of(out, options.arms[-1].name)  # which is written last: if a task is there, it is in all arms
-        made = [(index, done) for index, done in journal.outcomes.items() if done.task_id is not None]
+        made = [(index, done) for index, done in journal.outcomes.items() if done.task is not None]
         journal.drop([index for index, done in made if not is_complete(done, last)])
         num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
         on_progress(num_before, num_all)
@@ -123,7 +123,7 @@ def _write(
     outcomes: list[Outcome],
 ) -> ControlledRecord:
     """Write each arm's `dataset.json`, and `controlled.json` last."""
-    made = sorted((done.task_id, done.house_sha256) for done in outcomes if done.task_id and done.house_sha256)
+    made = sorted((done.task.task_id, done.task.house_sha256) for done in outcomes if done.task is not None)
     rejections = tuple(outcome.rejection for outcome in outcomes if outcome.rejection is not None)
     task_ids = tuple(task_id for task_id, _ in made)
     if not made:

@@ -203,7 +203,7 @@ class _Run:
         self._limit = limit
         self._on_progress = on_progress
         outcomes = journal.outcomes.values()
-        self._num_tasks = sum(outcome.reason is None for outcome in outcomes)
+        self._num_tasks = sum(outcome.task is not None for outcome in outcomes)
         self._num_failed = sum(outcome.is_failure for outcome in outcomes)
         self._num_before = self._num_tasks
         self._names: dict[int, str] = {}
@@ -228,7 +228,7 @@ class _Run:
 
     def _num_tasks_of(self, houses: list[int]) -> int:
         outcomes = self._journal.outcomes
-        return sum(index in outcomes and outcomes[index].reason is None for index in houses)
+        return sum(index in outcomes and outcomes[index].task is not None for index in houses)
 
     def generate(self, pool: Pool, wanted: Set[int] | None = None) -> None:
         """Process every house without an outcome.
@@ -266,7 +266,7 @@ class _Run:
     def _record(self, answer: Answer) -> None:
         outcome = outcome_of(answer, self._names.pop(answer.key))
         self._journal.add(outcome)
-        self._num_tasks += outcome.reason is None
+        self._num_tasks += outcome.task is not None
         self._num_failed += outcome.is_failure
 
     def report_progress(self) -> None:
@@ -289,9 +289,9 @@ class _Run:
         """Return the result of the run."""
         outcomes = self._journal.ordered_outcomes()
         return GenerationSummary(
-            roots=tuple(out / outcome.task_id for outcome in outcomes if outcome.task_id is not None),
+            roots=tuple(out / outcome.task.task_id for outcome in outcomes if outcome.task is not None),
             num_houses=len(outcomes),
-            reasons=Counter(str(outcome.reason) for outcome in outcomes if outcome.reason is not None),
+            reasons=Counter(str(one.rejection.reason) for one in outcomes if one.rejection is not None),
             num_new=self._num_tasks - self._num_before,
             seconds=time.monotonic() - self._start_s,
         )
@@ -301,7 +301,7 @@ def _lost_houses(journal: Journal, out: Path, retry_failed: bool) -> list[int]:
     """Return the houses to process again: their task is missing or changed, or the generator failed."""
 
     def is_lost(outcome: Outcome) -> bool:
-        if outcome.task_id is None:
+        if outcome.task is None:
             return retry_failed and outcome.is_failure
         return not is_complete(outcome, out)
 
@@ -347,10 +347,10 @@ def _check_tasks(record: DatasetRecord, journal: Journal) -> None:
     """Check that there are tasks and that their ids differ."""
     seen: set[str] = set()
     for outcome in journal.ordered_outcomes():
-        if outcome.task_id in seen:
-            raise TaskError(f"two houses give a task named {outcome.task_id}; the second is {outcome.house}")
-        if outcome.task_id is not None:
-            seen.add(outcome.task_id)
+        if outcome.task is not None and outcome.task.task_id in seen:
+            raise TaskError(f"two houses give a task named {outcome.task.task_id}; the second is {outcome.house}")
+        if outcome.task is not None:
+            seen.add(outcome.task.task_id)
     if not record.tasks:
         counts = ", ".join(f"{count} {reason}" for reason, count in record.num_rejected.most_common())
         first = f"; the first: {record.rejections[0].detail}" if record.rejections else ""

@@ -16,8 +16,7 @@ from evonav.errors import StoreError
 from evonav.parallel.folders import check_same_run, write_atomically
 from evonav.parallel.pool import FailureKind
 from evonav.records import Record, sentence_of
-from evonav.tasks.dataset import HouseRejection, RejectReason, TaskEntry
-from evonav.tasks.records import Sha256
+from evonav.tasks.dataset import HouseRejection, TaskEntry
 
 NAME = "journal.jsonl"
 
@@ -28,34 +27,13 @@ class Outcome(Record):
     index: NonNegativeInt
     """Index of the house in its source."""
     house: str
-    task_id: str | None = None
-    house_sha256: Sha256 | None = None
-    task_sha256: Sha256 | None = None
-    """SHA-256 of `task.json`, which holds the checksums of the task's other files."""
-    reason: RejectReason | None = None
-    stage: NonNegativeInt = 0
-    """Stage at which the reason was found; 0 before the first."""
-    detail: str = ""
-    """Explanation of the reason: a sentence, or the end of a traceback."""
+    task: TaskEntry | None = None
+    rejection: HouseRejection | None = None
 
     @property
     def is_failure(self) -> bool:
         """Whether the generator itself failed."""
-        return self.reason in get_args(FailureKind)
-
-    @property
-    def task(self) -> TaskEntry | None:
-        """The entry of the task in `dataset.json`."""
-        if self.task_id is None or self.task_sha256 is None or self.house_sha256 is None:
-            return None
-        return TaskEntry(task_id=self.task_id, sha256=self.task_sha256, house_sha256=self.house_sha256)
-
-    @property
-    def rejection(self) -> HouseRejection | None:
-        """The entry of the house in the rejections of `dataset.json`."""
-        if self.reason is None:
-            return None
-        return HouseRejection(house=self.house, reason=self.reason, stage=self.stage, detail=self.detail)
+        return self.rejection is not None and self.rejection.reason in get_args(FailureKind)
 
 
 class Journal:

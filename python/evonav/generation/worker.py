@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
+from evonav.errors import HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
 from evonav.generation.journal import Outcome
 from evonav.generation.pipeline import TaskRejectedError, generate_task, short_name
 from evonav.house import House
@@ -15,15 +15,15 @@ from evonav.parallel.folders import put_folder, sha256_of_file
 from evonav.parallel.pool import Answer
 from evonav.records import Record
 from evonav.tasks import write_task
-from evonav.tasks.dataset import RejectReason
+from evonav.tasks.dataset import HouseRejection, RejectReason, TaskEntry
 from evonav.tasks.manifest import Task
 from evonav.tasks.parameters import GenerationParameters
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"
+"""Folder beside the tasks, for those that are being written."""
 HOUSE_TIMEOUT_S = 120.0
 """Default number of seconds before a house is abandoned."""
-"""Folder beside the tasks, for those that are being written."""
 MAX_DETAIL = 2000
 """Largest number of characters in the detail of an outcome, as in `dataset.json`."""
 
@@ -61,16 +61,6 @@ class WorkerSettings(Record):
     options: GenerationOptions
 
 
-class _Reply(Record):
-    """The reply of a worker; exactly one field is set."""
-
-    outcome: Outcome | None = None
-    invalid_argument: str | None = None
-    """Message for an option outside its domain."""
-    write_error: str | None = None
-    """Message for a task that cannot be written."""
-
-
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the function of a worker, for `evonav.parallel.pool`.
 
@@ -100,12 +90,12 @@ def worker_of(generate: Callable[..., Mapping[Path, Task]]) -> Callable[[str], s
         head, _, house = text.partition("\n")
         index, name, *more = json.loads(head)
         try:
-            reply = _Reply(outcome=process_house(index, name, house, lambda parsed: generate(parsed, *more)))
+            outcome = process_house(index, name, house, lambda parsed: generate(parsed, *more))
         except InvalidArgumentError as error:
-            reply = _Reply(invalid_argument=str(error))
+            return json.dumps({"invalid_argument": str(error)})
         except (TaskError, OSError) as error:
-            reply = _Reply(write_error=str(error))
-        return reply.model_dump_json(exclude_defaults=True)
+            return json.dumps({"write_error": str(error)})
+        return outcome.model_dump_json(exclude_defaults=True)
 
     return work
 
@@ -121,20 +111,25 @@ def outcome_of(answer: Answer, name: str) -> Outcome:
         StoreError: A task cannot be written.
     """
     if answer.failure is not None:
-        detail = answer.detail[-MAX_DETAIL:]
-        return Outcome(index=answer.key, house=short_name(name), reason=answer.failure, detail=detail)
-    reply = _Reply.model_validate_json(answer.text)
-    if reply.invalid_argument is not None:
-        raise InvalidArgumentError(reply.invalid_argument)
-    if reply.outcome is None:
-        raise StoreError(str(reply.write_error))
-    return reply.outcome
+        return _without_task(answer.key, name, answer.failure, answer.detail[-MAX_DETAIL:])
+    reply = json.loads(answer.text)
+    if "invalid_argument" in reply:
+        raise InvalidArgumentError(reply["invalid_argument"])
+    if "write_error" in reply:
+        raise StoreError(reply["write_error"])
+    return Outcome.model_validate_json(answer.text)
+
+
+def _without_task(index: int, name: str, reason: RejectReason, detail: str, stage: int = 0) -> Outcome:
+    rejection = HouseRejection(house=short_name(name), reason=reason, stage=stage, detail=detail)
+    return Outcome(index=index, house=rejection.house, rejection=rejection)
 
 
 def is_complete(outcome: Outcome, folder: Path) -> bool:
     """Return whether the task of an outcome is in a folder as it was written."""
     try:
-        return sha256_of_file(folder / str(outcome.task_id) / "task.json") == outcome.task_sha256
+        task = outcome.task
+        return task is not None and sha256_of_file(folder / task.task_id / "task.json") == task.sha256
     except OSError:
         return False
 
@@ -152,31 +147,25 @@ def process_house(index: int, name: str, text: str, generate: Callable[[House], 
         OSError: A task cannot be moved to its place.
         InvalidArgumentError: A parameter is outside its domain.
     """
-
-    def without_task(reason: RejectReason, error: EvonavError, stage: int = 0) -> Outcome:
-        detail = str(error)[:MAX_DETAIL]
-        return Outcome(index=index, house=short_name(name), reason=reason, stage=stage, detail=detail)
-
     try:
         house = House(text, name=name)
     except HouseError as error:
-        return without_task("malformed_house", error)
+        return _without_task(index, name, "malformed_house", str(error)[:MAX_DETAIL])
     try:
         tasks = generate(house)
     except TaskRejectedError as error:
-        return without_task(error.reason, error, error.stage)
+        return _without_task(index, name, error.reason, str(error)[:MAX_DETAIL], error.stage)
     except (HouseError, SimulationError) as error:
-        return without_task("unusable_house", error)
+        return _without_task(index, name, "unusable_house", str(error)[:MAX_DETAIL])
     label = f"{socket.gethostname()}-{os.getpid()}"
     roots = [put_task(task, folder, label) for folder, task in tasks.items()]
     task = next(iter(tasks.values()))
-    return Outcome(
-        index=index,
-        house=short_name(name),
+    entry = TaskEntry(
         task_id=task.task_id,
+        sha256=sha256_of_file(roots[-1] / "task.json"),
         house_sha256=task.header.house.sha256,
-        task_sha256=sha256_of_file(roots[-1] / "task.json"),
     )
+    return Outcome(index=index, house=short_name(name), task=entry)
 
 
 def put_task(task: Task, out: Path, label: str) -> Path:

@@ -50,10 +50,10 @@ def measure(sampling: Sampling, *, houses: Path | str = BUNDLED, title: str = "b
             outcome = _process(house, seed, Path(out))
             took_ms = 1e3 * (time.process_time() - start_s)
             spans["all"] += took_ms
-            if outcome.task_id is None:
+            if outcome.rejection is not None:
                 num_failed += 1
                 if num_failed > 100 and not task_ms:
-                    raise TaskError(f"{houses}: no task in {num_failed} houses: {outcome.reason}")
+                    raise TaskError(f"{houses}: no task in {num_failed} houses: {outcome.rejection.reason}")
                 continue
             task_ms.append(took_ms)
             names.append(house.name)
