@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scripted_model import Scripted
-from toy_episode import START, belief_of, run
+from toy_episode import START, noted, run
 from toy_house import CHAIR_AWAY, stage_case
 
-from evonav.agents.agent import NavigateTo
+from evonav.agents.agent import NavigateTo, ViewSchedule
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
 from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.evaluation.protocol import ProtocolConfig
@@ -46,7 +46,8 @@ def object_of(label, otherwise="Continue Exploration", *, unless_rejected=False)
 @pytest.fixture(scope="module")
 def moved():
     """The chair is found, the agent goes to the bedroom, and the chair is gone when it is asked for again, twice."""
-    agent = Noting()
+    agent = MsgNav()
+    rounds = noted(agent)
     away = {"moves": CHAIR_AWAY, "mode": "SALIENT_OBJECT"}
     stages = (
         stage_case(1, "Chair|1"),
@@ -54,7 +55,7 @@ def moved():
         stage_case(3, "Chair|1", **away),
         stage_case(4, "Fridge|1", moves=CHAIR_AWAY, before=CHAIR_AWAY),
     )
-    return agent, run(agent, *stages)
+    return rounds, run(agent, *stages)
 
 
 def test_static_goals_are_found_and_verified(moved):
@@ -166,36 +167,23 @@ def test_the_text_matcher_sees_to_that_too():
     assert record.state is EndState.SUCCESS
 
 
-class Noting(MsgNav):
-    """Notes observations, actions and beliefs of all rounds."""
-
-    def begin_task(self, task):
-        super().begin_task(task)
-        self.rounds = []
-
-    def act(self, observation):
-        action = super().act(observation)
-        self.rounds.append((observation, action, belief_of(self)))
-        return action
-
-    @property
-    def places_m(self):
-        """Where it went, by round, up to the stop."""
-        return [action.position_m for _, action, _ in self.rounds if isinstance(action, NavigateTo)]
+def places_m(rounds):
+    """Where it went, by round, up to the stop."""
+    return [one.action.position_m for one in rounds if isinstance(one.action, NavigateTo)]
 
 
 def test_the_place_to_stand_is_chosen_once_or_again_while_it_is_off_the_circle():
     """Floor around a far target is not mapped yet: the nearest free cells are far from it."""
     start = replace(START, x_m=2.5, z_m=2.5, yaw_rad=np.pi / 2)
-    kept = Noting()
+    kept, again = MsgNav(), MsgNav(MsgNavConfig(has_fixed_viewpoint=False))
+    rounds = [noted(kept), noted(again)]
     (record,) = run(kept, stage_case(1, "Bed|1"), start=start)
-    assert record.trace[0].counters["viewpoints_snapped"] == 1
-    assert len(kept.places_m) > 1
-    assert len(set(kept.places_m)) == 1
-    again = Noting(MsgNavConfig(has_fixed_viewpoint=False))
     run(again, stage_case(1, "Bed|1"), start=start)
-    assert again.places_m[0] == kept.places_m[0]
-    assert again.places_m[-1] != again.places_m[0]
+    assert record.trace[0].counters["viewpoints_snapped"] == 1
+    kept_m, again_m = map(places_m, rounds)
+    assert len(kept_m) > 1
+    assert set(kept_m) == {again_m[0]}
+    assert again_m[-1] != again_m[0]
 
 
 def test_a_word_for_nothing_in_the_image_leads_to_a_random_frontier():
@@ -248,9 +236,10 @@ def test_verification_looks_at_five_rounds_of_seven_views_of_this_stage():
 def test_verification_sees_only_what_was_seen_before_the_arrival():
     """The original asks right after the move, before it looks around at the place."""
     model = script(object_of("Fridge"), arrival="no")
-    agent = Noting(decision=model)
+    agent = MsgNav(decision=model)
+    rounds = noted(agent)
     (record,) = run(agent, stage_case(1, "Fridge|1"), protocol=ProtocolConfig(max_rounds=25))
-    arrivals = [number for number, (observation, _, _) in enumerate(agent.rounds) if observation.has_arrived]
+    arrivals = [number for number, one in enumerate(rounds) if one.observation.has_arrived]
     verified = [at for at in arrivals if record.trace[at - 1].choice.startswith("object")]
     first = asked(model, "arrival")[0]
     assert verified[0] < 5
@@ -312,12 +301,11 @@ def test_no_valid_answer_on_arrival_counts_as_no():
 
 
 def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
-    agent, records = moved
-    assert agent.sensors.later_rounds == agent.sensors.first_round
-    assert (agent.sensors.later_rounds.count, agent.sensors.later_rounds.spacing_deg) == (7, 40.0)
-    assert [len(observation.views) for observation, _, _ in agent.rounds] == [7] * sum(len(r.trace) for r in records)
-    beliefs = [belief for _, _, belief in agent.rounds]
-    for before, after in pairwise(beliefs):
+    rounds, records = moved
+    sensors = MsgNav().sensors
+    assert sensors.later_rounds == sensors.first_round == ViewSchedule(7, 40.0)
+    assert [len(one.observation.views) for one in rounds] == [7] * sum(len(r.trace) for r in records)
+    for before, after in pairwise(one.belief for one in rounds):
         assert not np.any((before.cells != 0) & (after.cells == 0))
         assert not np.any(before.explored & ~after.explored)
 

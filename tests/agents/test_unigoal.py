@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import toy_episode
 from evonav_studies.variants import unigoal_as_published
 from scripted_model import scripted
-from toy_episode import START, belief_of
+from toy_episode import START, belief_of, noted
 from toy_house import OBJECTS, stage_case
 
 from evonav.agents.unigoal.agent import UniGoal, UniGoalConfig
@@ -24,7 +25,6 @@ from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 
-AS_PUBLISHED = UniGoalConfig(graph=GraphConfig(mode="paper"))
 SHORT = ProtocolConfig(max_actions=60)
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
 
@@ -35,19 +35,6 @@ def run(agent, *stages, start=START, perception=None, protocol=SHORT):
 
 def choices(record):
     return [entry.choice for entry in record.trace]
-
-
-class Watched(UniGoal):
-    """Notes each observation, what the agent holds true after it, and its diagnostics."""
-
-    def begin_task(self, task):
-        super().begin_task(task)
-        self.rounds = []
-
-    def act(self, observation):
-        action = super().act(observation)
-        self.rounds.append((observation, belief_of(self), self.explain()))
-        return action
 
 
 def cell_at(belief, place_m):
@@ -81,26 +68,26 @@ def test_the_goal_in_view_is_approached_confirmed_and_stopped_at():
 @pytest.fixture(scope="module")
 def in_vain():
     """A search for what no detector knows, to the end of the budget; only as published may it be named so."""
-    agent = Watched(AS_PUBLISHED)
+    agent = unigoal_as_published()
+    rounds = noted(agent)
     (record,) = run(agent, stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig())
-    return agent, record
+    return rounds, record
 
 
 def test_a_category_without_a_word_never_triggers_and_the_budget_is_500_actions(in_vain):
-    agent, record = in_vain
-    assert agent.explain().details["category"] is None
+    rounds, record = in_vain
+    assert rounds[-1].said.details["category"] is None
     assert len(record.trace) == 500
     assert not record.has_stopped
     assert set(choices(record)) <= {"exploration", "stuck", "none"}
 
 
 def test_with_nothing_left_to_explore_it_goes_to_random_explored_places(in_vain):
-    agent, _ = in_vain
     drawn = []
-    for (_, before, _), (observation, after, diagnostics) in zip(agent.rounds, agent.rounds[1:], strict=False):
-        (was,), (target,) = before.frontiers, after.frontiers
-        if target != was and diagnostics.counters["targets"] == 31:
-            drawn.append((target.position_m, observation.pose, after))
+    for before, after in pairwise(in_vain[0]):
+        (was,), (target,) = before.belief.frontiers, after.belief.frontiers
+        if target != was and after.said.counters["targets"] == 31:
+            drawn.append((target.position_m, after.observation.pose, after.belief))
     assert len(drawn) >= 10
     drawn = drawn[1:]  # the first one is the last frontier
     assert len({place_m for place_m, _, _ in drawn}) == len(drawn)
@@ -251,32 +238,34 @@ def test_as_published_a_node_found_whole_is_walked_to():
 
 
 def test_runs_are_the_same_every_time(in_vain):
-    agent, record = in_vain
-    again = Watched(AS_PUBLISHED)
-    (shorter,) = run(again, stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig(max_actions=350))
+    rounds, record = in_vain
+    agent = unigoal_as_published()
+    again = noted(agent)
+    (shorter,) = run(agent, stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig(max_actions=350))
     assert shorter.trace == record.trace[:350]
     # Places drawn when nothing is left to explore are the same ones, too.
-    targets = [[belief.frontiers for _, belief, _ in one.rounds[:350]] for one in (agent, again)]
+    targets = [[one.belief.frontiers for one in noted_[:350]] for noted_ in (rounds, again)]
     assert targets[0] == targets[1]
 
 
 def test_belief_shows_the_known_part_of_the_map_at_half_its_resolution():
-    agent = Watched()
+    agent = UniGoal()
+    rounds = noted(agent)
     run(agent, stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_actions=20))
-    _, belief, diagnostics = agent.rounds[-1]
+    belief = rounds[-1].belief
     frame = belief.map_frame
     assert frame.cell_m == pytest.approx(0.1)
     assert belief.cells.shape == (frame.rows, frame.cols)
     assert {entry.label for entry in belief.entries} <= {category for category, _, _ in OBJECTS.values()}
     assert (belief.cells > 0).sum() > 300
     # The same views make the same map.
-    assert diagnostics.counters["collisions"] == 0
+    assert rounds[-1].said.counters["collisions"] == 0
     bev = BevMap((START.x_m, START.z_m), len(MAP_CATEGORIES))
-    for observation, _, _ in agent.rounds:
-        view = observation.views[-1]
+    for one in rounds:
+        view = one.observation.views[-1]
         bev.integrate(view, category_image(view.detections))
     for value in (FREE, BLOCKED):
-        cells = [bev.centre_of((row, col)) for row, col in np.argwhere(bev.cells == value).tolist()]
+        cells = [bev.map_frame.centre_m(row, col) for row, col in np.argwhere(bev.cells == value).tolist()]
         assert len(cells) > 100
         assert all(cell_at(belief, place_m) >= value for place_m in cells)
     fine = {(math.floor(10 * x_m), math.floor(10 * z_m)) for x_m, z_m in cells}

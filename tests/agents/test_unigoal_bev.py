@@ -41,7 +41,7 @@ def floor_and_box(yaw_rad: float, horizon_rad: float, box: tuple[float, float, f
 
 def where(cells: NDArray[np.bool_], bev: BevMap) -> NDArray[np.float64]:
     """`(N, 2)` x and z of cells."""
-    return np.array([bev.centre_of((int(row), int(col))) for row, col in np.argwhere(cells)]).reshape(-1, 2)
+    return np.array([bev.map_frame.centre_m(int(row), int(col)) for row, col in np.argwhere(cells)]).reshape(-1, 2)
 
 
 @pytest.mark.parametrize("horizon_deg", [0.0, 30.0])
@@ -87,11 +87,11 @@ def test_the_cells_of_a_mask_are_where_its_pixels_lie() -> None:
     bev = BevMap((0.0, 0.0), 0)
     view = floor_and_box(0.0, 0.5, (-0.4, 0.4, 1.6, 2.4))
     heights = unproject(view.depth_m, Pose(0.0, CAMERA_M, 0.0, 0.0, 0.5), INTRINSICS)[..., 1]
-    cells = bev.cells_of(view, heights > 0.5)
+    cells = bev.core.cells_of(view, heights > 0.5)
     assert len(cells) > 100
-    points = np.array([bev.centre_of((int(row), int(col))) for row, col in cells])
+    points = np.array([bev.map_frame.centre_m(int(row), int(col)) for row, col in cells])
     assert np.abs(points - (0.0, 2.0)).max() < 0.43
-    assert len(bev.cells_of(view, np.zeros((300, 300), np.bool_))) == 0
+    assert len(bev.core.cells_of(view, np.zeros((300, 300), np.bool_))) == 0
     grown = bev.core.grown(cells[:1], 3)
     assert len(grown) == 29  # the disk of radius 3
     assert np.hypot(*(grown - cells[0]).T).max() == 3.0
@@ -101,7 +101,7 @@ def test_places_and_cells() -> None:
     bev = BevMap((1.0, -2.0), 0, BevConfig(size_m=10.0))
     assert bev.map_frame.rows == bev.map_frame.cols == 200
     assert bev.cell_of((1.01, -1.99)) == (100, 100)
-    assert bev.centre_of((100, 100)) == pytest.approx((1.025, -1.975))
+    assert bev.map_frame.centre_m(100, 100) == pytest.approx((1.025, -1.975))
     assert bev.cell_of((6.01, 0.0)) is None
     assert bev.cell_of((-4.01, 0.0)) is None
 
@@ -114,7 +114,7 @@ def test_bad_images_are_refused_by_name() -> None:
     with pytest.raises(InvalidArgumentError, match="categories"):
         bev.integrate(view, np.full((300, 300), 2, np.int32))
     with pytest.raises(InvalidArgumentError, match="mask"):
-        bev.cells_of(view, np.zeros((3, 3), np.bool_))
+        bev.core.cells_of(view, np.zeros((3, 3), np.bool_))
     with pytest.raises(InvalidArgumentError, match="stride_px"):
         BevMap((0.0, 0.0), 2, BevConfig(stride_px=0))
     assert not bev.core.explored.any()

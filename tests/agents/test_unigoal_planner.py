@@ -134,7 +134,7 @@ def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
         planner.observe(pose, action=Action.MOVE_FORWARD)
         rows, cols = np.nonzero(bev.core.collisions)
         widths.append((np.ptp(rows) + 1, np.ptp(cols) + 1))
-        centres = np.array([bev.centre_of((int(r), int(c))) for r, c in zip(rows, cols, strict=True)])
+        centres = np.array([bev.map_frame.centre_m(int(r), int(c)) for r, c in zip(rows, cols, strict=True)])
         assert centres[:, 1].min() > 0.1
     # Three cells across, then five, then four cells deep: and it is stuck.
     assert widths == [(2, 3), (2, 5), (4, 5)]

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -132,6 +133,15 @@ class Explorer:
         x_m, z_m = frontier.position_m
         ahead = (x_m + math.sin(frontier.direction_rad), z_m + math.cos(frontier.direction_rad))
         return frontier.position_m, ahead
+
+    def ways_m(self, here: Point2, places_m: Sequence[Point2], detour: float = 1.0) -> list[float]:
+        """Return the length of the way to each place over known floor; `detour` straight lines where none leads."""
+        if not places_m:
+            return []
+        return [
+            way_m if math.isfinite(way_m) else detour * math.dist(here, place_m)
+            for way_m, place_m in zip(self.map.distances_m(here, np.array(places_m)).tolist(), places_m, strict=True)
+        ]
 
     def is_going_to(self, frontier: Frontier) -> bool:
         """Return whether the agent last went to this frontier and is not there yet."""

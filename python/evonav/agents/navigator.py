@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-import numpy as np
-
 from evonav.agents.explorer import AS_THREE_D_MEM_PLUS, Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import FrontierCandidate, ObjectAppearance, ObjectCandidate
@@ -239,13 +237,10 @@ class Navigator:
     def frontier_candidates(self, here: Point2, *, with_images: bool = False) -> list[FrontierCandidate]:
         """Return all frontiers as questions describe them."""
         frontiers = self.explorer.frontiers
-        distances_m = [math.dist(frontier.position_m, here) for frontier in frontiers]
-        if self._names_colours and frontiers:
-            positions_m = np.array([frontier.position_m for frontier in frontiers])
-            ways_m = self.explorer.map.distances_m(here, positions_m).tolist()
-            distances_m = [
-                way if math.isfinite(way) else straight for way, straight in zip(ways_m, distances_m, strict=True)
-            ]
+        if self._names_colours:
+            distances_m = self.explorer.ways_m(here, [frontier.position_m for frontier in frontiers])
+        else:
+            distances_m = [math.dist(frontier.position_m, here) for frontier in frontiers]
         return [
             FrontierCandidate(
                 frontier.id,

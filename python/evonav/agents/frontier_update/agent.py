@@ -65,13 +65,12 @@ class FrontierUpdate(NavigatorAgent):
             encoder()  # reports a missing extra before the episode
         super().__init__(self.config.navigator, decision, num_tries=self.config.num_tries)
         self._matcher = Matcher()
-        self._details: dict[str, Any] = {}
-        """Extras for the records, beside the reason of a choice."""
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
         super().begin_task(task)
-        self._details = {}
+        self._details: dict[str, Any] = {}
+        """Extras for the records, beside the reason of a choice."""
 
     def act(self, observation: Observation) -> AgentAction:
         """Stop at the committed object if it was reached; else look, decide and move on."""

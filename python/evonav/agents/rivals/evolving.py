@@ -1,6 +1,5 @@
 """EvolvingNav's filter (arXiv 2609.39166): looks where most of the belief is found a metre."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -216,7 +215,8 @@ class Evolving(FailThenUpdateIdentity):
         sites = sorted(chances, key=lambda one: (-chances[one], one))[: self.config.num_sites]
         self._candidates = tuple(sites)
         targets = [self._target(entries[one]) for one in sites]
-        ways_m = self._ways_m(here, [*(one.goal_m for one in targets), *(one.position_m for one in frontiers)])
+        places_m = [*(one.goal_m for one in targets), *(one.position_m for one in frontiers)]
+        ways_m = navigator.explorer.ways_m(here, places_m, UNREACHED)
         shares = [belief.unknown * share for share in hidden]
         best = best_of([*(chances[one] for one in sites), *shares], ways_m, self.config.inspect_m)
         if best is None:
@@ -251,15 +251,6 @@ class Evolving(FailThenUpdateIdentity):
     def _target(self, entry: ObjectEntry) -> NavigationTarget:
         centre_m = (entry.centre_m[0], entry.centre_m[2])
         return NavigationTarget(entry.id, self._navigator.observation_point(centre_m) or centre_m, centre_m)
-
-    def _ways_m(self, here: Point2, places_m: list[Point2]) -> list[float]:
-        if not places_m:
-            return []
-        ways_m = self._navigator.explorer.map.distances_m(here, np.array(places_m)).tolist()
-        return [
-            way_m if math.isfinite(way_m) else UNREACHED * math.dist(here, place_m)
-            for way_m, place_m in zip(ways_m, places_m, strict=True)
-        ]
 
     def _without_chance(self, entries: Mapping[int, ObjectEntry], here: Point2) -> AgentAction:
         """Go back to the likeliest object that was set aside; without one the target is not found."""

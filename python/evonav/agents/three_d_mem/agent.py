@@ -111,7 +111,6 @@ class ThreeDMem(NavigatorAgent):
     def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or ThreeDMemConfig()
         super().__init__(self.config.navigator, decision, num_tries=self.config.num_tries)
-        self._details: dict[str, Any] = {}
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
@@ -123,7 +122,7 @@ class ThreeDMem(NavigatorAgent):
         self._queries.begin_round()
         self._candidates = ()
         navigator = self._navigator
-        self._details = {"num_snapshots_before": len(self._snapshots.snapshots)}
+        self._details: dict[str, Any] = {"num_snapshots_before": len(self._snapshots.snapshots)}
         reached = navigator.reached(observation)
         if reached is not None:
             return self._stop("arrived", reached.entry_id)

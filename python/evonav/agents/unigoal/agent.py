@@ -155,7 +155,7 @@ class UniGoal:
         rows, cols = np.nonzero(open_cells)
         for _ in range(_NUM_DRAWS if len(rows) else 0):
             index = self._random.randrange(len(rows))
-            place_m = bev.centre_of((int(rows[index]), int(cols[index])))
+            place_m = bev.map_frame.centre_m(int(rows[index]), int(cols[index]))
             cell = np.array([[rows[index], cols[index]]], np.int32)
             is_far = math.dist(place_m, (pose.x_m, pose.z_m)) >= planner.config.reached_m
             if is_far and planner.distance_m(pose, cell) is not None:

@@ -55,7 +55,6 @@ class BevMap:
             InvalidArgumentError: A parameter is outside its domain; the message names it.
         """
         self.config = config = config or BevConfig()
-        self.num_categories = num_categories
         self.core = _core.BevMap(centre_m, num_categories, config)
         """The map in Rust: what was seen, where the agent has been and collided, and paths."""
         rows, cols = self.core.shape
@@ -73,18 +72,10 @@ class BevMap:
         """
         self.core.integrate(view, categories)
 
-    def cells_of(self, view: View, mask: NDArray[np.bool_]) -> Cells:
-        """Return the cells of the marked pixels `(H, W)` of a view, sorted, each once; at any height and distance."""
-        return self.core.cells_of(view, mask)
-
     def cell_of(self, point_m: Point2) -> tuple[int, int] | None:
         """Return the `(row, col)` of the cell that contains `(x, z)`; `None` off the map."""
         row, col = self.map_frame.cells_at(np.array(point_m)).tolist()
         return (row, col) if 0 <= row < self.map_frame.rows and 0 <= col < self.map_frame.cols else None
-
-    def centre_of(self, cell: tuple[int, int]) -> Point2:
-        """Return the `(x, z)` of the middle of a cell `(row, col)`."""
-        return self.map_frame.centre_m(*cell)
 
     @property
     def cells(self) -> NDArray[np.uint8]:

@@ -61,7 +61,7 @@ class GoalWatch:
             seen_ids: Ids of the scene nodes in view.
         """
         mask = None if category is None else largest_detection(view, category)
-        found = None if mask is None else self._glimpse(self._bev.cells_of(view, mask), "detection")
+        found = None if mask is None else self._glimpse(self._bev.core.cells_of(view, mask), "detection")
         is_node_seen = self.temporary is not None and self.temporary.node_id in seen_ids
         self.is_in_view = mask is not None or is_node_seen
         if self.confirmed is None and found is not None and self._gives_way(found):

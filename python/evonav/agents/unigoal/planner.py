@@ -202,7 +202,7 @@ class UniGoalPlanner:
         self._num_target_steps = 0
         if chosen is not None:
             self.counters["targets"] += 1
-            self.target_m = bev.centre_of(chosen[0])
+            self.target_m = bev.map_frame.centre_m(*chosen[0])
         return self.target_m
 
     def distance_m(self, pose: Pose, goal: Cells) -> float | None:
@@ -312,7 +312,7 @@ class UniGoalPlanner:
             return None
         far = cells[np.hypot(*(cells - here).T) > self.config.stuck_cells]
         row, col = self._random.choice((far if len(far) else cells).tolist())
-        return self.bev.centre_of((row, col))
+        return self.bev.map_frame.centre_m(row, col)
 
     @property
     def _margin(self) -> int:
