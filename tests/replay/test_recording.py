@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import command
 
-from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import load_spec
@@ -24,8 +23,7 @@ rerun_chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed"
 @pytest.fixture(scope="module")
 def recording(viewed_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rerun") / "x.rrd"
-    result = CliRunner().invoke(app, ["video", str(viewed_run), "--agent", "fu", "--out", str(path)])
-    assert result.exit_code == 0, result.output
+    command("video", viewed_run, "--agent", "fu", "--out", path)
     assert [item.name for item in path.parent.iterdir()] == ["x.rrd"]
     return path
 

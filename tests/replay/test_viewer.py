@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import command
 from hypothesis import given
 from hypothesis import strategies as st
 from made_up_run import entry, stage_record
@@ -45,9 +46,8 @@ def stages(viewed_run: Path, task_id: str) -> list[ReplayedStage]:
 
 @pytest.fixture(scope="module")
 def pages(viewed_run: Path) -> Path:
-    result = CliRunner().invoke(app, ["view", str(viewed_run)])
-    assert result.exit_code == 0, result.output
-    assert str(viewed_run / "view" / "index.html") in result.output
+    result = command("view", viewed_run)
+    assert str(viewed_run / "view" / "index.html") in result
     return viewed_run / "view"
 
 
@@ -245,7 +245,7 @@ def test_the_index_keeps_earlier_pages_and_the_report_links_to_them(
     run = Path(shutil.copytree(viewed_run, tmp_path / "run", ignore=shutil.ignore_patterns("view")))
     assert ">round by round<" not in write_report(run).read_text("utf-8")
     for agent in ("random-walk", "fu"):
-        assert CliRunner().invoke(app, ["view", str(run), "--agent", agent, "--task", task_id]).exit_code == 0
+        command("view", run, "--agent", agent, "--task", task_id)
     index = (run / "view" / "index.html").read_text("utf-8")
     assert all(f'<a href="{page_name(task_id, agent)}">' in index for agent in ("fu", "random-walk"))
     (run / "view" / page_name(task_id, "random-walk")).unlink()
@@ -275,8 +275,7 @@ def test_one_stage_and_pages_a_stage(
     viewed_run: Path, stages: list[ReplayedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = ["--task", task_id, "--agent", "fu", "--stage", "2", "--out", str(tmp_path / "a")]
-    result = CliRunner().invoke(app, ["view", str(viewed_run), *asked])
-    assert result.exit_code == 0, result.output
+    command("view", viewed_run, *asked)
     (path,) = (tmp_path / "a").glob("*_stage2.html")
     assert [stage["k"] for stage in data_of(path)["stages"]] == [2]
     monkeypatch.setattr("evonav.replay.pages.MAX_PAGE_BYTES", 1000)
@@ -303,9 +302,8 @@ def test_a_replay_that_differs_is_told_on_the_page(viewed_run: Path, task_id: st
             store.set_meta(key, value)
         for record in records:
             store.add_stage(encode_stage(record, wall_s=0.0, cpu_s=0.0))
-    result = CliRunner().invoke(app, ["view", str(tmp_path / "run"), "--task", task_id, "--agent", "random-walk"])
-    assert result.exit_code == 0, result.output
-    assert "the replay differs from the records" in result.output
+    result = command("view", tmp_path / "run", "--task", task_id, "--agent", "random-walk")
+    assert "the replay differs from the records" in result
     data = data_of(tmp_path / "run" / "view" / page_name(task_id, "random-walk"))
     assert data["stages"][0]["differences"] == ['stop_reason: "other" stored, "" replayed']
     assert "replay differs from the records" in (tmp_path / "run" / "view" / "index.html").read_text("utf-8")

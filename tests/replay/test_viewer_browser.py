@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 from browser import XSS_CORPUS, needs_browser, probed
-from typer.testing import CliRunner
+from command_line import command
 
-from evonav.cli import app
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import ReplayedStage
@@ -26,8 +25,7 @@ pytestmark = needs_browser
 def pages(viewed_run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Pages by agent: one that is shown images, and one that tells nothing."""
     path = tmp_path_factory.mktemp("view")
-    result = CliRunner().invoke(app, ["view", str(viewed_run), "--out", str(path)])
-    assert result.exit_code == 0, result.output
+    command("view", viewed_run, "--out", path)
     return {agent: next(path.glob(f"*_{agent}.html")) for agent in ("fu", "random-walk")}
 
 

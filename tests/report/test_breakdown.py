@@ -5,10 +5,9 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from command_line import command
 from made_up_run import lettered_run, record_run, stage_record
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
@@ -113,9 +112,8 @@ def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
 def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Path) -> None:
     md, tex, table = tmp_path / "b.md", tmp_path / "b.tex", tmp_path / "b.csv"
     asked = ["breakdown", str(run), "--out", str(md), "--out", str(tex), "--out", str(table)]
-    result = CliRunner().invoke(app, asked)
-    assert result.exit_code == 0, result.output
-    assert "SR by success radius" in result.output
+    result = command(*asked)
+    assert "SR by success radius" in result
     assert md.read_text().count("\n## ") + 1 == tex.read_text().count(r"\toprule") == 7
     assert len({row["by"] for row in csv.DictReader(table.read_text().splitlines())}) == 7
 

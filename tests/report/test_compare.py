@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+from command_line import command
 from made_up_run import lettered_run, stage_record
 from typer.testing import CliRunner
 
@@ -140,14 +141,13 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     (run / VIEW_DIR / page_name("task-00", "fu")).write_text("page")
     files = {name: tmp_path / "out" / f"c.{name}" for name in ("md", "tex", "csv", "html", "svg")}
     options = [f"--out={path}" for path in files.values()]
-    result = CliRunner().invoke(app, ["compare", str(run), "ftu", "fu", *options])
-    assert result.exit_code == 0, result.output
+    result = command("compare", run, "ftu", "fu", *options, columns=80)
     assert (
         "ftu is ahead by 37.5 points of SR [18.8, 50.0] (87.5 vs 50.0%, p = 0.031; 16 stages in 8 houses)."
-        in " ".join(result.output.split())
+        in " ".join(result.split())
     )
-    assert re.search(r"^ % +ftu +fu +difference", result.output, re.MULTILINE), "in the order named"
-    assert max(len(line) for line in result.output.splitlines() if not line.startswith(("written", "note"))) <= 80
+    assert re.search(r"^ % +ftu +fu +difference", result, re.MULTILINE), "in the order named"
+    assert max(len(line) for line in result.splitlines() if not line.startswith(("written", "note"))) <= 80
     found = one(run, "ftu", "fu")
     rows = {(row["part"], row["metric"]): row for row in csv.DictReader(io.StringIO(files["csv"].read_text()))}
     effect = found.all.effects["success"]
@@ -158,10 +158,10 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     told = json.loads(again.stdout)  # nothing else is on standard output
     assert told == json.loads(json.dumps(comparison_json([found])))
     assert told["comparisons"][0]["parts"][0]["effects"]["success"]["verdict"] == "b"
-    command = f"evonav view {run} --task task-01 --agent ftu,fu --stage 2"
-    assert command in files["md"].read_text()
+    replays = f"evonav view {run} --task task-01 --agent ftu,fu --stage 2"
+    assert replays in files["md"].read_text()
     page = files["html"].read_text()
-    assert command in page
+    assert replays in page
     # Where a page is, it is linked to; from the folder of the comparison.
     assert f'href="../run/view/{page_name("task-00", "fu")}#stage=2&amp;round=1"' in page
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "")

@@ -4,6 +4,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
+from command_line import command
 from made_up_run import WriteRun, lettered_run
 from typer.testing import CliRunner
 
@@ -18,8 +19,7 @@ def test_a_row_a_stage_with_every_measure(tmp_path: Path) -> None:
     run = lettered_run(tmp_path / "run", {"fu": "sfse", "=ftu": "sf"})
     files = {suffix: tmp_path / "out" / f"s.{suffix}" for suffix in ("csv", "jsonl", "parquet")}
     pytest.importorskip("pyarrow")
-    result = CliRunner().invoke(app, ["export", str(run), *(f"--out={path}" for path in files.values())])
-    assert result.exit_code == 0, result.output
+    command("export", run, *(f"--out={path}" for path in files.values()))
     names = [field.name for field in fields(StageMetrics)]
     rows = stage_table(run)
     assert [list(row) for row in rows] == [names] * 6

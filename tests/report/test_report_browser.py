@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 from browser import XSS_CORPUS, needs_browser, probed
+from command_line import command
 from made_up_run import WriteRun, entry, record_run, stage_record
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.report import write_report
 from evonav.report.pages import run_page as html
@@ -27,8 +26,7 @@ def test_a_report_can_be_worked(
 ) -> None:
     if is_packed:
         monkeypatch.setattr(html, "MAX_OPEN_STAGES", 1)
-    result = CliRunner().invoke(app, ["report", str(viewed_run), "--out", str(tmp_path / "out"), "--replays", "1"])
-    assert result.exit_code == 0, result.output
+    command("report", viewed_run, "--out", tmp_path / "out", "--replays", "1")
     found = probed(tmp_path / "out" / "report.html", PROBE, tmp_path, size)
     assert found["errors"] == []
     assert found["packed"] == is_packed

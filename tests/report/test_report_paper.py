@@ -10,11 +10,10 @@ import numpy as np
 import perception_results
 import pytest
 from behaviour_tables import cause_share_table, end_table, ends_of, success_by_group
+from command_line import command
 from made_up_run import WriteRun, entry, floor_plan, record_run, stage_record
 from scipy import stats
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import AgentPair
 from evonav.evaluation.records.schema import EndState, StageRecord
@@ -186,9 +185,8 @@ def test_order_tells_ties_and_leaves_out_what_has_no_rate() -> None:
 def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path: Path) -> None:
     run_dir, out = write_run(), tmp_path / "paper.md"
     arguments = ["paper", str(run_dir), "--out", str(out), "--reweight", "procthor-10k"]
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
-    assert result.exit_code == 0, result.output
-    assert "Table 2: moved and not moved targets" in result.output
+    result = command(*arguments)
+    assert "Table 2: moved and not moved targets" in result
     text = out.read_text(encoding="utf-8")
     assert text.startswith(markdown_tables(paper.paper_tables(load_run(run_dir))))
     assert text.count("\n| ftu |") == 5
@@ -219,8 +217,7 @@ def latex_of(write_run: WriteRun, tmp_path: Path) -> str:
     run = record_run(tmp_path / "r_1", records, {f"task-{i}": 2 for i in range(6)}, ["fu", "ftu", "my_agent & co"])
     out = tmp_path / "tables.tex"
     asked = ["paper", str(run), "--out", str(out), "--prediction", str(write_run())]
-    result = CliRunner().invoke(app, asked, env={"COLUMNS": "200"})
-    assert result.exit_code == 0, result.output
+    command(*asked)
     return out.read_text(encoding="utf-8")
 
 

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 from browser import Chromium, needs_browser
+from command_line import command
 from made_up_analysis import ARMS, PAIRS, write_analysis
 from made_up_run import WriteRun
-from typer.testing import CliRunner
 
-from evonav.cli import app
 from evonav.controlled.page import write_controlled_report
 from evonav.tasks.listing import BUNDLED_TASKS
 
@@ -17,11 +16,6 @@ pytestmark = needs_browser
 
 BROKEN = "[...document.images].filter(image => !image.complete || image.naturalWidth === 0).length"
 SMUGGLED = '<script>document.title = "smuggled"</script><img src="https://example.org/x" onerror="document.title = 1">'
-
-
-def command(*words: str | Path) -> None:
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    assert result.exit_code == 0, result.output
 
 
 def pages_of(folder: Path, write_run: WriteRun) -> list[Path]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from command_line import command
 from html_page import HtmlPage
 from typer.testing import CliRunner
 
@@ -176,17 +177,16 @@ def test_a_page_needs_no_other_file_and_escapes_all_text(task: Task, tmp_path: P
 
 
 def test_the_command_draws_a_task_a_stage_and_a_gallery(task: Task, tmp_path: Path) -> None:
-    run = CliRunner().invoke
     root = write_task(task, tmp_path / "set")
     page = tmp_path / "one.html"
-    assert run(app, ["tasks", "show", str(root), "--out", str(page)]).exit_code == 0
+    command("tasks", "show", root, "--out", page)
     assert page.read_text(encoding="utf-8").count('class="task stage-plan"') == 3
     picture = tmp_path / "stage.svg"
     arguments = ["tasks", "show", str(root.parent), "--task", task.task_id, "--stage", "2", "--out", str(picture)]
-    assert run(app, arguments).exit_code == 0
+    command(*arguments)
     ElementTree.parse(picture)
     gallery = tmp_path / "gallery"
-    assert run(app, ["tasks", "show", str(root.parent), "--out", str(gallery)]).exit_code == 0
+    command("tasks", "show", root.parent, "--out", gallery)
     index = (gallery / "index.html").read_text(encoding="utf-8")
     assert f'href="{task.task_id}.html"' in index
     assert 'data-modes="FULL_SHUFFLE"' in index

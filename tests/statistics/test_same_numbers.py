@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import command
 
 import evonav
-from evonav.cli import app
 from evonav.statistics import ClusterBootstrap
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -24,12 +23,6 @@ NUM_HOUSES, NUM_HOUSES_WITH_TWO_TASKS = 8, 4
 AGENTS = ("fu", "stage-reset", "random-walk")
 GROUPS = {"first": "stage_1", "moved": "relocated", "not moved": "not_relocated"}
 """Strata as `evonav breakdown` and as the summary name them."""
-
-
-def command(*arguments: object) -> str:
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "300"})
-    assert done.exit_code == 0, done.output
-    return done.output
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from browser import XSS_CORPUS, Chromium, needs_browser
+from command_line import command
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -35,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, tasks: RankedTasks) -> Path
         root / "run", root / "packs" / "ours.evonav.jsonl.gz", about=About(title="Ours", url="https://example.org/ours")
     )
     options = ("--perception", "noisy:poor", "--limit", "1", "--workers", "0", "--out", str(root / "poor"))
-    assert CliRunner().invoke(app, ["evaluate", "--agent", "fu", *options]).exit_code == 0
+    command("evaluate", "--agent", "fu", *options)
     pack(root / "poor", root / "packs" / "poor.evonav.jsonl.gz")
     return root
 
@@ -166,9 +167,8 @@ def test_the_page_is_sorted_by_a_click_and_fits_a_phone(board: Leaderboard, tmp_
 
 def test_the_command_names_what_it_ranked_and_what_not(folder: Path, tmp_path: Path) -> None:
     words = ["leaderboard", str(folder / "packs"), "--scores-only", "--workers", "0", "--out", str(tmp_path / "p.html")]
-    shown = CliRunner().invoke(app, [*words, "--limit", "1"], env={"COLUMNS": "200"})
-    assert shown.exit_code == 0, shown.output
-    assert re.search(r"leaderboard: .*p\.html \(\d agents in \d tables?; 0 not ranked\)", shown.stdout)
+    shown = command(*words, "--limit", "1")
+    assert re.search(r"leaderboard: .*p\.html \(\d agents in \d tables?; 0 not ranked\)", shown)
     assert "evonav-mini (first 1): 1 with 4 stages" in (tmp_path / "p.html").read_text("utf-8")
     shown = CliRunner().invoke(app, words)
     assert "incomplete: ours.evonav.jsonl.gz: 1 of 24 tasks of evonav-mini" in shown.stdout

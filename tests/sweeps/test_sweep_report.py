@@ -3,9 +3,8 @@
 import re
 from pathlib import Path
 
-from typer.testing import CliRunner
+from command_line import command
 
-from evonav.cli import app
 from evonav.sweeps.report import sweep_plots
 from evonav.sweeps.summary import SweepRow
 
@@ -21,10 +20,8 @@ small = { folder = "bundled", limit = 1 }
 def test_a_sweep_has_a_page_and_a_report_a_cell(tmp_path: Path) -> None:
     (tmp_path / "sweep.toml").write_text(SWEEP)
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["sweep", str(tmp_path / "sweep.toml"), "--out", str(out), "--workers", "1"])
-    assert done.exit_code == 0, done.output
-    done = CliRunner().invoke(app, ["report", str(out)])
-    assert done.exit_code == 0, done.output
+    command("sweep", tmp_path / "sweep.toml", "--out", out, "--workers", "1")
+    command("report", out)
     text = (out / "report.html").read_text("utf-8")
     links = re.findall(r'<a href="([^"]+)">', text)
     assert len(links) == 2
@@ -36,8 +33,7 @@ def test_a_sweep_has_a_page_and_a_report_a_cell(tmp_path: Path) -> None:
         ("seed 1", "gt__text__small__s1"),
         ("seed 2", "gt__text__small__s2"),
     ]
-    elsewhere = CliRunner().invoke(app, ["report", str(out), "--out", str(tmp_path / "there")])
-    assert elsewhere.exit_code == 0, elsewhere.output
+    command("report", out, "--out", tmp_path / "there")
     assert all((tmp_path / "there" / link).is_file() for link in links)
 
 
