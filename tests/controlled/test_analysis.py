@@ -9,8 +9,7 @@ from made_up_analysis import ARMS, PAIRS, F, S, write_analysis
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.controlled.analysis import METRICS, load_analysis, pair_tables, split_of
-from evonav.controlled.claims import claims
+from evonav.controlled.analysis import METRICS, claims, load_analysis, pair_tables, split_of
 from evonav.controlled.layout import Arm, run_of
 from evonav.controlled.page import controlled_plots, write_controlled_report
 from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg

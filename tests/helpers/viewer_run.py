@@ -20,7 +20,7 @@ def scripted(seed):
             raise AnswerError("refusal", "I would rather not", "I would rather not")
         if count == 4:
             return "To the kitchen, please"
-        texts = [part.text for turn in question.prompt().turns for part in turn.parts if hasattr(part, "text")]
+        texts = [part for turn in question.prompt().turns for part in turn.parts if isinstance(part, str)]
         names = re.findall(r"^(Object \d+|Frontier \d+):", "\n".join(texts), re.MULTILINE)
         wanted = [name for name in names if name.startswith("Frontier" if count < 8 else "Object")]
         return f"{(wanted or names or ['Frontier 0'])[0]}\n{MARKUP}"

@@ -18,8 +18,7 @@ from evonav.drawing.svg import cm
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
 from evonav.report.tasks.floor_plans import TaskDrawing, _groups, change_frame, task_drawing
-from evonav.report.tasks.pages import stage_svg, write_task_page
-from evonav.report.tasks.text import change_sentence, move_rows
+from evonav.report.tasks.pages import change_sentence, move_rows, stage_svg, write_task_page
 from evonav.tasks import Task, write_task
 from evonav.tasks.oracle import StateChange
 

@@ -6,8 +6,16 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.controlled.analysis import BASELINE, METRICS, Analysis, Key, MetricOf, load_analysis, pair_tables
-from evonav.controlled.claims import claim_table
+from evonav.controlled.analysis import (
+    BASELINE,
+    METRICS,
+    Analysis,
+    Key,
+    MetricOf,
+    claim_table,
+    load_analysis,
+    pair_tables,
+)
 from evonav.controlled.paired_maps import (
     ARM_WORDS,
     REASONS,
