@@ -3,8 +3,8 @@
     evonav tasks generate --houses houses-train.jsonl.gz --limit 60 --out out/tasks/train
     python scripts/data/fit_priors.py out/tasks/train --houses houses-train.jsonl.gz
 
-prints the constants of `evonav.agents.proactive.config` and `evonav.decision.home_statistics`. Give it training houses
-only.
+prints the constants of `evonav.agents.proactive.config` and the rooms of `OF_TYPE` in `home_statistics`.
+Give it training houses only.
 """
 
 import argparse

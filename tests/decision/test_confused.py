@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 from test_noisy import Letter
 
 from evonav.agents.frontier_update.questions import ChooseQuestion
@@ -21,17 +22,12 @@ from evonav.decision.query import QuerySession
 from evonav.decision.rules import AppearanceMatch, TextMatch
 from evonav.decision.text.matcher import Matcher
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import StageRecord
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.run_settings import SettingError
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
 from evonav.tasks.language import COLOURS
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal
 
 TEXT = "Find the mug on the desk next to the laptop."
@@ -176,23 +172,11 @@ class Silent(TextMatch):
         self.matcher = None  # type: ignore[assignment]
 
 
-def run(folder: Path, num_workers: int, noise: dict[str, float]) -> list[StageRecord]:
-    backend = Backend(decision=Component("evonav.decision.backends:text_match", {"noise": noise}))
-    evaluate(
-        ["fu", "3d-mem", "unigoal"],
-        task_files(BUNDLED_TASKS, 1),
-        folder,
-        config=RunConfig(backend=backend),
-        num_workers=num_workers,
-    )
-    with RunStore(folder) as store:
-        return [StageRecord.model_validate_json(text) for text in store.record_texts()]
-
-
 @pytest.mark.slow
 def test_a_run_counts_confusions(tmp_path: Path) -> None:
-    noise = {"confused": 0.5, "wrong": 0.1}
-    here = run(tmp_path / "here", 0, noise)
+    noise = {"noise": {"confused": 0.5, "wrong": 0.1}}
+    backend = Backend(decision=Component("evonav.decision.backends:text_match", noise))
+    here = bundled_run(tmp_path, ["fu", "3d-mem", "unigoal"], backend)
     names = {name for record in here for name in record.trace[-1].counters if name.startswith("confused")}
     assert {"confused_objects", "confused_kept"} <= names <= {"confused_objects", "confused_unseen", "confused_kept"}
     unigoal = [record for record in here if record.agent == "unigoal"][-1].trace[-1].counters

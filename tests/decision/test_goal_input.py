@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.unigoal.agent import UniGoal
 from evonav.component import Component
-from evonav.decision.appearance import AppearanceMatcher, PictureConfig, goal_layout, picture_ratio
+from evonav.decision.appearance import PICTURE_CONSTANT, PICTURE_RANGE, AppearanceMatcher, goal_layout, picture_ratio
 from evonav.decision.backends import appearance_match, counting, custom, vlm
 from evonav.decision.candidates import ObjectAppearance, ObjectCandidate
 from evonav.decision.goal_input import GoalInput, PictureGoal, goal_as_given
@@ -20,17 +21,13 @@ from evonav.decision.prompts import Picture, goal_prompt
 from evonav.decision.question import Metered, Question, Reply
 from evonav.decision.rules import AppearanceMatch, TextMatch
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.run_settings import SettingError
 from evonav.evaluation.run.settings import DecisionSettings
 from evonav.memory.colours import Layout, layouts
 from evonav.submission.file import Submission
 from evonav.submission.packed_setup import packed_setup
 from evonav.tasks.language import COLOURS
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo
 
 SENTENCE = "Please navigate to the red mug on the desk."
@@ -84,9 +81,8 @@ def test_an_object_seen_amid_the_pictures_colours_is_likelier() -> None:
     parsed = matcher.parsed(goal_as_given(GOAL, "image"))
     assert (parsed.noun, parsed.relations, parsed.adjectives) == ("mug", (), ())
     other, same, unseen = matcher.scores(parsed, mugs, mugs, 0.0)
-    numbers = PictureConfig()
-    assert same / unseen == pytest.approx(min(np.exp(numbers.constant), numbers.range[1]))
-    assert other / unseen == pytest.approx(numbers.range[0])
+    assert same / unseen == pytest.approx(min(np.exp(PICTURE_CONSTANT), PICTURE_RANGE[1]))
+    assert other / unseen == pytest.approx(PICTURE_RANGE[0])
     # The sentence counts as before, and with both it counts beside the picture.
     assert matcher.scores(matcher.parsed(GOAL), mugs, mugs, 0.0) == pytest.approx([1 / 3] * 3)
     assert matcher.parsed(goal_as_given(GOAL, "both")).adjectives == ("red",)
@@ -94,13 +90,10 @@ def test_an_object_seen_amid_the_pictures_colours_is_likelier() -> None:
 
 def test_a_ratio_falls_with_each_distance_and_is_bounded() -> None:
     pictured = Layout((1.0, 0.0), (1.0, 0.0))
-    config = PictureConfig()
     mixed = (0.95, 0.05)
-    near, whole = (
-        picture_ratio(pictured, one, config) for one in (Layout(mixed, (1.0, 0.0)), Layout((1.0, 0.0), mixed))
-    )
-    same, apart = (picture_ratio(pictured, one, config) for one in (pictured, Layout((0.0, 1.0), (0.0, 1.0))))
-    assert config.range[0] == apart < whole < near < same <= config.range[1]
+    near, whole = (picture_ratio(pictured, one) for one in (Layout(mixed, (1.0, 0.0)), Layout((1.0, 0.0), mixed)))
+    same, apart = (picture_ratio(pictured, one) for one in (pictured, Layout((0.0, 1.0), (0.0, 1.0))))
+    assert PICTURE_RANGE[0] == apart < whole < near < same <= PICTURE_RANGE[1]
 
 
 def test_the_picture_of_a_new_stage_replaces_the_last() -> None:
@@ -137,18 +130,11 @@ class Recorder(AppearanceMatch):
         return super().answer(question, attempt)
 
 
-def record_texts(folder: Path, decision: Component[Any], num_workers: int) -> list[str]:
-    config = RunConfig(backend=Backend(decision=decision))
-    evaluate(["fu", "3d-mem"], task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=num_workers)
-    with RunStore(folder) as store:
-        return list(store.record_texts())
-
-
 @pytest.mark.slow
-def test_whole_stages_go_by_the_picture_alone_for_any_number_of_workers(tmp_path: Path) -> None:
+def test_whole_stages_go_by_the_picture_alone(tmp_path: Path) -> None:
     Recorder.asked.clear()
-    path = f"{__name__}:Recorder"
-    here = record_texts(tmp_path / "here", Component("evonav.decision.backends:custom", {"path": path}), 0)
+    recorder = Component("evonav.decision.backends:custom", {"path": f"{__name__}:Recorder"})
+    bundled_run(tmp_path, ["fu", "3d-mem"], Backend(decision=recorder))
     assert Recorder.asked
     assert all(isinstance(question.goal, PictureGoal) for question in Recorder.asked)
     assert not any(" on " in question.goal.unified_instruction for question in Recorder.asked)
@@ -156,8 +142,6 @@ def test_whole_stages_go_by_the_picture_alone_for_any_number_of_workers(tmp_path
     seen = [one.appearance for question in choices for one in question.objects if one.appearance is not None]
     assert seen
     assert all(one.layout is not None for one in seen)
-    looks = DecisionSettings(kind="looks", goal_input="image").component(0, None)
-    assert record_texts(tmp_path / "workers", looks, 2) == here
 
 
 def test_memory_keeps_no_layouts_where_the_sentence_counts() -> None:

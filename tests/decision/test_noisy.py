@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 from scripted_model import Scripted
 
 from evonav.component import Component
@@ -15,13 +16,7 @@ from evonav.decision.prompts import Prompt
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, Question, Reply
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.schema import StageRecord
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal
 
 GOAL = Goal(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))
@@ -131,26 +126,17 @@ def test_rates_that_make_no_sense_are_told(rates: dict[str, float], words: str) 
         NoiseRates(**rates)
 
 
-def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:
-    noise = {"wrong": 0.2, "unparsable": 0.3, "refusal": 0.2}
-    config = RunConfig(
-        seed=seed,
-        backend=Backend(decision=Component("evonav.decision.backends:text_match", {"noise": noise})),
-        protocol=ProtocolConfig(max_rounds=3),
-    )
-    evaluate(["fu", "ftu"], task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=num_workers)
-    with RunStore(folder) as store:
-        return list(store.record_texts())
-
-
 @pytest.mark.slow
 def test_a_noisy_run_counts_mistakes_and_follows_its_seed(tmp_path: Path) -> None:
-    here = noisy_run(tmp_path / "here", 0)
+    noise = {"noise": {"wrong": 0.2, "unparsable": 0.3, "refusal": 0.2}}
+    backend = Backend(decision=Component("evonav.decision.backends:text_match", noise))
+    here, other = (
+        bundled_run(tmp_path / str(seed), ["fu", "ftu"], backend, seed=seed, max_rounds=3) for seed in range(2)
+    )
+    assert not any(record.error for record in here)
     counted = Counter[str]()
-    for text in here:
-        record = StageRecord.model_validate_json(text)
-        assert record.error is None
+    for record in here:
         counted.update(record.trace[-1].counters)
     assert counted["invalid_answers"] > 0
     assert counted["refusals"] > 0
-    assert noisy_run(tmp_path / "seed", 0, seed=1) != here
+    assert here != other

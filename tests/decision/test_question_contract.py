@@ -3,12 +3,12 @@
 import json
 import re
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav.component import Component
 from evonav.decision.noisy import GARBAGE
@@ -16,12 +16,7 @@ from evonav.decision.prompts import Picture
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.decision.rules import TextMatch
 from evonav.decision.vlm.decision import read_json, with_schema
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from vlm_stub import check_strict
 
 NUM_OF_A_KIND = 12
@@ -50,15 +45,10 @@ class Collecting(DecisionModel):
 
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Question[Any], Reply[Any]]]]:
-    folder: Path = tmp_path_factory.mktemp("runs")
-    config = RunConfig(
-        backend=Backend(decision=Component(f"{__name__}:Collecting")),
-        protocol=ProtocolConfig(max_rounds=9, max_actions=60),
-    )
     agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:unigoal_as_published"]
-    evaluate(agents, task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=0)
-    with RunStore(folder) as store:
-        assert [record.error for record in store.records() if record.error] == []
+    backend = Backend(decision=Component(f"{__name__}:Collecting"))
+    records = bundled_run(tmp_path_factory.mktemp("runs"), agents, backend, max_rounds=9, max_actions=60)
+    assert [record.error for record in records if record.error] == []
     return ASKED
 
 

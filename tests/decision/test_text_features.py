@@ -6,17 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text import minilm
 from evonav.decision.text.ranking import rank_by_text, similarity_of_label, text_feature
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 
 needs_weights = pytest.mark.skipif(
     any(find_spec(name) is None for name in minilm.MODULES), reason="needs the extra evonav[text]"
@@ -96,13 +92,9 @@ def test_entries_are_ranked_by_meaning_then_as_ever() -> None:
 @needs_weights
 def test_agents_walk_by_it(tmp_path) -> None:
     agents = [f"agents_by_meaning:{name}" for name in ("fu", "ftu", "stage_reset")]
-    config = RunConfig(protocol=ProtocolConfig(max_rounds=4))
-    evaluate(agents, task_files(BUNDLED_TASKS, 1), tmp_path, config=config, num_workers=0)
-    with RunStore(tmp_path) as store:
-        for agent in agents:
-            records = list(store.records(agent))
-            assert len(records) >= 3
-            assert all(record.is_scored for record in records)
+    records = bundled_run(tmp_path, agents, max_rounds=4)
+    assert len(records) >= 9
+    assert all(record.is_scored for record in records)
 
 
 @pytest.mark.parametrize("missing", minilm.MODULES)

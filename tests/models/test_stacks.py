@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav.errors import PerceptionError, StoreError
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
@@ -47,13 +45,9 @@ def without_published_hash(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(weights.CATALOGUE, MASK_RCNN, replace(known, files=files))
 
 
-def config_of(word: str, models: Path, **protocol: int) -> RunConfig:
+def run(folder: Path, agent: str, word: str, models: Path, **limits: int) -> None:
     settings = PerceptionSettings(make=word, options={"models": str(models), "device": "cpu"})
-    return RunConfig(protocol=ProtocolConfig(**protocol), backend=Backend(perception=settings.component()))
-
-
-def run(folder: Path, config: RunConfig, agents: tuple[str, ...]) -> None:
-    evaluate(list(agents), task_files(BUNDLED_TASKS, 1), folder, config=config, num_workers=0)
+    bundled_run(folder, [agent], Backend(perception=settings.component()), **limits)
 
 
 def assert_looked(folder: Path, agent: str) -> None:
@@ -74,8 +68,7 @@ def assert_looked(folder: Path, agent: str) -> None:
 
 
 def test_an_episode_with_owlv2_sam_and_clip(tiny_models: Path, tmp_path: Path) -> None:
-    config = config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=2)
-    run(tmp_path / "run", config, ("fu",))
+    run(tmp_path / "run", "fu", "predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=2)
     assert_looked(tmp_path / "run", "fu")
 
 
@@ -83,7 +76,7 @@ def test_a_replay_finds_the_models_where_the_run_had_them(
     tiny_models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(weights.MODELS_VARIABLE, raising=False)
-    run(tmp_path / "run", config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=1), ("fu",))
+    run(tmp_path / "run", "fu", "predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=1)
     (task,) = task_files(BUNDLED_TASKS, 1)
     replay = RunReplay(tmp_path / "run", lambda _: task.path)
     stages = list(replay.episode("fu", task.task_id))
@@ -103,28 +96,26 @@ def test_an_episode_with_unigoals_detectors(all_models: Path, without_published_
     network = load_mask_rcnn(str(all_models / MASK_RCNN), "cpu", 0.05)
     network._model.transform.min_size = (64,)  # 800 px of noise take a minute a view
     network._model.roi_heads.detections_per_img = 8
-    config = config_of("predicted,min_confidence=0.5,min_mask_score=0", all_models, max_actions=2)
-    run(tmp_path / "run", config, ("unigoal",))
+    run(tmp_path / "run", "unigoal", "predicted,min_confidence=0.5,min_mask_score=0", all_models, max_actions=2)
     assert_looked(tmp_path / "run", "unigoal")
 
 
 def test_the_published_hash_keeps_other_weights_out(all_models: Path, tmp_path: Path) -> None:
     with pytest.raises(PerceptionError, match="published is bf2d0c1e"):
-        run(tmp_path / "run", config_of("predicted:unigoal", all_models), ("unigoal",))
+        run(tmp_path / "run", "unigoal", "predicted:unigoal", all_models)
 
 
 def test_a_run_is_not_resumed_with_other_weights(tiny_models: Path, tmp_path: Path) -> None:
     models = tmp_path / "models"
     shutil.copytree(tiny_models, models)
-    config = config_of("predicted:transformers", models, max_rounds=1)
-    run(tmp_path / "run", config, ("fu",))
+    run(tmp_path / "run", "fu", "predicted:transformers", models, max_rounds=1)
     sam = models / "facebook/sam-vit-large/config.json"
     sam.write_text(sam.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     with pytest.raises(PerceptionError, match="when it was first used"):
-        run(tmp_path / "run", config, ("stage-reset",))
+        run(tmp_path / "run", "stage-reset", "predicted:transformers", models, max_rounds=1)
     (models / weights.LOCK_NAME).unlink()
     with pytest.raises(StoreError, match=r"facebook/sam-vit-large/config\.json: there"):
-        run(tmp_path / "run", config, ("stage-reset",))
+        run(tmp_path / "run", "stage-reset", "predicted:transformers", models, max_rounds=1)
 
 
 def test_percepts_hold_types_features_and_one_label_a_pixel(tiny_models: Path) -> None:

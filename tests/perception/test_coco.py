@@ -8,19 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, PerceptionError
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception import coco
 from evonav.perception.coco import (
-    COCO_CLASSES,
     TYPE_OF_CLASS,
     CocoConfig,
     CocoDetector,
@@ -29,10 +25,9 @@ from evonav.perception.coco import (
     weights_path,
 )
 from evonav.perception.detector import DetectorView
-from evonav.perception.models.yolov4_tiny import load_yolov4_tiny
+from evonav.perception.models.yolov4_tiny import COCO_CLASSES, load_yolov4_tiny
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SimulatorConfig
 
@@ -66,7 +61,7 @@ def test_it_finds_what_opencv_finds_with_the_same_weights() -> None:
     sample = path.parents[2] / "samples" / "bus.jpg"
     picture = Image.open(sample).convert("RGB").resize((608, 608), Image.Resampling.BILINEAR)
     found = load_yolov4_tiny(path).detect(np.asarray(picture), min_confidence=0.25)
-    assert [COCO_CLASSES[number] for number in found.classes.tolist()] == [name for name, _, _ in BUS]
+    assert list(found.labels) == [name for name, _, _ in BUS]
     np.testing.assert_allclose(found.confidences, [confidence for _, confidence, _ in BUS], atol=0.01)
     np.testing.assert_allclose(found.boxes_px, [box for _, _, box in BUS], atol=2.0)
 
@@ -90,13 +85,10 @@ def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_threads() -> None:
 @needs_weights
 def test_an_episode_with_it(tmp_path: Path) -> None:
     backend = Backend(perception=PerceptionSettings(make="predicted:coco,min_confidence=0.05,side_px=96").component())
-    config = RunConfig(protocol=ProtocolConfig(max_rounds=2), backend=backend)
-    evaluate(["fu"], task_files(BUNDLED_TASKS, 1), tmp_path, config=config, num_workers=0)
+    records = bundled_run(tmp_path, ["fu"], backend, max_rounds=2)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["perception"] == "predicted:coco,min_confidence=0.05,side_px=96"
     assert summary["perception_models"]["coco"]["weights"] == {"yolov4-tiny.weights": coco.SHA256}
-    with RunStore(tmp_path) as store:
-        records = list(store.records("fu"))
     assert all(record.is_scored for record in records)
     assert {entry.label for record in records for entry in record.entries} <= set(TYPE_OF_CLASS.values())
 

@@ -8,20 +8,17 @@ from pathlib import Path
 import mini_frames
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import mini
 from evonav.perception.detector import DetectorView
 from evonav.perception.mini import MiniConfig, MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
+from evonav.tasks.listing import BUNDLED_TASKS
 
 MIN_AREA_PX = 1000
 MIN_RECALL, MIN_PRECISION = 0.7, 0.7
@@ -130,16 +127,10 @@ def test_weights_that_are_not_numbers_are_refused() -> None:
 
 def test_a_whole_episode_with_it(tmp_path: Path) -> None:
     backend = Backend(perception=PerceptionSettings(make="predicted:mini").component())
-    config = RunConfig(protocol=ProtocolConfig(max_rounds=4), backend=backend)
-    told = []
-    for folder, num_workers in ((tmp_path / "a", 0), (tmp_path / "b", 2)):
-        evaluate(["fu"], task_files(BUNDLED_TASKS, 2), folder, config=config, num_workers=num_workers)
-        with RunStore(folder) as store:
-            told.append(list(store.records("fu")))
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        assert summary["perception"] == "predicted:mini"
-        assert set(summary["perception_models"]["mini"]) == {"mini.weights"}
-    assert told[0] == told[1]
-    labels = {entry.label for record in told[0] for entry in record.entries}
+    records = bundled_run(tmp_path, ["fu"], backend, max_rounds=4)
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["perception"] == "predicted:mini"
+    assert set(summary["perception_models"]["mini"]) == {"mini.weights"}
+    labels = {entry.label for record in records for entry in record.entries}
     assert len(labels) > 3
     assert labels <= set(MiniDetector().classes)

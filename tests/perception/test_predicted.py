@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scripted_models
+from bundled_run import bundled_run
 from scripted_models import ColourEmbedder, scripted_perception
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
-from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.evaluate import evaluate
-from evonav.evaluation.run.run import RunConfig
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception.detector import Found, nothing_found
@@ -42,7 +40,6 @@ from evonav.perception.vocabulary import (
 )
 from evonav.sensors.observation import Detections
 from evonav.tasks.language import STRUCTURE_TYPES
-from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, LABEL_TRANSLATION, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -249,24 +246,22 @@ def test_folder_and_device_are_no_part_of_what_makes_runs_the_same() -> None:
     assert "/somewhere" not in json.dumps(backend.identity())
 
 
-def run(folder, perception, agents=("fu",), limit=1):
-    protocol = ProtocolConfig(max_rounds=4, max_actions=10)
-    config = RunConfig(protocol=protocol, backend=Backend(perception=Component(f"scripted_models:{perception}")))
-    return evaluate(list(agents), task_files(BUNDLED_TASKS, limit), folder, config=config, num_workers=0)
+def run(folder, perception, agents=("fu",)):
+    backend = Backend(perception=Component(f"scripted_models:{perception}"))
+    return bundled_run(folder, agents, backend, max_rounds=4, max_actions=10)
 
 
 def test_a_whole_episode_with_a_scripted_detector(tmp_path) -> None:
-    run(tmp_path / "run", "scripted_perception", agents=("3d-mem", "unigoal"))
-    with RunStore(tmp_path / "run") as store:
-        records = list(store.records("3d-mem"))
-        costs = store.costs()
-    assert len(records) >= 3
+    records = run(tmp_path / "run", "scripted_perception", agents=("3d-mem", "unigoal"))
+    assert len(records) >= 6
     assert all(record.is_scored for record in records)
-    labels = {entry.label for record in records for entry in record.entries}
+    labels = {entry.label for record in records if record.agent == "3d-mem" for entry in record.entries}
     assert labels
     assert labels <= {"Sofa", "DiningTable", "GarbageCan", "gizmo"}
+    with RunStore(tmp_path / "run") as store:
+        costs = store.costs()
     assert all(cost["perception_wall_s"] > 0.0 for cost in costs.values())
-    assert len(costs) == 2 * len(records)
+    assert len(costs) == len(records)
 
 
 def test_a_run_goes_on_with_the_same_weights_alone(tmp_path, monkeypatch) -> None:

@@ -5,17 +5,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from bundled_run import bundled_run
 
 from evonav import _core
-from evonav.evaluation.run.components import load_spec
+from evonav.evaluation.run.components import Backend, load_spec
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise.config import NoiseConfig, noise_presets
 from evonav.perception.noise.pose_drift import PoseDrift
+from evonav.perception.shorthand import parse_perception
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections
 from evonav.tasks.language import STRUCTURE_TYPES
@@ -348,3 +351,12 @@ def test_depth_errs_with_range() -> None:
             errors[is_far] += (error_m / scale)[::50].tolist()
     for drawn in errors.values():
         assert abs(np.std(drawn) - 1.0) < 0.05
+
+
+def test_records_of_perfect_perception_are_the_truths(tmp_path: Path) -> None:
+    exact, perfect, poor = (
+        bundled_run(tmp_path / word, ["fu"], Backend(perception=parse_perception(word)), max_rounds=6)
+        for word in ("gt", "noisy:perfect", "noisy:poor")
+    )
+    assert perfect == exact != poor
+    assert len(poor) >= 3

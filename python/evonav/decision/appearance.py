@@ -16,81 +16,67 @@ import hashlib
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.goal_input import PictureGoal
-from evonav.decision.home_statistics import COLOUR_PRIOR, PER_100_M2, UNKNOWN_PER_100_M2, usual_size
+from evonav.decision.home_statistics import COLOUR_PRIOR, per_100_m2, usual_size
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, similarity
-from evonav.decision.text.matcher import Best, Matcher, TextMatchConfig
+from evonav.decision.text.matcher import Best, Matcher
 from evonav.memory.colours import Layout, distance, layouts
 from evonav.tasks.language import COLOURS
 from evonav.tasks.public import Goal
 
 _WALL_THINGS = {"painting", "window", "doorway"}
 """Things on or in walls, which views show less often than what stands on the floor."""
+PICTURE_CONSTANT, PICTURE_NEAR, PICTURE_WHOLE = 3.56, -5.39, -12.95
+"""Of the logarithm of the ratio: the constant, and the weights of the distances near the object and in the whole view.
 
-
-@dataclass(frozen=True, slots=True)
-class PictureConfig:
-    """Numbers of the ratio's logarithm, as `scripts/data/calibrate_goal_pictures.py` fits them on the design houses."""
-
-    constant: float = 3.56
-    near: float = -5.39
-    """Weight of the distance near the object."""
-    whole: float = -12.95
-    """Weight of the distance in the whole view."""
-    range: tuple[float, float] = (0.05, 20.0)
-    """Smallest and largest ratio: a few hundred views do not tell of rarer things."""
-
-
-@dataclass(frozen=True, slots=True)
-class AppearanceConfig:
-    """Numbers of the rules."""
-
-    threshold: float = 0.5
-    """Probability from which an object is believed to be the goal, if it is either that object or not seen yet."""
-    eager_threshold: float = 0.2
-    """The same at full eagerness."""
-    colour_floor: float = 0.05
-    """Added to the share of a colour and to the word's prior: a colour that is not seen may be in the shade."""
-    colour_range: tuple[float, float] = (0.1, 6.0)
-    """Smallest and largest ratio of a colour."""
-    form_ratio: float = 3.0
-    """Largest ratio of a size or of a form; its inverse is the smallest."""
-    form_slope: float = 0.15
-    """Width of the step between a word and its opposite, in natural logarithms of sizes or proportions."""
-    min_sightings: int = 3
-    """Number of detections from which a box counts as complete."""
-    on: float = 0.95
-    """Probability that the goal's views show what it is said to stand on."""
-    near: float = 0.85
-    """The same for what stands beside it."""
-    near_wall_thing: float = 0.75
-    """The same for a painting, a window or a door."""
-    room: float = 0.9
-    """The same for the room."""
-    keep: float = 0.2
-    """Share by which another frontier must be nearer than the one to which the agent goes."""
-    picture: PictureConfig = field(default_factory=PictureConfig)
-    """Numbers of the ratio of the goal's picture."""
-    min_known_share: float = 0.7
-    """Known share of the surroundings from which a neighbour or a room that is not seen counts as violated.
-
-    What an object stands on is seen with it.
-    """
+`scripts/data/calibrate_goal_pictures.py` fits them on the design houses.
+"""
+PICTURE_RANGE = (0.05, 20.0)
+"""Smallest and largest ratio: a few hundred views do not tell of rarer things."""
 
 
 class AppearanceMatcher(Matcher):
     """Compares goals with remembered objects by what their views show."""
 
-    def __init__(self, config: AppearanceConfig | None = None, *, eagerness: float = 0.0) -> None:
+    threshold = 0.5
+    """Probability from which an object is believed to be the goal, if it is either that object or not seen yet."""
+    eager_threshold = 0.2
+    """The same at full eagerness."""
+    colour_floor = 0.05
+    """Added to the share of a colour and to the word's prior: a colour that is not seen may be in the shade."""
+    colour_range = (0.1, 6.0)
+    """Smallest and largest ratio of a colour."""
+    form_ratio = 3.0
+    """Largest ratio of a size or of a form; its inverse is the smallest."""
+    form_slope = 0.15
+    """Width of the step between a word and its opposite, in natural logarithms of sizes or proportions."""
+    min_sightings = 3
+    """Number of detections from which a box counts as complete."""
+    on_probability = 0.95
+    """Probability that the goal's views show what it is said to stand on."""
+    near_probability = 0.85
+    """The same for what stands beside it."""
+    near_wall_thing_probability = 0.75
+    """The same for a painting, a window or a door."""
+    room_probability = 0.9
+    """The same for the room."""
+    keep_share = 0.2
+    """Share by which another frontier must be nearer than the one to which the agent goes."""
+    min_known_share = 0.7
+    """Known share of the surroundings from which a neighbour or a room that is not seen counts as violated.
+
+    What an object stands on is seen with it.
+    """
+
+    def __init__(self, *, eagerness: float = 0.0) -> None:
         """Create a matcher: `eagerness` 0 believes an object at `threshold`, 1 at `eager_threshold`."""
-        super().__init__(TextMatchConfig())
+        super().__init__()
         self._pictured: tuple[Goal, Layout] | None = None
         """The last goal with a picture, and the picture's layout, which takes a millisecond."""
-        self.numbers = config or AppearanceConfig()
-        self._threshold = self.numbers.threshold + eagerness * (self.numbers.eager_threshold - self.numbers.threshold)
+        self._threshold = self.threshold + eagerness * (self.eager_threshold - self.threshold)
 
     def parsed(self, goal: Goal) -> ParsedGoal:
         """Return the parsed instruction, and the layout of the picture if that counts."""
@@ -124,7 +110,7 @@ class AppearanceMatcher(Matcher):
             unseen_m2: Area that the map does not know.
         """
         ratios = self._times_relations(self.appearance_ratios(goal, named), goal, named, around)
-        unseen = PER_100_M2.get(goal.noun, UNKNOWN_PER_100_M2) * unseen_m2 / 100.0
+        unseen = per_100_m2(goal.noun) * unseen_m2 / 100.0
         total = math.fsum(ratios) + unseen
         return [ratio / total for ratio in ratios]
 
@@ -156,18 +142,18 @@ class AppearanceMatcher(Matcher):
         """Return the ratio of the named colours; 1 if none is named, or none was seen."""
         if one.appearance is None:
             return 1.0
-        low, high = self.numbers.colour_range
+        low, high = self.colour_range
         ratio = 1.0
         for word in goal.adjectives:
             if word in COLOUR_PRIOR:
-                share = one.appearance.colours[COLOURS.index(word)] + self.numbers.colour_floor
-                ratio *= min(max(share / (COLOUR_PRIOR[word] + self.numbers.colour_floor), low), high)
+                share = one.appearance.colours[COLOURS.index(word)] + self.colour_floor
+                ratio *= min(max(share / (COLOUR_PRIOR[word] + self.colour_floor), low), high)
         return ratio
 
     def _form_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
         """Return the ratio of the named size and proportions; 1 for a box that may be a part of the object."""
         usual = usual_size(canonical(one.label))
-        if usual is None or one.num_detections < self.numbers.min_sightings or min(one.size_m) <= 0.0:
+        if usual is None or one.num_detections < self.min_sightings or min(one.size_m) <= 0.0:
             return 1.0
         width_m, height_m, depth_m = one.size_m
         size = math.log(math.cbrt(width_m * height_m * depth_m) / usual[0])
@@ -184,14 +170,14 @@ class AppearanceMatcher(Matcher):
         ratio = 1.0
         for word in goal.adjectives:
             if word in over:
-                ratio *= self.numbers.form_ratio ** math.tanh(over[word] / (2.0 * self.numbers.form_slope))
+                ratio *= self.form_ratio ** math.tanh(over[word] / (2.0 * self.form_slope))
         return ratio
 
     def _picture_ratio(self, goal: ParsedGoal, one: ObjectCandidate) -> float:
         """Return the ratio of the goal's picture; 1 if it does not count, or nothing was seen in colour."""
         if goal.picture is None or one.appearance is None or one.appearance.layout is None:
             return 1.0
-        return picture_ratio(goal.picture, one.appearance.layout, self.numbers.picture)
+        return picture_ratio(goal.picture, one.appearance.layout)
 
     def _relation_ratios(
         self, relation: Relation, named: Sequence[ObjectCandidate], around: Sequence[ObjectCandidate]
@@ -210,15 +196,14 @@ class AppearanceMatcher(Matcher):
         self, goal: ParsedGoal, frontiers: Sequence[FrontierCandidate], around: Sequence[ObjectCandidate]
     ) -> list[float]:
         """Return the costs of `Matcher`, of a way that is shorter for the frontier to which the agent already goes."""
-        keep = self.numbers.keep
-        ways = [replace(one, travel_m=one.travel_m * (1.0 - keep * one.is_current)) for one in frontiers]
+        ways = [replace(one, travel_m=one.travel_m * (1.0 - self.keep_share * one.is_current)) for one in frontiers]
         return super().frontier_costs_m(goal, ways, around)
 
     def _probability(self, relation: Relation) -> float:
         """Return the probability that the goal's views show a relation."""
         if relation.kind == "near":
-            return self.numbers.near_wall_thing if relation.noun in _WALL_THINGS else self.numbers.near
-        return self.numbers.on if relation.kind == "on" else self.numbers.room
+            return self.near_wall_thing_probability if relation.noun in _WALL_THINGS else self.near_probability
+        return self.on_probability if relation.kind == "on" else self.room_probability
 
     def _is_seen(self, relation: Relation, one: ObjectCandidate, around: Sequence[ObjectCandidate]) -> bool | None:
         """Return whether the views of an object show a relation; `None` if they cannot tell."""
@@ -231,7 +216,7 @@ class AppearanceMatcher(Matcher):
         if self.holds(relation, one, shown):
             return True
         is_ever_detected = any(similarity(relation.noun, other.label) >= 1.0 for other in around)
-        is_known = relation.kind == "on" or one.appearance.known_share >= self.numbers.min_known_share
+        is_known = relation.kind == "on" or one.appearance.known_share >= self.min_known_share
         return False if is_known and (is_ever_detected or relation.noun not in _WALL_THINGS | {"corner"}) else None
 
 
@@ -274,8 +259,8 @@ def goal_layout(goal: Goal) -> Layout:
     return layouts(goal.reference_image, [(width_px / 2.0, height_px / 2.0)])[0]
 
 
-def picture_ratio(pictured: Layout, seen: Layout, config: PictureConfig) -> float:
+def picture_ratio(pictured: Layout, seen: Layout) -> float:
     """Return the probability of what is seen if it is the goal, over that if it is another object of its type."""
     near, whole = distance(pictured.near, seen.near), distance(pictured.whole, seen.whole)
-    low, high = config.range
-    return min(max(math.exp(config.constant + config.near * near + config.whole * whole), low), high)
+    low, high = PICTURE_RANGE
+    return min(max(math.exp(PICTURE_CONSTANT + PICTURE_NEAR * near + PICTURE_WHOLE * whole), low), high)

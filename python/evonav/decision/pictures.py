@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.memory.views import Box, StoredView, jpeg_size, pixels_of, thumbnail
 
+MARGIN_PX = 20
+"""Margin around crops, as in 3D-Mem."""
 MAX_PICTURES = 32
 """Largest number of pictures, and of crops, that a process keeps: a question has about ten."""
 
@@ -63,9 +65,9 @@ def picture_of(view: StoredView, size_px: int) -> Picture | None:
     return None if view.jpeg is None else _picture(view.jpeg, size_px)
 
 
-def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> Picture | None:
-    """Return a part of a view with a margin around it (3D-Mem: 20 px); `None` if the view had no colours."""
-    return None if view.jpeg is None else _crop(view.jpeg, box_px, margin_px)
+def crop_of(view: StoredView, box_px: Box) -> Picture | None:
+    """Return a part of a view with `MARGIN_PX` around it; `None` if the view had no colours."""
+    return None if view.jpeg is None else _crop(view.jpeg, box_px)
 
 
 @lru_cache(MAX_PICTURES)
@@ -75,8 +77,8 @@ def _picture(jpeg: bytes, size_px: int) -> Picture:
 
 
 @lru_cache(MAX_PICTURES)
-def _crop(jpeg: bytes, box_px: Box, margin_px: int) -> Picture:
+def _crop(jpeg: bytes, box_px: Box) -> Picture:
     left, top, right, bottom = box_px
-    rows = slice(max(0, top - margin_px), bottom + margin_px)
-    cols = slice(max(0, left - margin_px), right + margin_px)
+    rows = slice(max(0, top - MARGIN_PX), bottom + MARGIN_PX)
+    cols = slice(max(0, left - MARGIN_PX), right + MARGIN_PX)
     return Picture(np.ascontiguousarray(pixels_of(jpeg)[rows, cols]))

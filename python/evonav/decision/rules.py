@@ -10,7 +10,7 @@ from typing import TypeVar
 from evonav.decision.appearance import AppearanceMatcher, MistakenMatcher
 from evonav.decision.goal_input import GoalInput, check_goal_input
 from evonav.decision.question import DecisionModel, Question, Reply
-from evonav.decision.text.matcher import Matcher, TextMatchConfig
+from evonav.decision.text.matcher import Matcher
 from evonav.errors import InvalidArgumentError
 
 A = TypeVar("A")
@@ -21,9 +21,9 @@ class TextMatch(DecisionModel):
 
     matcher: Matcher
 
-    def __init__(self, config: TextMatchConfig | None = None) -> None:
-        """Create a model whose rules use the given thresholds."""
-        self.matcher = Matcher(config)
+    def __init__(self) -> None:
+        """Create a model with a matcher of its own."""
+        self.matcher = Matcher()
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
         """Return the rule's answer, or raise as the question's `by_rule` does."""

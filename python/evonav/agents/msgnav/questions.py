@@ -217,11 +217,11 @@ class GraphQuestion(Question[GraphChoice]):
         With no frontier or hardly a round left, any object of the right category is chosen, or else one that the goal
         should be on or near.
         """
-        goal, config = matcher.parsed(self.goal), matcher.config
+        goal = matcher.parsed(self.goal)
         around = [node.candidate for node in self.objects]
         left = self._not_rejected()
         named = [candidate for candidate in left if matcher.names_goal(goal, candidate)]
-        is_last_chance = self.num_frontiers == 0 or self.max_rounds - self.round <= config.hurry_rounds
+        is_last_chance = self.num_frontiers == 0 or self.max_rounds - self.round <= matcher.hurry_rounds
         best = matcher.best(goal, named, around, self.unseen_m2) if named else None
         if best is None or not best.fits:
             image = self._unmapped(matcher, goal, around)
@@ -242,7 +242,7 @@ class GraphQuestion(Question[GraphChoice]):
         known_m += [past.place_m for past in self.history if past.place_m is not None]
 
         def is_known(place_m: Point2) -> bool:
-            return any(math.dist(place_m, other_m) <= matcher.config.near_m for other_m in known_m)
+            return any(math.dist(place_m, other_m) <= matcher.near_m for other_m in known_m)
 
         found = [
             (seen.area_px, -number, seen.label)
@@ -250,7 +250,7 @@ class GraphQuestion(Question[GraphChoice]):
             for seen in image.seen
             if seen.entry_id is None
             and seen.centre_m is not None
-            and similarity(goal.noun, seen.label) >= matcher.config.min_similarity
+            and similarity(goal.noun, seen.label) >= matcher.min_similarity
             and not is_known(seen.centre_m)
         ]
         if not found:
@@ -338,13 +338,13 @@ class ArrivalQuestion(YesNoQuestion):
 
         With no frontier or hardly a round left the category is enough.
         """
-        goal, config = matcher.parsed(self.goal), matcher.config
+        goal = matcher.parsed(self.goal)
         here = [
-            seen for seen in self.seen if matcher.names_goal(goal, seen) and gap_m(seen, self.target) <= config.near_m
+            seen for seen in self.seen if matcher.names_goal(goal, seen) and gap_m(seen, self.target) <= matcher.near_m
         ]
         if not here:
             return False, f"no {goal.noun} seen here"
         share = max(matcher.relation_share(goal, seen, self.seen) for seen in here)
-        is_fitting = share >= config.min_relations
-        is_last_chance = self.num_frontiers == 0 or self.num_rounds_left <= config.hurry_rounds
+        is_fitting = share >= matcher.min_relations
+        is_last_chance = self.num_frontiers == 0 or self.num_rounds_left <= matcher.hurry_rounds
         return is_fitting or is_last_chance, f"{goal.noun} seen here, {share:.0%} of what is said fits"

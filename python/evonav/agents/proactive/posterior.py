@@ -15,7 +15,7 @@ from evonav.agents.grid import NO_GROUP, CoarseFrame, box_distance_m, box_slices
 from evonav.agents.proactive.config import ProactiveConfig
 from evonav.agents.proactive.sightings import FarSighting
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.home_statistics import PER_100_M2, UNKNOWN_PER_100_M2, room_ratios
+from evonav.decision.home_statistics import per_100_m2, room_ratios
 from evonav.decision.text.language import ParsedGoal, canonical, is_structure, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import Frontier
@@ -193,7 +193,7 @@ def visible_range_m(noun: str) -> float:
 
 def density_of(noun: str) -> float:
     """Return the usual number of objects of a type on a square metre."""
-    return PER_100_M2.get(noun, UNKNOWN_PER_100_M2) / 100.0
+    return per_100_m2(noun) / 100.0
 
 
 def prior_of(

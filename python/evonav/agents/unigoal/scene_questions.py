@@ -303,7 +303,7 @@ def _sentences(nodes: Sequence[Node], relations: Relations) -> list[str]:
 def _relation(matcher: Matcher, a: Node, b: Node) -> str:
     """Return how a node stands to another, by their boxes."""
     apart_m = gap_m(a, b)
-    if apart_m > matcher.config.near_m:
+    if apart_m > matcher.near_m:
         return _APART
     if apart_m == 0.0:
         # Of two things in one place the one with the higher bottom is on the other.

@@ -6,9 +6,9 @@ question brings its own rule: the method `by_rule(matcher)`, which returns an an
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.text.language import ParsedGoal, Relation, canonical, is_structure, parse_goal, similarity
@@ -44,40 +44,6 @@ _ROOM_OF_SIGN = {sign: room for room, signs in ROOM_SIGNS.items() for sign in si
 
 
 @dataclass(frozen=True, slots=True)
-class TextMatchConfig:
-    """Thresholds of the rules."""
-
-    near_m: float = 1.0
-    """Largest gap between boxes that are near each other."""
-    support_margin_m: float = 0.15
-    """Largest distance of an object's centre outside of its support's box, and of its bottom above that box."""
-    room_radius_m: float = 3.5
-    """Distance up to which objects indicate a room."""
-    min_relations: float = 0.6
-    """Share of an instruction's relations that must hold before exploration ends for a candidate."""
-    unknown_room: float = 0.5
-    """Value of a room that is unknown."""
-    hurry_rounds: int = 8
-    """Number of remaining rounds from which any candidate of the right category is accepted."""
-    min_similarity: float = 0.99
-    """Smallest similarity at which a label names the goal."""
-    lead_radius_m: float = 3.0
-    """A frontier this near something that the instruction mentions is worth a detour..."""
-    lead_m: float = 3.0
-    """...of this length."""
-    same_place_m: float = 0.5
-    """Verification: centres this near are the same place."""
-    min_overlap: float = 0.2
-    """Verification: or this share of the object's points lies by the remembered object's points."""
-    violated_fixed: float = 0.1
-    """Identity: factor for a violated relation to what does not move: the room, a doorway, a window."""
-    violated_movable: float = 0.4
-    """Identity: factor for a violated relation to a support or a neighbour."""
-    chance_fit: float = 0.2
-    """Identity: probability that a description fits a place of which nothing is known."""
-
-
-@dataclass(frozen=True, slots=True)
 class Best:
     """The candidate that fits a goal best."""
 
@@ -87,26 +53,41 @@ class Best:
     reason: str
 
 
-class _WorkedOut(dict[str, float]):
-    """Scores by label, each worked out once: agents ask for the same ones in every round."""
-
-    def __init__(self, score_of: Callable[[str], float]) -> None:
-        super().__init__()
-        self._score_of = score_of
-
-    def __missing__(self, label: str) -> float:
-        self[label] = score = self._score_of(label)
-        return score
-
-
 class Matcher:
     """Compares goals with remembered objects."""
 
-    def __init__(self, config: TextMatchConfig | None = None) -> None:
-        self.config = config or TextMatchConfig()
-        self._scored: ParsedGoal | None = None
-        """The goal of `_scores`."""
-        self._scores: Mapping[str, float] = {}
+    near_m = 1.0
+    """Largest gap between boxes that are near each other."""
+    support_margin_m = 0.15
+    """Largest distance of an object's centre outside of its support's box, and of its bottom above that box."""
+    room_radius_m = 3.5
+    """Distance up to which objects indicate a room."""
+    min_relations = 0.6
+    """Share of an instruction's relations that must hold before exploration ends for a candidate."""
+    unknown_room = 0.5
+    """Value of a room that is unknown."""
+    hurry_rounds = 8
+    """Number of remaining rounds from which any candidate of the right category is accepted."""
+    min_similarity = 0.99
+    """Smallest similarity at which a label names the goal."""
+    lead_radius_m = 3.0
+    """A frontier this near something that the instruction mentions is worth a detour..."""
+    lead_m = 3.0
+    """...of this length."""
+    same_place_m = 0.5
+    """Verification: centres this near are the same place."""
+    min_overlap = 0.2
+    """Verification: or this share of the object's points lies by the remembered object's points."""
+    violated_fixed = 0.1
+    """Identity: factor for a violated relation to what does not move: the room, a doorway, a window."""
+    violated_movable = 0.4
+    """Identity: factor for a violated relation to a support or a neighbour."""
+    chance_fit = 0.2
+    """Identity: probability that a description fits a place of which nothing is known."""
+
+    def __init__(self) -> None:
+        self._score_of: tuple[ParsedGoal | None, Callable[[str], float]] = (None, float)
+        """The last goal, and its scores by label, each worked out once: agents ask for them in every round."""
 
     def parsed(self, goal: Goal) -> ParsedGoal:
         """Return the parsed instruction."""
@@ -114,26 +95,22 @@ class Matcher:
 
     def names_goal(self, goal: ParsedGoal, entry: ObjectCandidate) -> bool:
         """Return whether an entry's label is the goal's name for its target."""
-        return similarity(goal.noun, entry.label) >= self.config.min_similarity
+        return similarity(goal.noun, entry.label) >= self.min_similarity
 
     def label_score(self, goal: ParsedGoal, label: str) -> float:
         """Return 1 for the goal's own label, less for part of it, still less for a related object.
 
         Doors and windows score 0 even where they are named: every room has them.
         """
-        return self.label_scores(goal)[label]
-
-    def label_scores(self, goal: ParsedGoal) -> Mapping[str, float]:
-        """Return `label_score` by label, for any label."""
-        if goal is not self._scored:
-            self._scored, self._scores = goal, _WorkedOut(partial(self._label_score, goal))
-        return self._scores
+        if goal is not self._score_of[0]:
+            self._score_of = (goal, cache(partial(self._label_score, goal)))
+        return self._score_of[1](label)
 
     def _label_score(self, goal: ParsedGoal, label: str) -> float:
         if is_structure(label):
             return 0.0
         own = similarity(goal.noun, label)
-        if own >= self.config.min_similarity:
+        if own >= self.min_similarity:
             return own
         related = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *related])
@@ -154,7 +131,7 @@ class Matcher:
         """
         shares = self.scores(goal, named, around, unseen_m2)
         index = shares.index(max(shares))
-        fits = shares[index] >= self.config.min_relations
+        fits = shares[index] >= self.min_relations
         return Best(index, fits, f"{named[index].label}, {shares[index]:.0%} of what is said fits")
 
     def scores(
@@ -178,11 +155,10 @@ class Matcher:
         Below 1 the surroundings contradict the description. The sentence describes the home as it is now, so they do
         so for another object, and for the right one at a place where it no longer is.
         """
-        config = self.config
         fixed = {relation for relation in goal.relations if relation.kind == "in" or is_structure(relation.noun)}
-        factors = {r: config.violated_fixed if r in fixed else config.violated_movable for r in goal.relations}
+        factors = {r: self.violated_fixed if r in fixed else self.violated_movable for r in goal.relations}
         return [
-            math.prod(factors[relation] for relation in self._violated(goal, one, around)) / config.chance_fit
+            math.prod(factors[relation] for relation in self._violated(goal, one, around)) / self.chance_fit
             for one in named
         ]
 
@@ -212,15 +188,15 @@ class Matcher:
         """Return 1 if a relation of an entry holds, 0 if not, and in between for a room that is unknown."""
         if relation.kind == "in":
             room = self.room_around(entry.ground_m, around)
-            return self.config.unknown_room if room is None else float(room == relation.noun)
+            return self.unknown_room if room is None else float(room == relation.noun)
         others = [o for o in around if o.entry_id != entry.entry_id and similarity(relation.noun, o.label) >= 1.0]
         if relation.kind == "on":
             return float(any(self.is_on(entry, other) for other in others))
-        return float(any(gap_m(entry, other) <= self.config.near_m for other in others))
+        return float(any(gap_m(entry, other) <= self.near_m for other in others))
 
     def is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
         """Return whether an object stands on, or in, another, by their boxes."""
-        margin_m = self.config.support_margin_m
+        margin_m = self.support_margin_m
         for axis in (0, 2):
             if abs(entry.centre_m[axis] - support.centre_m[axis]) > support.size_m[axis] / 2 + margin_m:
                 return False
@@ -244,7 +220,7 @@ class Matcher:
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
         """Return the same as `room_around`, from objects that were read before: for many places among the same ones."""
         votes: dict[str, list[float]] = defaultdict(list)
-        (x_m, z_m), radius_m = place_m, self.config.room_radius_m
+        (x_m, z_m), radius_m = place_m, self.room_radius_m
         for room, (other_x_m, other_z_m) in signs:
             if abs(other_x_m - x_m) >= radius_m or abs(other_z_m - z_m) >= radius_m:  # most are in other rooms
                 continue
@@ -263,12 +239,12 @@ class Matcher:
         mentioned = {r.noun for r in goal.relations if r.kind != "in" and not is_structure(r.noun)}
         leads_m = [other.ground_m for other in around if canonical(other.label) in mentioned] if mentioned else []
         signs = [] if goal.room is None else self.room_signs(around)
-        config, costs_m = self.config, []
+        costs_m = []
         for frontier in frontiers:
-            is_lead = any(math.dist(lead_m, frontier.position_m) <= config.lead_radius_m for lead_m in leads_m)
+            is_lead = any(math.dist(lead_m, frontier.position_m) <= self.lead_radius_m for lead_m in leads_m)
             if not is_lead and signs:
                 is_lead = self.room_of_signs(frontier.position_m, signs) == goal.room
-            costs_m.append(frontier.travel_m - (config.lead_m if is_lead else 0.0))
+            costs_m.append(frontier.travel_m - (self.lead_m if is_lead else 0.0))
         return costs_m
 
 

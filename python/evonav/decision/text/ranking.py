@@ -1,8 +1,8 @@
 """Rank remembered objects for a decision model, and choose by rule between objects and frontiers."""
 
 import math
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ def rank_entries(matcher: Matcher, goal: Goal, entries: Sequence[ObjectCandidate
     Stands for the paper's CLIP similarity (Sec. C.4), which ground-truth perception lacks. Ties go to more detections,
     then to the nearer entry, then to the older one.
     """
-    return _ranked(matcher.label_scores(matcher.parsed(goal)), entries, position_m)
+    return _ranked(partial(matcher.label_score, matcher.parsed(goal)), entries, position_m)
 
 
 def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
@@ -36,14 +36,18 @@ def rank_by_text(goal: Goal, entries: Sequence[ObjectCandidate], position_m: Poi
     Raises:
         InvalidArgumentError: The extra is missing or broken.
     """
-    instruction = goal.unified_instruction
-    scores = {label: similarity_of_label(instruction, label) for label in {entry.label for entry in entries}}
-    return _ranked(scores, entries, position_m)
+    return _ranked(cache(partial(similarity_of_label, goal.unified_instruction)), entries, position_m)
 
 
-def _ranked(scores: Mapping[str, float], entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
+def _ranked(score_of: Callable[[str], float], entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     keys = [
-        (-scores[entry.label], -entry.num_detections, math.dist(entry.centre_m[::2], position_m), entry.entry_id, index)
+        (
+            -score_of(entry.label),
+            -entry.num_detections,
+            math.dist(entry.centre_m[::2], position_m),
+            entry.entry_id,
+            index,
+        )
         for index, entry in enumerate(entries)
     ]
     keys.sort()
@@ -119,11 +123,10 @@ def choose_candidate(
         AnswerError: No object has to do with the goal, and there is no frontier.
     """
     goal = matcher.parsed(stage)
-    config = matcher.config
     named = [index for index, candidate in enumerate(objects) if matcher.names_goal(goal, candidate)]
     if named:
         best = matcher.best(goal, [objects[index] for index in named], surroundings, unseen_m2)
-        is_last_chance = not frontiers or num_rounds_left <= config.hurry_rounds
+        is_last_chance = not frontiers or num_rounds_left <= matcher.hurry_rounds
         if is_final or best.fits or is_last_chance:
             return Choice("object", named[best.index]), best.reason
     index = best_frontier(matcher, stage, frontiers, surroundings)

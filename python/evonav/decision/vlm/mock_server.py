@@ -21,6 +21,8 @@ from evonav.decision.noisy import read_rates
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import InvalidArgumentError
 
+HOST = "127.0.0.1"
+
 JsonObject = dict[str, Any]
 
 MockReply = dict[str, Any]
@@ -134,13 +136,13 @@ def without_schemas(request: JsonObject) -> None:
 
 
 @contextmanager
-def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> Iterator[MockServer]:
+def serving(server: MockServer, *, port: int = 0) -> Iterator[MockServer]:
     """Serve while the context lasts, at `server.url`; `InvalidArgumentError` if the port is not available."""
     try:
-        http = _QuietServer((host, port), _handler(server))
+        http = _QuietServer((HOST, port), _handler(server))
     except OSError as error:
-        raise InvalidArgumentError(f"{host}:{port}: {error}") from error
-    server.url = f"http://{host}:{http.server_port}/v1"
+        raise InvalidArgumentError(f"{HOST}:{port}: {error}") from error
+    server.url = f"http://{HOST}:{http.server_port}/v1"
     thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
     try:

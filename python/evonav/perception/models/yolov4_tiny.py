@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav.errors import PerceptionError
+from evonav.perception.models.prompted import Boxes
+from evonav.tasks.language import phrases_of
 
 Array = NDArray[np.float32]
 
@@ -39,18 +41,20 @@ _ANCHORS_PX = (((81.0, 82.0), (135.0, 169.0), (344.0, 319.0)), ((23.0, 27.0), (3
 _XY_SCALE = 1.05
 _LEAK = np.float32(0.1)
 _EPSILON = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class CocoBoxes:
-    """Boxes that the network finds in one image, the most confident first."""
-
-    boxes_px: Array
-    """`(N, 4)` left, top, right, bottom, in pixels of the image."""
-    classes: NDArray[np.int64]
-    """`(N,)` indices into COCO's 80 classes."""
-    confidences: Array
-    """`(N,)` in 0..1: that there is an object, times that it is of the class."""
+_MAX_IOU = 0.45
+"""Overlap above which the less confident one of two boxes of a class is dropped: Darknet's."""
+COCO_CLASSES = phrases_of(
+    """
+    person; bicycle; car; motorcycle; airplane; bus; train; truck; boat; traffic light; fire hydrant; stop sign;
+    parking meter; bench; bird; cat; dog; horse; sheep; cow; elephant; bear; zebra; giraffe; backpack; umbrella;
+    handbag; tie; suitcase; frisbee; skis; snowboard; sports ball; kite; baseball bat; baseball glove; skateboard;
+    surfboard; tennis racket; bottle; wine glass; cup; fork; knife; spoon; bowl; banana; apple; sandwich; orange;
+    broccoli; carrot; hot dog; pizza; donut; cake; chair; couch; potted plant; bed; dining table; toilet; tv; laptop;
+    mouse; remote; keyboard; cell phone; microwave; oven; toaster; sink; refrigerator; book; clock; vase; scissors;
+    teddy bear; hair drier; toothbrush
+    """
+)
+"""COCO's 80 classes, in its order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,16 +94,13 @@ class YoloV4Tiny:
         values = np.frombuffer(darknet[_HEADER_BYTES:], np.float32)
         self._convolutions = tuple(_read(values))
 
-    def detect(
-        self, rgb: NDArray[np.uint8], *, side_px: int = 608, min_confidence: float = 0.1, max_iou: float = 0.45
-    ) -> CocoBoxes:
+    def detect(self, rgb: NDArray[np.uint8], *, side_px: int = 608, min_confidence: float = 0.1) -> Boxes:
         """Detect objects.
 
         Args:
             rgb: Image `(H, W, 3)`; it is stretched to a square.
             side_px: Side of the square that the network sees, a multiple of 32.
             min_confidence: Least confidence of a detection.
-            max_iou: Overlap above which the less confident one of two boxes of a class is dropped (Darknet's 0.45).
         """
         square = Image.fromarray(rgb).resize((side_px, side_px), Image.Resampling.BILINEAR)
         image = np.ascontiguousarray(np.asarray(square, np.float32).transpose(2, 0, 1)) / np.float32(255.0)
@@ -108,10 +109,11 @@ class YoloV4Tiny:
             for output, anchors in zip(self._outputs(image), _ANCHORS_PX, strict=True)
         ]
         boxes, classes, confidences = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        remaining = _without_doubles(boxes, classes, confidences, max_iou)
+        remaining = _without_doubles(boxes, classes, confidences)
         size_px = np.array([rgb.shape[1], rgb.shape[0]] * 2, np.float32)
         inside = np.clip(boxes[remaining], 0.0, 1.0) * size_px
-        return CocoBoxes(inside.astype(np.float32), classes[remaining], confidences[remaining])
+        names = tuple(COCO_CLASSES[number] for number in classes[remaining].tolist())
+        return Boxes(inside.astype(np.float32), names, confidences[remaining])
 
     def _outputs(self, image: Array) -> tuple[Array, Array]:
         """Return what the two heads say: `(255, H, W)` at a 32nd and at a 16th of the image's size."""
@@ -204,12 +206,12 @@ def _sigmoid(values: Array) -> Array:
     return np.float32(1.0) / (np.float32(1.0) + np.exp(-values))
 
 
-def _without_doubles(boxes: Array, classes: NDArray[np.int64], confidences: Array, max_iou: float) -> NDArray[np.int64]:
+def _without_doubles(boxes: Array, classes: NDArray[np.int64], confidences: Array) -> NDArray[np.int64]:
     """Return the indices of the remaining boxes, the most confident first: of each class by itself."""
     remaining: list[int] = []
     for index in np.argsort(-confidences, kind="stable").tolist():
         rivals = [other for other in remaining if classes[other] == classes[index]]
-        if not rivals or box_ious(boxes[[index]], boxes[rivals]).max() <= max_iou:
+        if not rivals or box_ious(boxes[[index]], boxes[rivals]).max() <= _MAX_IOU:
             remaining.append(index)
     return np.array(remaining, np.int64)
 
