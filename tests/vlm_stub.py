@@ -4,10 +4,10 @@ import base64
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
-from typing import Any
+from typing import Annotated, Any, Literal
 
-import jsonschema
 from PIL import Image
+from pydantic import BaseModel, ConfigDict, Field
 
 from evonav.decision.vlm import mock_server as mock_vlm
 from evonav.decision.vlm.mock_server import MockReply
@@ -15,75 +15,54 @@ from evonav.decision.vlm.mock_server import MockServer as Stub
 
 KEY = "sk-test-0123456789abcdefghijklmnop"
 
-PART = {
-    "oneOf": [
-        {
-            "type": "object",
-            "required": ["type", "text"],
-            "additionalProperties": False,
-            "properties": {"type": {"const": "text"}, "text": {"type": "string", "minLength": 1}},
-        },
-        {
-            "type": "object",
-            "required": ["type", "image_url"],
-            "additionalProperties": False,
-            "properties": {
-                "type": {"const": "image_url"},
-                "image_url": {
-                    "type": "object",
-                    "required": ["url"],
-                    "additionalProperties": False,
-                    "properties": {"url": {"type": "string"}, "detail": {"enum": ["auto", "low", "high"]}},
-                },
-            },
-        },
-    ]
-}
-REQUEST = {
-    "type": "object",
-    "required": ["model", "messages"],
-    "additionalProperties": False,
-    "properties": {
-        "model": {"type": "string", "minLength": 1},
-        "messages": {
-            "type": "array",
-            "minItems": 1,
-            "items": {
-                "type": "object",
-                "required": ["role", "content"],
-                "additionalProperties": False,
-                "properties": {
-                    "role": {"enum": ["system", "user", "assistant"]},
-                    "content": {"oneOf": [{"type": "string"}, {"type": "array", "minItems": 1, "items": PART}]},
-                },
-            },
-        },
-        "temperature": {"type": "number", "minimum": 0, "maximum": 2},
-        "seed": {"type": "integer"},
-        "max_tokens": {"type": "integer", "minimum": 1},
-        "max_completion_tokens": {"type": "integer", "minimum": 1},
-        "top_p": {"type": "number", "minimum": 0, "maximum": 1},
-        "response_format": {
-            "type": "object",
-            "required": ["type", "json_schema"],
-            "additionalProperties": False,
-            "properties": {
-                "type": {"const": "json_schema"},
-                "json_schema": {
-                    "type": "object",
-                    "required": ["name", "schema"],
-                    "additionalProperties": False,
-                    "properties": {
-                        "name": {"type": "string", "pattern": "^[a-zA-Z0-9_-]{1,64}$"},
-                        "strict": {"type": "boolean"},
-                        "schema": {"type": "object"},
-                    },
-                },
-            },
-        },
-    },
-}
-"""The part of OpenAI's published API that is used; anything else is refused with 400."""
+
+class Closed(BaseModel):
+    """The part of OpenAI's published API that is used; anything else is refused with 400."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class TextPart(Closed):
+    type: Literal["text"]
+    text: str = Field(min_length=1)
+
+
+class ImageUrl(Closed):
+    url: str
+    detail: Literal["auto", "low", "high"] = "auto"
+
+
+class ImagePart(Closed):
+    type: Literal["image_url"]
+    image_url: ImageUrl
+
+
+class Message(Closed):
+    role: Literal["system", "user", "assistant"]
+    content: str | Annotated[list[TextPart | ImagePart], Field(min_length=1)]
+
+
+class JsonSchema(Closed):
+    name: str = Field(pattern="^[a-zA-Z0-9_-]{1,64}$")
+    strict: bool = False
+    content: dict[str, Any] = Field(alias="schema")
+
+
+class ResponseFormat(Closed):
+    type: Literal["json_schema"]
+    json_schema: JsonSchema
+
+
+class ChatRequest(Closed):
+    model: str = Field(min_length=1)
+    messages: list[Message] = Field(min_length=1)
+    temperature: float = Field(1.0, ge=0.0, le=2.0)
+    top_p: float = Field(1.0, ge=0.0, le=1.0)
+    seed: int = 0
+    max_tokens: int = Field(1, ge=1)
+    max_completion_tokens: int = Field(1, ge=1)
+    response_format: ResponseFormat | None = None
+
 
 _STRICT_KEYWORDS = {
     "type", "properties", "required", "additionalProperties", "items", "enum", "const", "anyOf", "description", "title",
@@ -127,7 +106,7 @@ def images_in(request: dict[str, Any]) -> list[Image.Image]:
 
 def check_request(request: dict[str, Any]) -> None:
     """Raises unless a request is one that OpenAI's API would take."""
-    jsonschema.validate(request, REQUEST)
+    ChatRequest.model_validate(request)
     images_in(request)
     if "response_format" in request:
         schema = request["response_format"]["json_schema"]

@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 from evonav.evaluation.run.components import load_spec
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.noise.config import noise_presets
+from evonav.perception.noise import noise_presets
 from evonav.perception.simulated import noisy_perception
 from evonav.sensors.observation import Detections
 from evonav.tasks.language import noun_of

@@ -126,7 +126,9 @@ def leaking(told: str) -> list[MockReply]:
     ]
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "form", [pytest.param(form, marks=() if form == "JSON" else pytest.mark.slow) for form in FORMS]
+)
 def test_no_error_answer_or_exchange_has_a_key_that_the_server_repeats(stub: Stub, tmp_path: Path, form: str) -> None:
     config = VlmConfig("m", base_url=stub.url, api_key=KEY, timeout_s=5.0, max_retries=0)
     store = ResponseCache(tmp_path / "exchanges.sqlite")

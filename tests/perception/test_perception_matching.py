@@ -170,17 +170,16 @@ def test_overlaps_and_depths_are_what_counting_gives(seed):
         assert medians[i] == (inside[(len(inside) - 1) // 2] if len(inside) else np.inf)
 
 
-def average_precision_naive(confidences, is_right, num_true):
-    """COCO's definition, in words: at each recall the best precision of any cut that reaches it."""
-    ranked = sorted(range(len(confidences)), key=lambda i: -confidences[i])
-    cuts, right = [], 0
-    for rank, i in enumerate(ranked, start=1):
-        right += is_right[i]
-        cuts.append((right / num_true, right / rank))
-    total = 0.0
-    for step in np.linspace(0, 1, 101):
-        total += max([precision for recall, precision in cuts if recall >= step], default=0.0)
-    return total / 101
+def average_precision_naive(confidences, is_right, counts, num_true):
+    """COCO's definition, in words: at each recall the best precision of any cut that reaches it.
+
+    Every detection is there as many times as `counts` says, all at once.
+    """
+    cuts, right, seen = [], 0, 0
+    for i in sorted(range(len(confidences)), key=lambda i: -confidences[i]):
+        right, seen = right + counts[i] * is_right[i], seen + counts[i]
+        cuts.append((right / num_true, right / seen if seen else 0.0))
+    return sum(max([p for r, p in cuts if r >= step - 1e-9], default=0.0) for step in np.linspace(0, 1, 101)) / 101
 
 
 CASES = st.integers(1, 30).flatmap(
@@ -196,7 +195,7 @@ def test_average_precision_is_cocos(case):
     rows, num_true = case
     confidences = np.array([row[0] for row in rows], np.float64)
     is_right = np.array([row[1] for row in rows], np.bool_)
-    expected = average_precision_naive(confidences, is_right, num_true)
+    expected = average_precision_naive(confidences, is_right, [1] * len(rows), num_true)
     assert interpolated(confidences, is_right, num_true).mean() == pytest.approx(expected, abs=1e-12)
 
 
@@ -215,14 +214,5 @@ def test_a_resample_is_the_average_precision_of_copies(case, seed):
         if total == 0:
             assert np.isnan(value)
             continue
-        expected = average_precision_of_copies(confidences, is_right, row[units], total)
+        expected = average_precision_naive(confidences, is_right, row[units], total)
         assert value == pytest.approx(expected, abs=1e-9)
-
-
-def average_precision_of_copies(confidences, is_right, counts, num_true):
-    """As above, with every detection counted several times at once."""
-    cuts, right, seen = [], 0, 0
-    for i in sorted(range(len(confidences)), key=lambda i: -confidences[i]):
-        right, seen = right + counts[i] * is_right[i], seen + counts[i]
-        cuts.append((right / num_true, right / seen if seen else 0.0))
-    return sum(max([p for r, p in cuts if r >= step - 1e-9], default=0.0) for step in np.linspace(0, 1, 101)) / 101

@@ -16,8 +16,7 @@ from evonav import _core
 from evonav.evaluation.run.components import Backend, load_spec
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.noise.config import NoiseConfig, noise_presets
-from evonav.perception.noise.pose_drift import PoseDrift
+from evonav.perception.noise import NoiseConfig, PoseDrift, noise_presets
 from evonav.perception.shorthand import parse_perception
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections

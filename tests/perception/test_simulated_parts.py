@@ -9,8 +9,7 @@ import pytest
 from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.components import load_spec
-from evonav.perception.noise.config import NoiseConfig, noise_presets
-from evonav.perception.noise.confusion import read_confusion
+from evonav.perception.noise import NoiseConfig, noise_presets, read_confusion
 from evonav.perception.simulated import noisy_perception
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, nouns_of, text_feature
 from evonav.tasks.listing import BUNDLED_TASKS

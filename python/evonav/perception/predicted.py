@@ -15,7 +15,7 @@ from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig, filtered, joined
 from evonav.perception.models import libraries
-from evonav.perception.models.prompted import PromptedDetector
+from evonav.perception.models.prompted import BoxFinder, MaskMaker, PromptedDetector
 from evonav.perception.models.torchvision_models import MaskRcnn
 from evonav.perception.perception import Perception, StageScene
 from evonav.perception.vocabulary import COCO_UNIGOAL, DINO_UNIGOAL, VOCABULARIES
@@ -40,8 +40,6 @@ UNIGOAL_GRAPH = EVERYTHING.model_copy(update={"reference_px": (480, 640), "min_a
 """UniGoal's, of its scene graph; it looks at 640x480."""
 _SAME_IOU = 0.5
 """UniGoal's two detectors: masks that overlap by more are one object, and the map's detector names it."""
-_MIN_MASK_SCORE = 0.95
-"""UniGoal's, of SAM's masks."""
 _COCO = {{"plant": "potted plant"}.get(word, word): word for word in COCO_UNIGOAL}
 """UniGoal's word by COCO's category."""
 
@@ -89,14 +87,13 @@ class JointDetector:
     network: MaskRcnn
     min_confidence: float
     grounded: Detector
-    graph_filters: FilterConfig = UNIGOAL_GRAPH
 
     def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """Join the detections of both; of a thing that both found, take the map's word, which every table knows."""
         firsts = self.network.detect([view.rgb for view in views], _COCO, self.min_confidence)
         seconds = self.grounded.detect(views)
         return [
-            joined(filtered(first, EVERYTHING), filtered(second, self.graph_filters), _SAME_IOU)
+            joined(filtered(first, EVERYTHING), filtered(second, UNIGOAL_GRAPH), _SAME_IOU)
             for first, second in zip(firsts, seconds, strict=True)
         ]
 
@@ -185,47 +182,39 @@ def load_stack(
     folder = models_folder(models)
     paths = {part: str(located(one, folder)) for part, one in weights_of(stack, config).items()}
     on = libraries.device_of(device)
-    min_score = config.min_mask_score
     if stack == "3d-mem":
         from evonav.perception.models import open_clip_models, ultralytics_models
 
-        min_confidence = _either(config.min_confidence, 0.4)
-        detector: Detector = PromptedDetector(
-            ultralytics_models.load_yolo_world(paths["detector"], paths["text"], on),
-            ultralytics_models.load_ultralytics_sam(paths["sam"], on),
-            phrases,
-            min_confidence,
-            _either(min_score, -math.inf),
-            swaps_colours=config.swapped_colours,
-        )
+        published = 0.4
+        finder: BoxFinder = ultralytics_models.load_yolo_world(paths["detector"], paths["text"], on)
+        masker: MaskMaker = ultralytics_models.load_ultralytics_sam(paths["sam"], on)
         embedder: Embedder = open_clip_models.load_open_clip("ViT-B-32", paths["clip"], on)
-        return detector, FilterConfig(min_confidence=min_confidence), embedder
-    from evonav.perception.models import transformers_models
+    else:
+        from evonav.perception.models import transformers_models
 
-    masker = transformers_models.Sam.load(paths["sam"], on)
-    if stack == "transformers":
-        min_confidence = _either(config.min_confidence, 0.3)
-        detector = PromptedDetector(
-            transformers_models.Owlv2.load(paths["detector"], on),
-            masker,
-            phrases,
-            min_confidence,
-            _either(min_score, -math.inf),
-        )
+        masker = transformers_models.Sam.load(paths["sam"], on)
+        if stack == "unigoal":
+            from evonav.perception.models.torchvision_models import load_mask_rcnn
+
+            finder = transformers_models.GroundingDino.load(paths["detector"], on)
+            min_score, min_confidence = _either(config.min_mask_score, 0.95), _either(config.min_confidence, 0.3)
+            least = _either(config.min_confidence, 0.5)
+            network = load_mask_rcnn(paths["network"], on, min(least, 0.05))
+            grounded = PromptedDetector(finder, masker, DINO_UNIGOAL, min_confidence, min_score)
+            return JointDetector(network, least, grounded), EVERYTHING, None
+        published = 0.3
+        finder = transformers_models.Owlv2.load(paths["detector"], on)
         embedder = transformers_models.Clip.load(paths["clip"], on)
-        return detector, FilterConfig(min_confidence=min_confidence), embedder
-    from evonav.perception.models.torchvision_models import load_mask_rcnn
-
-    grounded = PromptedDetector(
-        transformers_models.GroundingDino.load(paths["detector"], on),
+    min_confidence = _either(config.min_confidence, published)
+    detector = PromptedDetector(
+        finder,
         masker,
-        DINO_UNIGOAL,
-        _either(config.min_confidence, 0.3),
-        _either(min_score, _MIN_MASK_SCORE),
+        phrases,
+        min_confidence,
+        _either(config.min_mask_score, -math.inf),
+        swaps_colours=config.swapped_colours,
     )
-    least = _either(config.min_confidence, 0.5)
-    network = load_mask_rcnn(paths["network"], on, min(least, 0.05))
-    return JointDetector(network, least, grounded), EVERYTHING, None
+    return detector, FilterConfig(min_confidence=min_confidence), embedder
 
 
 def _either(given: float | None, published: float) -> float:

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.noise.config import NoiseConfig
-from evonav.perception.noise.confusion import Confusion, read_confusion
-from evonav.perception.noise.pose_drift import PoseDrift
+from evonav.perception.noise import Confusion, NoiseConfig, PoseDrift, read_confusion
 from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, text_feature
 from evonav.sensors.observation import Detections

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.perception.noise.confusion import Confusion
+from evonav.perception.noise import Confusion
 from evonav.tasks.language import noun_of, plural_of
 
 DIMENSIONS = 64

@@ -1,1 +1,0 @@
-"""Describe simulated errors of perception: presets, confused labels, drifting poses."""
