@@ -23,6 +23,11 @@ from vlm_stub import KEY, check_request, serving
 COMMON = ("--agent", "fu", "--limit", "1", "--workers", "0", "--isolation", "none")
 
 
+def sets(**values: object) -> list[str]:
+    """Return the options that set keys of `decision`."""
+    return [word for key, value in values.items() for word in ("--set", f"decision.{key}={value}")]
+
+
 def run(*arguments: object) -> tuple[int, str]:
     result = CliRunner().invoke(app, [str(argument) for argument in arguments])
     return result.exit_code, result.output + str(result.exception or "")
@@ -44,14 +49,11 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     out, again = tmp_path / "out", tmp_path / "again"
     with serving(lambda request: {"text": mock_answer(request)}) as stub:
         options = ("--decision", "vlm", "--base-url", stub.url, "--prices", prices, "--max-cost", 5)
-        code, printed = run(
-            "evaluate", *COMMON, *options, "--set", "decision.temperature=0.2", "--seed", 3, "--out", out
-        )
+        warm = (*options, *sets(temperature=0.2))
+        code, printed = run("evaluate", *COMMON, *warm, "--seed", 3, "--out", out)
         num_asked = len(stub.requests or [])
         # Going on asks nothing, and counts on.
-        assert (
-            run("evaluate", *COMMON, *options, "--set", "decision.temperature=0.2", "--seed", 3, "--out", out)[0] == 0
-        )
+        assert run("evaluate", *COMMON, *warm, "--seed", 3, "--out", out)[0] == 0
         assert len(stub.requests or []) == num_asked > 0
         for request in stub.requests or []:
             check_request(request)
@@ -63,16 +65,9 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
     assert f"${num_asked * 0.002:.4f}" in printed  # 1000 tokens in, 100 out
     assert code_other != 0
     assert "temperature" in told
-    replay = (
-        "--decision",
-        "vlm",
-        "--set",
-        "decision.mode=replay",
-        "--set",
-        f"decision.exchanges={out / 'exchanges.sqlite'}",
-    )
+    replay = ("--decision", "vlm", *sets(mode="replay", exchanges=out / "exchanges.sqlite", temperature=0.2))
     monkeypatch.delenv("OPENAI_API_KEY")
-    code, printed = run("evaluate", *COMMON, *replay, "--set", "decision.temperature=0.2", "--seed", 3, "--out", again)
+    code, printed = run("evaluate", *COMMON, *replay, "--seed", 3, "--out", again)
     assert code == 0, printed
     assert f"m: 0 questions asked, {num_asked} answered from exchanges" in printed
     with RunStore(out) as first, RunStore(again) as second:
@@ -98,10 +93,7 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
         (("--decision", "vlm", "--model", "m", "--set", "decision.mode=replay"), "no exchanges here"),
         (("--decision", "vlm", "--model", "x", "--prices", "PRICES", "--base-url", "http://x/v1"), "no prices of"),
         (("--decision", "vlm", "--model", "m", "--max-cost", 1, "--base-url", "http://x"), "the model's prices"),
-        (
-            ("--decision", "vlm", "--model", "m", "--set", "decision.temperature=9", "--base-url", "http://x/v1"),
-            "temperature",
-        ),
+        (("--decision", "vlm", "--model", "m", *sets(temperature=9), "--base-url", "http://x/v1"), "temperature"),
         (("--set", "decision.noise.wrong=2"), "noise: wrong = 2"),
         (("--set", "decision.noise.wrnog=0.1"), "wrnog"),
         (("--set", "decision.noise.wrong=many"), "Input should be a valid number"),
@@ -181,18 +173,7 @@ def test_a_model_is_told_of_changes_in_all_prompts_or_in_none(tmp_path: Path) ->
 
 
 def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) -> None:
-    options = (
-        "--decision",
-        "vlm",
-        "--model",
-        "o9",
-        "--set",
-        "decision.reasoning=true",
-        "--set",
-        "decision.mode=live",
-        "--out",
-        tmp_path / "out",
-    )
+    options = ("--decision", "vlm", "--model", "o9", *sets(reasoning="true", mode="live"), "--out", tmp_path / "out")
     with serving(lambda request: {"status": 401, "raw": b"{}"}) as stub:
         run("evaluate", *COMMON, *options, "--base-url", stub.url)
     request = (stub.requests or [])[0]
@@ -203,16 +184,8 @@ def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) ->
 
 
 def test_the_stand_in_serves_until_it_is_stopped() -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "evonav.decision.vlm.mock_server",
-        "--port",
-        "0",
-        "--faults",
-        "refusal=1.0",
-        "--no-schemas",
-    ]
+    options = ["--port", "0", "--faults", "refusal=1.0", "--no-schemas"]
+    command = [sys.executable, "-m", "evonav.decision.vlm.mock_server", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout
         url = server.stdout.readline().split()[1].rstrip(";")

@@ -12,9 +12,9 @@ from evonav.decision.custom_model import CustomClient
 from evonav.decision.options import AskedOptions
 from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
+from evonav.decision.vlm.caching_client import ResponseCache
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.evaluation.records.store import RunStore
 

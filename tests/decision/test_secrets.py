@@ -22,11 +22,11 @@ import short_stages
 
 from evonav.cli.doctor import all_checks
 from evonav.decision.prompts import Picture, Prompt
+from evonav.decision.vlm.caching_client import ResponseCache
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import MockReply
-from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.decision.vlm.secrets import without_secrets
 from evonav.errors import DecisionError
 from vlm_stub import Stub, check_request, serving

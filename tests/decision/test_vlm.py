@@ -19,9 +19,9 @@ from PIL import Image
 
 from evonav.decision.prompts import Picture, Prompt, Turn
 from evonav.decision.vlm.account import Account, Price, Usage, image_tokens, read_prices
+from evonav.decision.vlm.caching_client import ResponseCache, key_of
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import ResponseCache, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
@@ -110,7 +110,7 @@ def test_replay_imports_no_client(config: VlmConfig, path: Path) -> None:
     VlmClient(config, store=ResponseCache(path), mode="record").ask(Prompt.of("Hello?"))
     script = f"""
 import sys
-from evonav.decision.vlm.response_cache import ResponseCache
+from evonav.decision.vlm.caching_client import ResponseCache
 from evonav.decision.prompts import Prompt
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache({str(path)!r}), mode="replay")

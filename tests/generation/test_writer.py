@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from evonav.decision.vlm.account import Account, Price
+from evonav.decision.vlm.caching_client import ResponseCache
 from evonav.decision.vlm.client import VlmClient, VlmConfig
-from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import TaskError
 from evonav.generation.instructions import writer
 from evonav.generation.instructions.writer import estimate_texts, write_texts

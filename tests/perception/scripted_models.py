@@ -11,6 +11,10 @@ from evonav.perception.models.crops import padded_crops, unit
 WORDS = ("couch", "dining table", "trash can", "gizmo")
 
 
+def nothing_found(shape):
+    return Found(np.zeros((0, *shape), np.bool_), np.zeros((0, 4), np.float32), (), np.zeros(0, np.float32))
+
+
 class BandDetector:
     """In each quarter of an image, what is nearer than its neighbourhood is one of four things."""
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Found, nothing_found
+from evonav.perception.detector import Found
 from evonav.perception.filters import (
     FilterConfig,
     box_areas_px,
@@ -137,7 +137,7 @@ def test_all_filters_in_their_order() -> None:
 
 
 def test_nothing_is_left_of_nothing() -> None:
-    nothing = nothing_found((SIDE, SIDE))
+    nothing = found()
     assert filtered(nothing, CONFIG).labels == ()
     assert (one_label_a_pixel(nothing.masks) == -1).all()
     assert joined(nothing, nothing, 0.5).labels == ()

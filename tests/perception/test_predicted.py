@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scripted_models
 from bundled_run import bundled_run
-from scripted_models import ColourEmbedder, scripted_perception
+from scripted_models import ColourEmbedder, nothing_found, scripted_perception
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
@@ -16,7 +16,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
-from evonav.perception.detector import Found, nothing_found
+from evonav.perception.detector import Found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
 from evonav.perception.models.prompted import Boxes, Masks, PromptedDetector

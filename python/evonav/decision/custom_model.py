@@ -11,9 +11,8 @@ from evonav.component import import_callable
 from evonav.decision.prompts import Prompt
 from evonav.decision.question import DecisionModel, Need
 from evonav.decision.vlm.account import Account, Usage
-from evonav.decision.vlm.caching_client import CachingClient, Mode
+from evonav.decision.vlm.caching_client import CachingClient, JsonObject, Mode, ResponseCache
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 
 

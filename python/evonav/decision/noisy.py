@@ -98,7 +98,8 @@ class Noisy(ModelWrapper):
         """
         if attempt == 0:
             self._num_asked[question.kind] += 1
-        draws = self._draws(question.kind, attempt)
+        name = f"noise\0{self._seed}\0{question.kind}\0{self._num_asked[question.kind]}\0{attempt}"
+        draws = random.Random(hashlib.sha256(name.encode()).digest())  # noqa: S311 - not for secrets
         if self.rates.delay:
             self._sleep(self.rates.delay)
         mistake = self._mistake(draws.random())
@@ -144,10 +145,6 @@ class Noisy(ModelWrapper):
         if unseen is not None:
             return _mistaken(question, unseen, "confused_unseen")
         return replace(reply, counter="confused_kept")
-
-    def _draws(self, kind: str, attempt: int) -> random.Random:
-        name = f"noise\0{self._seed}\0{kind}\0{self._num_asked[kind]}\0{attempt}"
-        return random.Random(hashlib.sha256(name.encode()).digest())  # noqa: S311 - not for secrets
 
 
 def _mistaken(question: Question[A], answer: A, counter: str) -> Reply[A]:

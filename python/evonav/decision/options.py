@@ -8,9 +8,8 @@ from pydantic import Field
 
 from evonav.decision.goal_input import GoalInput
 from evonav.decision.vlm.account import Account, Ledger, Price
-from evonav.decision.vlm.caching_client import Mode
+from evonav.decision.vlm.caching_client import Mode, ResponseCache
 from evonav.decision.vlm.client import VlmClient, VlmConfig
-from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import InvalidArgumentError
 from evonav.records import Options
 

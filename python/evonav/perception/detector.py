@@ -77,15 +77,6 @@ class Found:
                 )
 
 
-def nothing_found(shape: tuple[int, int]) -> Found:
-    """Return an image without detections.
-
-    Args:
-        shape: `(H, W)` of the image.
-    """
-    return Found(np.zeros((0, *shape), np.bool_), np.zeros((0, 4), np.float32), (), np.zeros(0, np.float32))
-
-
 class Detector(Protocol):
     """Finds objects in views. It may be shared by the episodes of a process, so it keeps nothing between calls."""
 

@@ -60,7 +60,11 @@ class DetectorPerception(Perception):
         Raises:
             InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
         """
-        views = [DetectorView(_colours(frame), frame.depth_m, frame.pose.horizon_rad) for frame in frames]
+        views = []
+        for frame in frames:
+            if frame.rgb is None:
+                raise InvalidArgumentError("argument `frames`: one has no colours, expected frames rendered with them")
+            views.append(DetectorView(frame.rgb, frame.depth_m, frame.pose.horizon_rad))
         found = self._detector.detect(views)
         if len(found) != len(views):
             raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(views)} views")
@@ -96,9 +100,3 @@ class DetectorPerception(Perception):
             confidences=found.confidences[is_large_enough],
             features=None if features is None else features[is_large_enough],
         )
-
-
-def _colours(frame: Frame) -> NDArray[np.uint8]:
-    if frame.rgb is None:
-        raise InvalidArgumentError("argument `frames`: one has no colours, expected frames rendered with them")
-    return frame.rgb

@@ -54,7 +54,6 @@ class _Found:
 
     is_reported: NDArray[np.bool_]
     labels: list[str]
-    true_labels: list[str]
     confidences: F64
     draws: F64
     """`(N, _NUM_DRAWS)` standard normals."""
@@ -181,17 +180,16 @@ class NoisyPerception(Perception):
         )
         is_found = shares[:, _MISS] < (1.0 - config.miss_rate) * quality
         is_confused = shares[:, _CONFUSED] < config.confusion_rate
-        true_labels = [body.category for body in bodies]
+        is_similar = shares[:, _SIMILAR] < config.confusion_similar
+        draws_of_labels = zip(is_confused.tolist(), is_similar.tolist(), shares[:, _LABEL].tolist(), strict=True)
         labels = [
-            self._confusion.another(label, bool(share[_SIMILAR] < config.confusion_similar), float(share[_LABEL]))
-            if confused
-            else label
-            for label, share, confused in zip(true_labels, shares, is_confused.tolist(), strict=True)
+            self._confusion.another(body.category, similar, share) if confused else body.category
+            for body, (confused, similar, share) in zip(bodies, draws_of_labels, strict=True)
         ]
         medians = np.where(is_confused, config.false_confidence, config.confidence)
         confidences = _confidences(medians, quality, draws[:, _CONFIDENCE], config)
         is_reported = is_found & (confidences >= config.confidence_threshold)
-        return _Found(is_reported, labels, true_labels, confidences, draws)
+        return _Found(is_reported, labels, confidences, draws)
 
     def _masks(
         self,
@@ -304,7 +302,7 @@ class NoisyPerception(Perception):
         labels: Sequence[str],
     ) -> NDArray[np.float32]:
         """Return the `(N, D)` features of objects, parts of objects and false detections."""
-        label_sets = [tuple(dict.fromkeys((found.true_labels[n], found.labels[n]))) for n in sources]
+        label_sets = [tuple(dict.fromkeys((bodies[n].category, found.labels[n]))) for n in sources]
         label_sets += [(label,) for label in labels[len(sources) :]]
         task_id = self._stage().task_id
         things = [["feature", "object", task_id, bodies[n].id] for n in sources]

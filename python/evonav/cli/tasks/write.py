@@ -37,8 +37,8 @@ def write(
     `--set decision.images=false` it only merges them. The key is read from OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account
+    from evonav.decision.vlm.caching_client import ResponseCache
     from evonav.decision.vlm.client import VlmClient, VlmConfig
-    from evonav.decision.vlm.response_cache import ResponseCache
     from evonav.generation.instructions.writer import estimate_texts, write_texts
 
     given = {"decision.model": model, "decision.base_url": base_url, "prices": prices, "max_cost": max_cost}

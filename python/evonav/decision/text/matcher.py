@@ -157,14 +157,9 @@ class Matcher:
         """
         fixed = {relation for relation in goal.relations if relation.kind == "in" or is_structure(relation.noun)}
         factors = {r: self.violated_fixed if r in fixed else self.violated_movable for r in goal.relations}
-        return [
-            math.prod(factors[relation] for relation in self._violated(goal, one, around)) / self.chance_fit
-            for one in named
-        ]
-
-    def _violated(self, goal: ParsedGoal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> list[Relation]:
-        """Return the relations that can be judged and do not hold."""
-        return [relation for relation in self._judged(goal, around) if self.holds(relation, entry, around) == 0.0]
+        judged = self._judged(goal, around)
+        violated = ([one for one in judged if self.holds(one, entry, around) == 0.0] for entry in named)
+        return [math.prod(factors[relation] for relation in relations) / self.chance_fit for relations in violated]
 
     def _judged(self, goal: ParsedGoal, around: Sequence[ObjectCandidate]) -> list[Relation]:
         """Return the relations, without those to a doorway or a window if none is remembered."""

@@ -23,9 +23,8 @@ from pydantic_core import to_json
 from evonav.decision.pictures import Picture
 from evonav.decision.prompts import Prompt, Turn
 from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
-from evonav.decision.vlm.caching_client import CachingClient, Mode
+from evonav.decision.vlm.caching_client import CachingClient, JsonObject, Mode, ResponseCache
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import JsonObject, ResponseCache
 from evonav.decision.vlm.secrets import REMOVED, without_secrets
 from evonav.errors import DecisionError, InvalidArgumentError
 

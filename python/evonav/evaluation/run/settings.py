@@ -306,7 +306,7 @@ class DecisionSettings(Settings):
 
     def _response_cache(self, run_dir: Path) -> dict[str, Any]:
         """Return where answers are stored, and how the stored ones are used."""
-        from evonav.decision.vlm.response_cache import ResponseCache
+        from evonav.decision.vlm.caching_client import ResponseCache
         from evonav.evaluation.records.store import FILE_NAME
 
         mode = self.mode or "auto"

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.perception.detector import DetectorView, Found, nothing_found
+from evonav.perception.detector import DetectorView, Found
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,15 +67,11 @@ class PromptedDetector:
         boxes = self.finder.find(images, self.phrases, self.min_confidence)
         masks = self.masker.outline(images, [one.boxes_px for one in boxes])
         return [
-            self._found(some, outlined, (image.shape[0], image.shape[1]))
-            for some, outlined, image in zip(boxes, masks, images, strict=True)
+            Found(outlined.masks, some.boxes_px, some.labels, some.confidences).taken(
+                np.flatnonzero(outlined.scores >= self.min_mask_score)
+            )
+            for some, outlined in zip(boxes, masks, strict=True)
         ]
-
-    def _found(self, boxes: Boxes, masks: Masks, shape: tuple[int, int]) -> Found:
-        if not boxes.labels:
-            return nothing_found(shape)
-        found = Found(masks.masks, boxes.boxes_px, boxes.labels, boxes.confidences)
-        return found.taken(np.flatnonzero(masks.scores >= self.min_mask_score))
 
 
 def box_masks(boxes_px: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]:
