@@ -47,7 +47,7 @@ class Collecting(DecisionModel):
 def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Question[Any], Reply[Any]]]]:
     agents = ["ftu", "3d-mem", "msgnav", "unigoal", "evonav_studies.variants:unigoal_as_published"]
     backend = Backend(decision=Component(f"{__name__}:Collecting"))
-    records = bundled_run(tmp_path_factory.mktemp("runs"), agents, backend, max_rounds=9, max_actions=60)
+    records = bundled_run(tmp_path_factory.mktemp("runs"), agents, backend, max_rounds=5, max_actions=30)
     assert [record.error for record in records if record.error] == []
     return ASKED
 

@@ -111,35 +111,40 @@ def test_whole_stages_ask_what_the_api_takes_with_images_that_can_be_seen(run: R
         )
 
 
+FAULTY = (
+    # Passing faults of the way are the client's business: the agent never hears of them.
+    ("rate_limit", 1, None),
+    ("server_error", 1, None),
+    ("disconnect", 1, None),
+    # Lasting ones are lost answers, after as many retries as allowed.
+    ("rate_limit", 3, "lost_answers"),
+    ("server_error", 3, "lost_answers"),
+    ("disconnect", 3, "lost_answers"),
+    ("hang", 3, "lost_answers"),
+    ("malformed", 1, "invalid_answers"),
+    ("broken_json", 1, "invalid_answers"),
+    ("truncated", 1, "invalid_answers"),
+    ("empty", 1, "invalid_answers"),
+    ("off_topic", 1, "invalid_answers"),
+    ("refusal", 1, "refusals"),
+    ("filtered", 1, "refusals"),
+)
+QUICK = {("server_error", 1), ("server_error", 3), ("malformed", 1), ("refusal", 1)}
+"""One of each outcome."""
+
+
 @pytest.mark.parametrize(
     ("fault", "num_times", "counter"),
-    [
-        # Passing faults of the way are the client's business: the agent never hears of them.
-        ("rate_limit", 1, None),
-        ("server_error", 1, None),
-        ("disconnect", 1, None),
-        # Lasting ones are lost answers, after as many retries as allowed.
-        ("rate_limit", 3, "lost_answers"),
-        ("server_error", 3, "lost_answers"),
-        ("disconnect", 3, "lost_answers"),
-        ("hang", 3, "lost_answers"),
-        ("malformed", 1, "invalid_answers"),
-        ("broken_json", 1, "invalid_answers"),
-        ("truncated", 1, "invalid_answers"),
-        ("empty", 1, "invalid_answers"),
-        ("off_topic", 1, "invalid_answers"),
-        ("refusal", 1, "refusals"),
-        ("filtered", 1, "refusals"),
-    ],
+    [pytest.param(*case, marks=() if case[:2] in QUICK else pytest.mark.slow) for case in FAULTY],
 )
 def test_faults_are_survived_counted_and_replayed(run: Run, fault: str, num_times: int, counter: str | None) -> None:
     run.max_rounds = 1
-    reply = {**FAULTS[fault], "hang_s": 1.5} if fault == "hang" else dict(FAULTS[fault])
+    reply = {**FAULTS[fault], "hang_s": 6.0} if fault == "hang" else dict(FAULTS[fault])
     if fault == "server_error":
         reply["headers"] = {"Retry-After-Ms": "5"}
     with serving(answers) as stub:
         stub.script = [reply] * num_times
-        first = run("first", stub.url, agents=["fu"], server={"timeout_s": 0.5} if fault == "hang" else None)
+        first = run("first", stub.url, agents=["fu"], server={"timeout_s": 3.0} if fault == "hang" else None)
     counted = counters(first[0])
     faults = {name: counted[name] for name in ("invalid_answers", "lost_answers", "refusals") if counted[name]}
     assert faults == ({} if counter is None else {counter: 1})

@@ -82,6 +82,7 @@ def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_threads() -> None:
         assert one.masks.tobytes() == other.masks.tobytes()
 
 
+@pytest.mark.slow
 @needs_weights
 def test_an_episode_with_it(tmp_path: Path) -> None:
     backend = Backend(perception=PerceptionSettings(make="predicted:coco,min_confidence=0.05,side_px=96").component())

@@ -39,7 +39,7 @@ def view_of(frame: mini_frames.LabelledFrame) -> DetectorView:
     return DetectorView(frame.rgb, frame.depth_m, frame.horizon_rad)
 
 
-@pytest.mark.parametrize("tilted", [0.0, 1.0])
+@pytest.mark.parametrize("tilted", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_it_finds_most_large_objects_and_is_mostly_right(tilted: float) -> None:
     """However far down the camera looks: houses of the test split alone have it at 30 degrees."""
     frames = views(tilted)

@@ -191,6 +191,7 @@ def test_rows_add_up(folder):
                 assert d < 0 or detections.label[d] == truths.category[t]
 
 
+@pytest.mark.slow
 def test_workers_change_nothing_and_what_is_there_is_not_done_again(folder, tasks, tmp_path):
     measure(SPECS[1:3], tasks[:2], tmp_path, config=CONFIG, num_workers=2)
     again = []
