@@ -1,5 +1,6 @@
 """The pictures in prompts are those that the words speak of: on rendered views of a real house, compared by pixels."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -44,8 +45,8 @@ class Recorder:
         return action
 
 
-@pytest.fixture(scope="module", params=["facing", "all"])
-def recorded(request):
+@cache
+def recorded(verify_views="facing"):
     backend = Backend()
     case = backend.tasks.create(task_file(BUNDLED_TASKS / TASK).path)
 
@@ -55,11 +56,11 @@ def recorded(request):
         return "Object 0" if question.objects and len(question.surroundings) > 8 else "Frontier 0"
 
     model = Scripted(answer, needs_images=True)
-    recorder = Recorder(FailThenUpdate(FailThenUpdateConfig(verify_views=request.param), model), model)
+    recorder = Recorder(FailThenUpdate(FailThenUpdateConfig(verify_views=verify_views), model), model)
     protocol = ProtocolConfig(max_rounds=14)
     episode = Episode(case, "ftu", recorder, backend.simulator.create(), backend.perception.create(), protocol, 0)
     assert next(iter(episode.run())).record.is_scored
-    return request.param, recorder
+    return recorder
 
 
 def difference(a, b):
@@ -81,16 +82,16 @@ def of(recorder, kind):
     return found
 
 
-def test_the_heading_view_is_the_last_one_seen(recorded):
-    _, recorder = recorded
+def test_the_heading_view_is_the_last_one_seen():
+    recorder = recorded()
     for question, num_views, _, _ in of(recorder, ChooseQuestion):
         shares = [difference(question.heading_view.pixels, view.rgb) for view in recorder.views[:num_views]]
         assert shares[-1] < SAME
 
 
 @pytest.mark.slow
-def test_a_crop_shows_the_object_and_a_view_is_where_it_was_last_seen(recorded):
-    _, recorder = recorded
+def test_a_crop_shows_the_object_and_a_view_is_where_it_was_last_seen():
+    recorder = recorded()
     num = 0
     for question, num_views, _, entries in of(recorder, ChooseQuestion):
         for candidate in question.objects:
@@ -105,8 +106,8 @@ def test_a_crop_shows_the_object_and_a_view_is_where_it_was_last_seen(recorded):
     assert num > 20
 
 
-def test_a_frontier_is_shown_by_a_view_towards_it(recorded):
-    _, recorder = recorded
+def test_a_frontier_is_shown_by_a_view_towards_it():
+    recorder = recorded()
     for question, num_views, _, _ in of(recorder, ChooseQuestion):
         for frontier in question.frontiers:
             shown = [view for view in recorder.views[:num_views] if difference(frontier.image.pixels, view.rgb) < SAME]
@@ -119,8 +120,9 @@ def test_a_frontier_is_shown_by_a_view_towards_it(recorded):
             assert min(off_axis) < np.pi / 4 + 0.2  # within the view, or hardly outside
 
 
-def test_verification_shows_the_stored_crop_and_the_views_of_the_arrival(recorded):
-    views, recorder = recorded
+@pytest.mark.parametrize("views", ["facing", "all"])
+def test_verification_shows_the_stored_crop_and_the_views_of_the_arrival(views):
+    recorder = recorded(views)
     for question, num_views, num_now, _ in of(recorder, VerifyQuestion):
         now = recorder.views[num_views - num_now : num_views]
         expected = now if views == "all" else now[-1:]
@@ -132,8 +134,8 @@ def test_verification_shows_the_stored_crop_and_the_views_of_the_arrival(recorde
         assert min(difference(question.entry.crop.pixels, crop) for crop in crops) < SAME
 
 
-def test_prompts_put_each_picture_under_its_title(recorded):
-    _, recorder = recorded
+def test_prompts_put_each_picture_under_its_title():
+    recorder = recorded()
     question = of(recorder, ChooseQuestion)[-1][0]
     parts = question.prompt().turns[0].parts
     titled = {}

@@ -71,19 +71,32 @@ def tasks(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def run_dir(tasks, tmp_path_factory):
-    """All of them in one run, so that they share workers, which have more agents than they keep processes."""
-    config = replace(SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
+    """All that keep their processes in one run, so that they share workers, which keep fewer processes."""
     folder = tmp_path_factory.mktemp("run")
-    others = [f"unruly_agents:{name}" for name in ("Unmakeable", "Hungry", "Farthest")]
-    evaluate([*CONTAINED, *LOST, *UNHARMED, *others], tasks, folder, config=config, num_workers=2)
+    agents = [*CONTAINED, *UNHARMED, "unruly_agents:Unmakeable", "unruly_agents:Farthest"]
+    evaluate(agents, tasks, folder, config=SHORT, num_workers=2)
     return folder
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("agent", [*CONTAINED, *LOST, "unruly_agents:Hungry"])
-def test_a_failure_costs_its_stage_alone(run_dir, agent):
+@pytest.fixture(scope="module")
+def lost_dir(tasks, tmp_path_factory):
+    """All others in another run."""
+    config = replace(SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
+    folder = tmp_path_factory.mktemp("lost")
+    evaluate([*LOST, "unruly_agents:Hungry"], tasks, folder, config=config, num_workers=2)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("agent", "folder"),
+    [
+        *((agent, "run_dir") for agent in CONTAINED),
+        *(pytest.param(agent, "lost_dir", marks=pytest.mark.slow) for agent in (*LOST, "unruly_agents:Hungry")),
+    ],
+)
+def test_a_failure_costs_its_stage_alone(request, agent, folder):
     kind, message = (CONTAINED | LOST).get(agent, (ErrorKind.AGENT, "MemoryError"))
-    first, second, third = records(run_dir, agent)
+    first, second, third = records(request.getfixturevalue(folder), agent)
     assert (first.is_scored, second.state, third.is_scored) == (True, EndState.ERRORED, True)
     assert second.error.kind is kind
     assert message in second.error.message
@@ -93,6 +106,12 @@ def test_a_failure_costs_its_stage_alone(run_dir, agent):
     assert [record.memory_lost_at for record in (first, second, third)] == [None, None, lost_at]
     if kind is not ErrorKind.AGENT:
         assert third.requested_start == second.effective_start  # it had not moved yet
+
+
+@pytest.mark.slow
+def test_what_a_process_says_at_its_end_is_in_the_log(lost_dir):
+    lines = (lost_dir / LOG_NAME).read_text().splitlines()
+    assert any("Segmentation fault" in line for line in lines if line.startswith("unruly_agents:Segfaulting"))
 
 
 @pytest.mark.parametrize("agent", UNHARMED)
@@ -119,7 +138,6 @@ def test_what_agents_print_is_in_the_log(run_dir):
     about = f"unruly_agents:Printing {records(run_dir, 'unruly_agents:Printing')[0].task_id} stage 2 | "
     assert f"{about}a word on standard output" in lines
     assert f"{about}and one on standard error" in lines
-    assert any("Segmentation fault" in line for line in lines if line.startswith("unruly_agents:Segfaulting"))
 
 
 def test_records_are_the_same_in_either_process(run_dir, tasks, tmp_path):
@@ -314,7 +332,7 @@ def test_processes_are_reused_and_agents_are_not():
     processes.take_back(process)
     assert second.sensors == first.sensors
     assert processes.lend("toy_agents:Explorer") is not process  # which `second` has
-    with pytest.raises(AgentFailedError, match="begin_task comes first"):
+    with pytest.raises(AgentFailedError, match="'Explorer' object has no attribute"):
         acted(second, nothing)
     processes.close()
     processes.close()

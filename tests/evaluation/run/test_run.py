@@ -188,13 +188,13 @@ def test_a_file_that_is_no_run_is_refused(tmp_path):
 
 def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, monkeypatch):
     run = tmp_path / "run"
-    evaluate(["random-walk"], tasks, run, config=CONFIG)
+    evaluate(["random-walk"], tasks, run, config=CONFIG, num_workers=0)
     read_states = RunStore.states
 
     def states(store):
         found = read_states(store)
         monkeypatch.undo()
-        evaluate(["toy_agents:Idle"], tasks, run, config=CONFIG)
+        evaluate(["toy_agents:Idle"], tasks, run, config=CONFIG, num_workers=0)
         return found
 
     monkeypatch.setattr(RunStore, "states", states)
