@@ -110,7 +110,7 @@ class WorkerProcess:
             else:
                 with _without_main():
                     context = multiprocessing.get_context("spawn")
-                    self._process = context.Process(target=_spawned, args=(far_end, program.work), daemon=True)
+                    self._process = context.Process(target=_serve, args=(far_end, program.work), daemon=True)
                     self._process.start()
 
     def _started(self, program: Program, connection: int) -> "subprocess.Popen[bytes]":
@@ -234,10 +234,6 @@ def main(connection: str, life: str, work: str, prelude: str) -> None:
         os.environ.clear()
         os.environ.update(environment)
         _serve(parent, work, int(life))
-
-
-def _spawned(connection: Connection, work: str) -> None:
-    _serve(connection, work)
 
 
 def _serve(connection: Connection, work: str, life: int | None = None) -> None:

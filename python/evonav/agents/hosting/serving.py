@@ -88,16 +88,11 @@ def _end_with_parent(life_fd: int) -> None:
     def watch() -> None:
         with suppress(OSError):
             os.read(life_fd, 1)
-        _end_group()
+        if os.getpgrp() == os.getpid():  # its children, too
+            os.killpg(os.getpid(), signal.SIGKILL)
+        os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def _end_group() -> None:
-    """End this process and its children."""
-    if os.getpgrp() == os.getpid():
-        os.killpg(os.getpid(), signal.SIGKILL)
-    os._exit(1)
 
 
 def _serve(requests: BinaryIO, connection: socket.socket, memory: SharedSlots, answering: Answering) -> None:

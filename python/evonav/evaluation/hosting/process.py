@@ -27,7 +27,6 @@ from pathlib import Path
 from evonav.agents.hosting import forking, wire
 from evonav.agents.hosting.error_text import clean
 from evonav.agents.hosting.requests import write_request
-from evonav.agents.hosting.sandbox import Policy
 from evonav.agents.hosting.serving import LENGTH, peak_memory_mb
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
@@ -157,7 +156,9 @@ class AgentProcess:
         try:
             if self._scratch is not None:
                 name = with_absolute_file(name)
-                self._shut_in(policy_of(name, self._scratch, setup.hidden, hosting.memory_mb))
+                policy = policy_of(name, self._scratch, setup.hidden, hosting.memory_mb)
+                with suppress(OSError):  # a process that has ended already: the next request says so
+                    self._write(json.dumps(asdict(policy)).encode())
             self.ask("load", name, hosting.memory_mb, timeout_s=max(hosting.timeout_s, LOAD_TIMEOUT_S))
         except BaseException:
             self.close(is_at_once=True)
@@ -194,11 +195,6 @@ class AgentProcess:
             stderr=stderr,
             start_new_session=True,
         )
-
-    def _shut_in(self, policy: Policy) -> None:
-        data = json.dumps(asdict(policy)).encode()
-        with suppress(OSError):  # a process that has ended already: the next request says so
-            self._connection.sendall(LENGTH.pack(len(data)) + data)
 
     @property
     def is_usable(self) -> bool:
@@ -240,8 +236,13 @@ class AgentProcess:
         timeout_s = timeout_s or self._hosting.timeout_s
         self._request = (operation, timeout_s, time.monotonic() + timeout_s)
         self._is_waiting = True
+        self._num_asked += 1
         try:
-            self._send(operation, arguments, self._request[2])
+            request = write_request(self._num_asked, operation, arguments, self._block.write)
+            self._connection.settimeout(max(1e-3, self._request[2] - time.monotonic()))
+            if self._num_asked > 1 and not self._setup.is_one_of_many:  # it waits, it does not start
+                self._one_core.stay(self._process.pid)
+            self._write(request)
         except OSError as error:
             raise self._lost(error) from None
 
@@ -269,13 +270,8 @@ class AgentProcess:
         self.close(is_at_once=True)
         return AgentFailedError(ErrorKind.CRASH, died or f"malformed response: {clean(str(error))}")
 
-    def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
-        self._num_asked += 1
-        request = write_request(self._num_asked, operation, arguments, self._block.write)
-        self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
-        if self._num_asked > 1 and not self._setup.is_one_of_many:  # it waits, it does not start
-            self._one_core.stay(self._process.pid)
-        self._connection.sendall(LENGTH.pack(len(request)) + request)
+    def _write(self, message: bytes) -> None:
+        self._connection.sendall(LENGTH.pack(len(message)) + message)
 
     def _message(self, deadline_s: float) -> bytes:
         """Read one message, with nothing after it."""
