@@ -27,6 +27,8 @@ CHEAP = RunConfig(
     hosting=AgentHosting(usual_isolation()),
 )
 """Of tasks by the dozen, seen in few pixels."""
+HERE_ALONE = {"config": replace(CHEAP, hosting=AgentHosting()), "num_workers": 0}
+"""How these are evaluated in this process."""
 NEEDS_SANDBOX = pytest.mark.skipif(sandbox_problem() is not None, reason=f"no sandbox here: {sandbox_problem()}")
 
 

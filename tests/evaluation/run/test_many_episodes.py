@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from chaos import num_recorded
 from processes import children, is_running
-from toy_run import CHEAP, many_tasks, started_driver, texts
+from toy_run import CHEAP, HERE_ALONE, many_tasks, started_driver, texts
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
@@ -146,7 +146,7 @@ def test_a_run_that_is_ended_leaves_no_process_and_is_resumed(tmp_path, kill):
     waited_for(lambda: not any(map(is_running, everything)), 10.0)
     assert num_recorded(tmp_path / "run") < 24
     evaluate([WAITING], tasks, tmp_path / "run", config=CHEAP, episodes_at_once=6)
-    evaluate([WAITING], tasks, tmp_path / "whole", config=replace(CHEAP, hosting=AgentHosting()), num_workers=0)
+    evaluate([WAITING], tasks, tmp_path / "whole", **HERE_ALONE)
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
 
 

@@ -13,7 +13,7 @@ from chaos import disturb, num_recorded, texts
 from power_loss import Disk, read_log
 from processes import children
 from toy_house import write_tasks
-from toy_run import CHEAP, CONFIG, driver_command, driver_environment, many_tasks
+from toy_run import CHEAP, CONFIG, HERE_ALONE, driver_command, driver_environment, many_tasks
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -135,7 +135,6 @@ def texts_of_stages(run):
         return list(store.record_texts())
 
 
-HERE_ALONE = {"config": CHEAP, "num_workers": 0}
 MANY_AT_ONCE = {"config": CHEAP, "num_workers": 2, "episodes_at_once": 4}
 RESILIENT = {"agents": ["random-walk"], "num_workers": 2, "num_retries": 5}
 
@@ -146,7 +145,7 @@ def test_a_wall_clock_that_jumps_changes_nothing(tmp_path, at_once):
     """By up to a day, forwards or backwards, whenever a driver, worker or agent reads it."""
     library = compiled("clock.c", tmp_path)
     tasks = many_tasks(tmp_path / "tasks", 8)
-    evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
+    evaluate(["random-walk"], tasks, tmp_path / "whole", **HERE_ALONE)
     environment = driver_environment(LD_PRELOAD=str(library))
     look = [sys.executable, "-c", "import time; print(max(abs(time.time() - time.time()) for _ in range(20)))"]
     assert float(subprocess.run(look, env=environment, check=True, capture_output=True).stdout) > 3600.0
@@ -221,7 +220,7 @@ def test_a_full_disk_is_one_clear_error(small_disk, tmp_path, workers):
     assert 0 < len(kept) < 90
     remount("size=20m")
     evaluate(["random-walk"], tasks, small / "run", **workers)
-    evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
+    evaluate(["random-walk"], tasks, tmp_path / "whole", **HERE_ALONE)
     assert texts(small / "run") == texts(tmp_path / "whole")
 
 
