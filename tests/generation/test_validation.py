@@ -9,6 +9,7 @@ from typing import get_args
 
 import pytest
 from damaged_task import kinds, signed
+from generated_folder import record_of
 from PIL import Image, PngImagePlugin
 from typer.testing import CliRunner
 
@@ -16,7 +17,7 @@ from evonav.cli import app
 from evonav.errors import TaskError
 from evonav.generation.validation import KINDS, ProblemKind, validate_files, validate_folder, validate_task
 from evonav.tasks import load_task, write_task
-from evonav.tasks.dataset import DatasetRecord, entry_of, write_dataset
+from evonav.tasks.dataset import entry_of, write_dataset
 from evonav.tasks.listing import BUNDLED_TASKS
 from evonav.tasks.records import read_gzip, write_gzip
 
@@ -40,24 +41,8 @@ def folder(root: Path) -> Path:
     task = load_task(root)
     other = dataclasses.replace(task, header=task.header.model_copy(update={"task_id": "another"}))
     write_task(other, root.parent)
-    write_dataset(
-        DatasetRecord(
-            name="evonav",
-            split="none",
-            generator=task.header.generator,
-            sources=(),
-            seed=4,
-            limit=None,
-            subset=None,
-            allow_unknown_assets=False,
-            parameters=task.header.parameters,
-            num_houses=2,
-            num_tasks=2,
-            tasks=(entry_of(other), entry_of(task)),
-            rejections=(),
-        ),
-        root.parent,
-    )
+    record = record_of((entry_of(other), entry_of(task)), parameters=task.header.parameters)
+    write_dataset(record, root.parent)
     return root.parent
 
 

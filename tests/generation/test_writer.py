@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from generated_folder import record_of
 
 from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.caching_client import ResponseCache
@@ -20,7 +21,7 @@ from evonav.errors import TaskError
 from evonav.generation.instructions import writer
 from evonav.generation.instructions.writer import estimate_texts, write_texts
 from evonav.tasks import Task, load_tasks, write_task
-from evonav.tasks.dataset import DatasetRecord, check_dataset, entry_of, read_dataset, write_dataset
+from evonav.tasks.dataset import check_dataset, entry_of, read_dataset, write_dataset
 from vlm_stub import KEY, Stub, images_in, serving
 
 
@@ -59,21 +60,7 @@ def folder(tmp_path: Path) -> Path:
         tasks = list(load_tasks(directory, 3))
     for task in tasks:
         write_task(task, tmp_path / "tasks")
-    record = DatasetRecord(
-        name="evonav",
-        split="test",
-        generator="evonav",
-        sources=(),
-        seed=0,
-        limit=None,
-        subset=None,
-        allow_unknown_assets=False,
-        parameters=tasks[0].header.parameters,
-        num_houses=3,
-        num_tasks=3,
-        tasks=tuple(entry_of(task) for task in tasks),
-        rejections=(),
-    )
+    record = record_of(tuple(map(entry_of, tasks)), parameters=tasks[0].header.parameters)
     write_dataset(record, tmp_path / "tasks")
     return tmp_path / "tasks"
 

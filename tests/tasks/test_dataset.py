@@ -6,45 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from generated_folder import record_of
 
 from evonav.errors import TaskError
 from evonav.tasks import Task, write_task
 from evonav.tasks.dataset import (
-    DatasetRecord,
-    HouseRejection,
-    SourceFile,
     TaskEntry,
     check_dataset,
     entry_of,
     read_dataset,
     write_dataset,
 )
-from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.subsets import SubsetError, subset_of
 
 
 def sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def record_of(entries: tuple[TaskEntry, ...], **changes: Any) -> DatasetRecord:
-    rejection = HouseRejection(house="a.jsonl:2", reason="too_few_rooms", stage=0, detail="1 room(s)")
-    fields: dict[str, Any] = {
-        "name": "evonav",
-        "split": "test",
-        "generator": "evonav 0",
-        "sources": (SourceFile(name="a.jsonl", sha256=sha256("a")),),
-        "seed": 0,
-        "limit": None,
-        "subset": None,
-        "allow_unknown_assets": False,
-        "parameters": GenerationParameters(),
-        "num_houses": len(entries) + 1,
-        "num_tasks": len(entries),
-        "tasks": entries,
-        "rejections": (rejection,),
-    }
-    return DatasetRecord(**{**fields, **changes})
 
 
 def entries_of(num: int) -> tuple[TaskEntry, ...]:
