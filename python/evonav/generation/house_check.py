@@ -92,7 +92,11 @@ def check_house(name: str, text: str, *, allow_unknown_assets: bool = False) -> 
         house = House(text, name=name)
     except HouseError as error:
         return HouseCheck(name, None, (Finding("wrong", "house", "", str(error).removeprefix(f"house {name}: ")),))
-    findings = [*_assets(house, allow_unknown_assets), *_start(house), *_rooms(house)]
+    findings = list(_assets(house, allow_unknown_assets))
+    if house.start is None:
+        message = "is missing, so the house gives no task; `--start auto` chooses a free place"
+        findings.append(Finding("wrong", "house", "metadata.agent", message))
+    findings += _rooms(house)
     num_places = 0
     if all(finding.field != "assetId" or finding.severity == "note" for finding in findings):
         simulator = EmbeddedSimulator(allow_unknown_assets=allow_unknown_assets)
@@ -124,12 +128,6 @@ def _assets(house: House, allow_unknown_assets: bool) -> Iterator[Finding]:
                 "or let its category guess one (--allow-unknown-assets)"
             )
             yield Finding("wrong", items[0].id, "assetId", message)
-
-
-def _start(house: House) -> Iterator[Finding]:
-    if house.start is None:
-        message = "is missing, so the house gives no task; `--start auto` chooses a free place"
-        yield Finding("wrong", "house", "metadata.agent", message)
 
 
 def _rooms(house: House) -> Iterator[Finding]:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from evonav.errors import EvonavError
 from evonav.thor import objects
 from evonav.thor.actions.registry import ActionError
-from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
 from evonav.thor.geometry import vector
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import Surfaces, fresh_surfaces
@@ -79,11 +78,6 @@ def detach(lists: Mapping[str, list[Entry]], object_id: str) -> Entry:
     """Remove an entry, with the objects on it, from its list."""
     entries = lists[object_id]
     return entries.pop(next(index for index, entry in enumerate(entries) if entry["id"] == object_id))
-
-
-def metadata_of_entry(entry: Mapping[str, Any], object_type: str) -> AssetMetadata:
-    """Return the metadata of an entry's asset."""
-    return metadata_of_asset(str(entry.get("assetId", "")), object_type)
 
 
 def set_pose(entry: Entry, centre_m: Sequence[float], rotation: Mapping[str, float]) -> None:

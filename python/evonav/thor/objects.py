@@ -119,7 +119,7 @@ def record_of(scene: Scene, object_id: str) -> Record:
 def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
     """Return the edges of a house object's box along its own axes."""
     record = record_of(scene, entry["id"])
-    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), record["objectType"])
+    asset = metadata_of_entry(entry, record["objectType"])
     return np.array(asset.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
 
 
@@ -168,7 +168,7 @@ def _relate(house: Mapping[str, Any], records: list[Record]) -> None:
 
 
 def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
-    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), body.category)
+    asset = metadata_of_entry(entry, body.category)
     rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
     centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
     record = _record(entry, body, asset, centre_m, rotation)
@@ -180,7 +180,7 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
 
 def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[str, Any]) -> Record:
     """Make a door's or window's record: AI2-THOR puts the closed one's centre at `assetPosition` along `wall0`."""
-    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), body.category)
+    asset = metadata_of_entry(entry, body.category)
     wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
     centre_m, yaw_deg = body.centre_m, 0.0
     if wall is not None:
@@ -248,6 +248,11 @@ def _record(
         "axisAlignedBoundingBox": aligned_box(body.centre_m, body.size_m),
         "objectOrientedBoundingBox": None,
     }
+
+
+def metadata_of_entry(entry: Mapping[str, Any], object_type: str) -> AssetMetadata:
+    """Return the metadata of an entry's asset."""
+    return metadata_of_asset(str(_value_of(entry, "assetId", "")), object_type)
 
 
 def _value_of(entry: Mapping[str, Any], key: str, otherwise: object) -> Any:  # noqa: ANN401

@@ -129,7 +129,7 @@ def _move_by(
     if not engine.scene.simulator.can_move(before_m, to_m):
         raise ActionError(_why_blocked(engine, to_m, (x_m, 0.0, z_m)))
     agent.x_m, agent.z_m = snapped(engine, to_m)
-    if object_id and max_distance_m > 0 and _distance_m(engine, object_id) > max_distance_m:
+    if object_id and max_distance_m > 0 and distance_to_object(engine, objectId=object_id) > max_distance_m:
         agent.x_m, agent.z_m = before_m
         raise ActionError(f"Agent movement would bring it beyond the max distance of {object_id}")
 
@@ -160,14 +160,9 @@ def is_within_bounds(engine: Engine, point_m: Point) -> bool:
 @action("DistanceToObject")
 def distance_to_object(engine: Engine, *, objectId: str) -> float:
     """Return the ground-plane distance from the agent to the object's box."""
-    return _distance_m(engine, objectId)
-
-
-def _distance_m(engine: Engine, object_id: str) -> float:
-    """Return the ground-plane distance from the agent to an object's box."""
-    body = next((body for body in engine.scene.simulator.objects if body.id == object_id), None)
+    body = next((body for body in engine.scene.simulator.objects if body.id == objectId), None)
     if body is None:
-        raise ActionError(f"No object with ID {object_id}")
+        raise ActionError(f"No object with ID {objectId}")
     return ground_gap_m(engine.agent.point_m, body.centre_m, body.size_m)
 
 

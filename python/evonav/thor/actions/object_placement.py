@@ -189,7 +189,7 @@ def change_physics(engine: Engine) -> None:
 
 def _put_pivot(entry: dict[str, Any], object_type: str, position: Vector3, rotation: Vector3) -> None:
     turn = rotation.model_dump()
-    offset_m = objects.rotation_of(turn) @ edits.metadata_of_entry(entry, object_type).pivot_m
+    offset_m = objects.rotation_of(turn) @ objects.metadata_of_entry(entry, object_type).pivot_m
     edits.set_pose(entry, np.subtract((position.x, position.y, position.z), offset_m).tolist(), turn)
 
 
@@ -213,7 +213,7 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     surfaces = fresh_surfaces(scene)
     surfaces = surfaces.without(_bodies_of(scene, entry))
     under_m = surfaces.height_under_m(np.array([[point.x, point.z]]), point.y)
-    pivot_m = axes @ edits.metadata_of_entry(entry, objects.record_of(scene, object_id)["objectType"]).pivot_m
+    pivot_m = axes @ objects.metadata_of_entry(entry, objects.record_of(scene, object_id)["objectType"]).pivot_m
     centre_m = np.array([point.x - pivot_m[0], under_m + _CLEARANCE_M + reach_m[1], point.z - pivot_m[2]])
     struck = surfaces.bodies_in_box(centre_m, 0.5 * size_m, axes)
     if struck:
