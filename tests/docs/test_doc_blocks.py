@@ -258,7 +258,7 @@ def test_cells_of_the_notebook_run_and_show_something(tmp_path: Path, monkeypatc
 
 
 def test_no_script_of_a_page_guards_against_being_imported_by_workers() -> None:
-    """Workers do not import the script: tests/evaluation/test_nothing_lost.py runs one without a guard."""
+    """Workers do not import the script: tests/evaluation/run/test_nothing_lost.py runs one without a guard."""
     guarded = [str(page) for page in pages() for text in python_texts(page) if "__main__" in text]
     assert guarded == []
 
