@@ -10,6 +10,7 @@ from evonav.decision.question import DecisionModel, Metered, Reply
 from evonav.decision.vlm.account import Account, Price, Usage
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.agent import RemoteAgent
+from evonav.evaluation.hosting.isolation import AgentHosting
 from evonav.evaluation.hosting.process import AgentFailedError
 from evonav.evaluation.metrics.stage_rows import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
@@ -77,7 +78,7 @@ class Silent:
 
     cpu_s = 0.0
     relay = None
-
+    hosting = AgentHosting("process")
     waiting = staticmethod(nullcontext)
 
     def lend(self, name):

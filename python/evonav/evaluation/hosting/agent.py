@@ -233,7 +233,7 @@ class RemoteAgent(HostedAgent):
         if self._process is None:
             self._sense(self._make())
         self._use(operation, lambda process: process.send(operation, *arguments))
-        return lambda: self._use(operation, AgentProcess.answer)
+        return lambda: self._use(operation, lambda process: process.answer())
 
     def _use(self, operation: str, call: Callable[[AgentProcess], T]) -> T:
         """Call something of the process while other episodes compute, and add up its CPU time."""
