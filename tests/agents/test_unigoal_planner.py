@@ -21,6 +21,11 @@ def look(simulator):
     return a_view(frame.depth_m, pose=frame.pose, intrinsics=frame.intrinsics)
 
 
+def on_a_blank_map(seed=0):
+    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
+    return bev, UniGoalPlanner(bev, seed)
+
+
 class Walk:
     """Simulator, map and planner, a step at a time."""
 
@@ -109,7 +114,7 @@ def test_a_goal_close_by_behind_something_is_as_near_as_it_gets():
 @pytest.mark.parametrize(("bearing_deg", "action"), [(0, "MOVE_FORWARD"), (5, "MOVE_FORWARD"), (40, "TURN_RIGHT")])
 def test_it_turns_towards_what_is_more_than_15_degrees_off(bearing_deg, action):
     for sign, expected in ((1, action), (-1, action.replace("RIGHT", "LEFT"))):
-        planner = UniGoalPlanner(BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0)), 0)
+        _, planner = on_a_blank_map()
         pose = Pose(0.0, 0.9, 0.0, math.radians(100.0))
         yaw_rad = pose.yaw_rad + sign * math.radians(bearing_deg)
         planner.observe(pose)
@@ -125,8 +130,7 @@ def bump(planner, pose, times):
 
 
 def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 0)
+    bev, planner = on_a_blank_map()
     pose = Pose(0.025, 0.9, 0.025, 0.0)  # the middle of a cell
     widths = []
     for _ in range(3):
@@ -149,8 +153,7 @@ def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
 
 
 def test_a_move_that_gets_on_is_no_collision():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 0)
+    bev, planner = on_a_blank_map()
     for z_m in (0.0, 0.25, 0.5):
         planner.observe(Pose(0.0, 0.9, z_m, 0.0), action=Action.MOVE_FORWARD)
     assert not bev.core.collisions.any()
@@ -161,8 +164,7 @@ def test_a_move_that_gets_on_is_no_collision():
 
 
 def test_moves_that_were_not_its_own_tell_nothing_of_obstacles():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 0)
+    bev, planner = on_a_blank_map()
     for _ in range(4):
         planner.observe(START, action=None)
     assert not bev.core.collisions.any()
@@ -170,8 +172,7 @@ def test_moves_that_were_not_its_own_tell_nothing_of_obstacles():
 
 
 def test_a_stuck_agent_heads_for_where_it_has_been_until_it_moves():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 3)
+    bev, planner = on_a_blank_map(seed=3)
     bev.core.visit((0.0, 0.0), (0.0, -2.0))
     pose = Pose(0.0, 0.9, 0.0, 0.0)
     bump(planner, pose, 3)
@@ -245,8 +246,7 @@ class AsNearAsItGets:
 
 
 def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has_been():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 0)
+    bev, planner = on_a_blank_map()
     bev.core.visit((0.0, 0.0), (1.5, 0.0))
     # Bumps all around the goal, wider than its growth.
     for yaw in np.arange(0.0, 2 * math.pi, 0.02):
@@ -276,8 +276,7 @@ def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has
 
 
 def test_what_is_blacklisted_is_no_goal_until_the_next_stage():
-    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
-    planner = UniGoalPlanner(bev, 0)
+    bev, planner = on_a_blank_map()
     cells = np.array([[120, 120], [120, 123], [120, 124]], np.int32)
     planner.blacklist(cells[:1])
     assert planner.allowed(cells).tolist() == [[120, 124]]

@@ -17,59 +17,35 @@ RULE_MARK = "@"
 """Sign between a built-in agent's name and the rule by which it forgets object entries."""
 
 BUILT_IN: dict[str, tuple[str, str]] = {
-    "fu": (
-        "evonav.agents.frontier_update.agent:FrontierUpdate",
-        "Frontier-Update: rebuilds its map when it is contradicted",
-    ),
-    "stage-reset": (
-        "evonav.agents.frontier_update.agent:StageReset",
-        "Frontier-Update that forgets everything at each stage",
-    ),
-    "ftu": (
-        "evonav.agents.frontier_update.fail_then_update:FailThenUpdate",
-        "Frontier-Update that checks its target on arrival",
-    ),
-    "pro": (
-        "evonav.agents.proactive.agent:Proactive",
-        "Belief-Weighted Search: goes where most of its posterior is found a metre",
-    ),
-    "evolving": (
-        "evonav.agents.rivals.evolving:Evolving",
-        "rival: EvolvingNav's belief over sites, with soft negative evidence",
-    ),
+    "fu": ("frontier_update.agent:FrontierUpdate", "Frontier-Update: rebuilds its map when it is contradicted"),
+    "stage-reset": ("frontier_update.agent:StageReset", "Frontier-Update that forgets everything at each stage"),
+    "ftu": ("frontier_update.fail_then_update:FailThenUpdate", "Frontier-Update that checks its target on arrival"),
+    "pro": ("proactive.agent:Proactive", "Belief-Weighted Search: goes where most of its posterior is found a metre"),
+    "evolving": ("rivals.evolving:Evolving", "rival: EvolvingNav's belief over sites, with soft negative evidence"),
     "dynamem": (
-        "evonav.agents.rivals.dynamem:DynaMem",
+        "rivals.dynamem:DynaMem",
         "rival: DynaMem deletes points that depth sees through, and looks again at what it saw long ago",
     ),
     "dualmap": (
-        "evonav.agents.rivals.dualmap:DualMap",
+        "rivals.dualmap:DualMap",
         "rival: DualMap remembers furniture, and what lay on it, and looks there again",
     ),
     "khronos-fu": (
-        "evonav.agents.rivals.khronos:KhronosFrontierUpdate",
+        "rivals.khronos:KhronosFrontierUpdate",
         "rival: Frontier-Update with Khronos' votes of rays before and after each object",
     ),
-    "vlfm": (
-        "evonav.agents.rivals.vlfm:Vlfm",
-        "rival: VLFM explores frontiers by a value map that each goal begins again",
-    ),
+    "vlfm": ("rivals.vlfm:Vlfm", "rival: VLFM explores frontiers by a value map that each goal begins again"),
     "onemap": (
-        "evonav.agents.rivals.onemap:OneMap",
+        "rivals.onemap:OneMap",
         "rival: OneMap keeps one map over goals, and checks likely places again for each",
     ),
-    "3d-mem": (
-        "evonav.agents.three_d_mem.agent:ThreeDMem",
-        "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
-    ),
-    "msgnav": ("evonav.agents.msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
-    "unigoal": (
-        "evonav.agents.unigoal.agent:UniGoal",
-        "UniGoal as released: single actions, detector, nearest frontiers",
-    ),
-    "stay-still": ("evonav.agents.baselines:StayStill", "baseline: stops at once; its successes are free"),
-    "random-walk": ("evonav.agents.baselines:RandomWalk", "baseline: walks in random directions"),
+    "3d-mem": ("three_d_mem.agent:ThreeDMem", "3D-Mem: chooses among snapshots and frontiers, forgets nothing"),
+    "msgnav": ("msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
+    "unigoal": ("unigoal.agent:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
+    "stay-still": ("baselines:StayStill", "baseline: stops at once; its successes are free"),
+    "random-walk": ("baselines:RandomWalk", "baseline: walks in random directions"),
 }
-"""Import path and description of each built-in agent, by name."""
+"""Import path in `evonav.agents` and description of each built-in agent, by name."""
 
 _REGISTERED: dict[str, Callable[..., Agent]] = {}
 """Agents of this process that other processes cannot import, by name."""
@@ -109,7 +85,7 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     if at and base in BUILT_IN:
         return _forgetful(base, rule)
     if name in BUILT_IN:
-        return import_callable(BUILT_IN[name][0], "agent")
+        return import_callable(f"evonav.agents.{BUILT_IN[name][0]}", "agent")
     if name in _REGISTERED:
         return _REGISTERED[name]
     if ":" in name:
