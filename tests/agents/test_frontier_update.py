@@ -233,3 +233,37 @@ def test_the_widest_direction_is_the_middle_of_the_widest_opening():
     is_free[:] = True
     assert widest_direction_rad(is_free, frame, (2.05, 2.05), 1.0) == 0.0
     assert widest_direction_rad(is_free, frame, (0.05, 0.05), 1.0) == pytest.approx(math.radians(45.0), abs=0.05)
+
+
+def questions(*, needs_colours):
+    """Return an agent's questions while it goes to the frontier that is named last."""
+    model = Scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
+    model.needs = frozenset({"colours"}) if needs_colours else frozenset()
+    run(FrontierUpdate(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=12), size_px=120)
+    return model.questions
+
+
+def straight_m(question, frontier):
+    return math.dist(question.position_m, frontier.position_m)
+
+
+def test_rules_that_look_are_told_the_way_along_the_map():
+    asked = questions(needs_colours=True)
+    detours = [one.travel_m / straight_m(question, one) for question in asked for one in question.frontiers]
+    assert min(detours) > 0.8  # ways are from cell to cell
+    assert max(detours) > 1.2
+
+
+def test_others_are_told_the_straight_distance():
+    for question in questions(needs_colours=False):
+        for frontier in question.frontiers:
+            assert frontier.travel_m == pytest.approx(straight_m(question, frontier))
+
+
+def test_the_frontier_on_the_way_is_marked():
+    marked = [
+        [one.frontier_id for one in question.frontiers if one.is_current] for question in questions(needs_colours=True)
+    ]
+    assert marked[0] == []
+    assert any(marked)
+    assert all(len(ids) <= 1 for ids in marked)

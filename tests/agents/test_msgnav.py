@@ -5,13 +5,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scripted_model import Scripted
+from evonav_studies.variants import msgnav_plus, three_d_mem_plus
+from scripted_model import Scripted, scripted
 from toy_episode import START, noted, run
 from toy_house import CHAIR_AWAY, stage_case
 
 from evonav.agents.agent import NavigateTo, ViewSchedule
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
 from evonav.agents.msgnav.questions import GraphQuestion
+from evonav.agents.three_d_mem.agent import ThreeDMem
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 
@@ -308,6 +310,22 @@ def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
     for before, after in pairwise(one.belief for one in rounds):
         assert not np.any((before.cells != 0) & (after.cells == 0))
         assert not np.any(before.explored & ~after.explored)
+
+
+@pytest.mark.parametrize(("released", "plus"), [(ThreeDMem, three_d_mem_plus), (MsgNav, msgnav_plus)])
+def test_our_fallback_finds_frontiers_where_no_region_is_left(released, plus):
+    """3D-Mem and MSGNav explore as their released code does, and their variants with `+` as all others do."""
+    answers = {"prefilter": "none", "choose_snapshot": "Frontier 0", "graph": "Continue Exploration"}
+    model = scripted(subgraph="none", frontier="Frontier 0", **answers)
+    (original,), (ours,) = (
+        run(make(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=60), size_px=120)
+        for make in (released, plus)
+    )
+    assert original.trace[-1].num_frontiers == 0
+    last = original.num_rounds - 1
+    assert [entry.pose for entry in ours.trace[: last + 1]] == [entry.pose for entry in original.trace]
+    assert ours.trace[last].num_frontiers > 0
+    assert ours.num_rounds > original.num_rounds
 
 
 def test_answers_go_through_the_grammar():

@@ -60,19 +60,14 @@ def look() -> tuple[Observation, TaskInfo]:
     return observation, TaskInfo("a", 1, 50, MapFrame(rows, cols, grid.cell_m, grid.corner_m), 0)
 
 
-def after(name: str, look: tuple[Observation, TaskInfo]) -> tuple[Agent, list[Question]]:
+def after(name: str, look: tuple[Observation, TaskInfo], *config: object) -> tuple[Agent, list[Question]]:
     """Return an agent after a round, and what it asked."""
-    asked: list[Question] = []
-
-    def answer(question: Question) -> str:
-        asked.append(question)
-        return ANSWERS[question.kind]
-
-    agent = agent_factory(name)(decision=Scripted(answer))
+    model = Scripted(lambda question: ANSWERS[question.kind])
+    agent = agent_factory(name)(*config, decision=model)
     agent.begin_task(look[1])
     agent.begin_stage(Goal(1, "Mug", GOAL, GOAL, GOAL, np.zeros((1, 1, 3), np.uint8)))
     agent.act(look[0])
-    return agent, asked
+    return agent, model.questions
 
 
 @pytest.mark.parametrize("name", ["fu", "stage-reset", "ftu", "3d-mem", "evonav_studies.variants:three_d_mem_plus"])
@@ -93,10 +88,7 @@ def test_msgnav_remembers_doors_and_windows(name: str, look) -> None:
 def test_the_list_is_each_agents_own(look) -> None:
     config = MsgNav().config
     bare = replace(config, navigator=replace(config.navigator, background=("Door", "windows", "chair")))
-    agent = MsgNav(bare, Scripted(lambda question: ANSWERS[question.kind]))
-    agent.begin_task(look[1])
-    agent.begin_stage(Goal(1, "Mug", GOAL, GOAL, GOAL, np.zeros((1, 1, 3), np.uint8)))
-    agent.act(look[0])
+    agent, _ = after("msgnav", look, bare)
     assert not {*STRUCTURE_TYPES, "Chair"} & {entry.label for entry in agent.explain().entries()}
 
 

@@ -276,7 +276,7 @@ def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has
 
 
 def test_what_is_blacklisted_is_no_goal_until_the_next_stage():
-    bev, planner = on_a_blank_map()
+    _, planner = on_a_blank_map()
     cells = np.array([[120, 120], [120, 123], [120, 124]], np.int32)
     planner.blacklist(cells[:1])
     assert planner.allowed(cells).tolist() == [[120, 124]]
