@@ -90,7 +90,11 @@ class ViewStore:
             entry_ids: Entry of each detection, as in `ObjectUpdate`.
         """
         seen = self._seen(view, entry_ids) if self._keeps_detections else ()
-        jpeg = None if view.rgb is None or self._names_colours else _jpeg(view.rgb)
+        jpeg = None
+        if view.rgb is not None and not self._names_colours:
+            buffer = BytesIO()
+            Image.fromarray(view.rgb).save(buffer, "JPEG", quality=JPEG_QUALITY)
+            jpeg = buffer.getvalue()
         stored = StoredView(len(self.views), stage, round_, view.pose, view.intrinsics, seen, jpeg)
         self.views.append(stored)
         for one in seen:
@@ -198,9 +202,3 @@ def boxes_of(detections: Detections) -> list[tuple[int, Box]]:
     """Return number of pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` for one without pixels."""
     extents = _core.mask_extents(detections.stored_masks, num_masks=len(detections.labels))
     return [(area_px, (left, top, right, bottom)) for area_px, left, top, right, bottom in extents.tolist()]
-
-
-def _jpeg(pixels: NDArray[np.uint8]) -> bytes:
-    buffer = BytesIO()
-    Image.fromarray(pixels).save(buffer, "JPEG", quality=JPEG_QUALITY)
-    return buffer.getvalue()

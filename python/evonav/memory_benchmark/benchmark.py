@@ -80,7 +80,7 @@ def benchmark(
 
     Raises:
         InvalidArgumentError: There is no memory or stream, or one is named twice.
-        StoreError: The folder holds other settings, or cannot be written.
+        StoreError: The folder holds other settings or a damaged record, or cannot be written.
         EngineError: Workers cannot be had.
     """
     settings = settings or MeasureSettings()
@@ -115,31 +115,22 @@ def benchmark(
             if text is None:
                 failures.extend((memory.name, stream.name, why) for memory in left)
             else:
-                for memory, record in zip(left, json.loads(text), strict=True):
-                    write_atomically(record_path(out, memory.name, stream.name), record + "\n")
+                for one, record in zip(left, json.loads(text), strict=True):
+                    write_atomically(record_path(out, one.name, stream.name), record + "\n")
             num_done += len(left)
             on_progress(num_done, num_all, stream.name)
-        return read_folder(out, known, streams), sorted(failures)
+        found = {}
+        for memory in known:
+            paths = [record_path(out, memory, stream.name) for stream in streams]
+            there = [path for path in paths if path.exists()]
+            if there:
+                found[memory] = [read_model(StreamResult, path, "delete it to measure it again") for path in there]
+        return BenchmarkResult(machine=machine_name(), memories=found), sorted(failures)
 
 
 def record_path(folder: Path, memory: str, stream: str) -> Path:
     """Return the path of the record of a memory in a stream."""
     return folder / RECORD_DIR / slug(memory) / f"{stream.replace('/', '_')}.json"
-
-
-def read_folder(folder: Path, memories: Sequence[str], streams: Sequence[AnyStream]) -> BenchmarkResult:
-    """Read the records of memories in streams; those that are missing are left out.
-
-    Raises:
-        StoreError: A record cannot be read.
-    """
-    found = {}
-    for memory in memories:
-        paths = [record_path(folder, memory, stream.name) for stream in streams]
-        records = [read_model(StreamResult, path, "delete it to measure it again") for path in paths if path.exists()]
-        if records:
-            found[memory] = records
-    return BenchmarkResult(machine=machine_name(), memories=found)
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:

@@ -64,7 +64,9 @@ class JudgedMemory:
     def state(self, share: float) -> MemoryState:
         """Return the state of the memory now, after a share of the stage's tour."""
         entries, matched = self.map.entries, self._matched()
-        sources = {entry.id: self._source(entry.id) for entry in entries}
+        # The object that most detections of an entry are of, the first of equals; "" for none.
+        votes = ((entry.id, self._votes.get(entry.id)) for entry in entries)
+        sources = {entry_id: mine.most_common(1)[0][0] if mine else "" for entry_id, mine in votes}
         there = {body.id: body for body in self._objects}
         named = [name for name in sources.values() if name]
         errors_m = [
@@ -89,11 +91,6 @@ class JudgedMemory:
             error_m=math.fsum(errors_m),
             num_error=len(errors_m),
         )
-
-    def _source(self, entry_id: int) -> str:
-        """Id of the object that most detections of an entry are of, the first of equals; "" for none."""
-        votes = self._votes.get(entry_id)
-        return votes.most_common(1)[0][0] if votes else ""
 
     def _matched(self) -> dict[int, SceneObject]:
         """Return the object of each entry that has one of its label in its place."""

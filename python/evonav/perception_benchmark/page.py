@@ -46,7 +46,15 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
     header = read_header(folder)
     found = scores(read_records(folder))
     tables = perception_tables(found)
-    write_atomically(folder / "summary.json", json.dumps(perception_json(found), indent=2) + "\n")
+    summary = {
+        "schema_version": 1,
+        "perceptions": [_value(replace(one, pictures=())) for one in found],
+        "differences": [
+            {"perception": ours, "less": less, **_value(measures)}
+            for (ours, less), measures in differences(found).items()
+        ],
+    }
+    write_atomically(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     write_atomically(folder / "summary.csv", perception_csv(found))
     write_atomically(folder / "summary.md", markdown_tables(tables))
     text = page_text(
@@ -57,24 +65,12 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
         missing=0 if header is None else len(header.tasks) - found[0].num_tasks,
         tables=tables,
         plots=plot_elements(perception_plots(found)),
-        confusions=plot_elements(confusion_plots(found)),
+        confusions=plot_elements([_confusion_plot(one) for one in found if one.confusions]),
         features=plot_elements(feature_plots(found)),
         tasks=[task for task, _ in found[0].pictures],
         pictures={(one.perception, task): picture for one in found for task, picture in one.pictures},
     )
     return write_atomically(folder / REPORT_NAME, text), found
-
-
-def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
-    """Return the content of `summary.json`: all scores but the pictures."""
-    return {
-        "schema_version": 1,
-        "perceptions": [_value(replace(one, pictures=())) for one in found],
-        "differences": [
-            {"perception": ours, "less": less, **_value(measures)}
-            for (ours, less), measures in differences(found).items()
-        ],
-    }
 
 
 def _value(value: Any) -> Any:  # noqa: ANN401 - a part of the scores
@@ -106,11 +102,6 @@ def perception_plots(found: Sequence[Scores]) -> list[Plot]:
     for by, name in _GROUPS:
         plots += [_group_plot(found, by, name, measure) for measure in ("recall", "precision")]
     return plots + _memory_plots(found)
-
-
-def confusion_plots(found: Sequence[Scores]) -> list[ConfusionPlot]:
-    """Return a table in shades of each perception that takes objects for others."""
-    return [_confusion_plot(one) for one in found if one.confusions]
 
 
 def feature_plots(found: Sequence[Scores]) -> list[CurvePlot]:
@@ -168,6 +159,7 @@ def _memory_plots(found: Sequence[Scores]) -> list[CurvePlot]:
 
 
 def _confusion_plot(one: Scores) -> ConfusionPlot:
+    """Return a table in shades of what a perception takes objects for."""
     by_category: Counter[str] = Counter()
     by_label: Counter[str] = Counter()
     for each in one.confusions:

@@ -134,7 +134,8 @@ class Rows:
             "other": cosines[is_pair & ~is_alike],
         }
         spelled = sorted(set(categories.tolist()))
-        texts = [text_feature(_words_of(word)) for word in spelled]
+        # `DiningTable` as `dining table`
+        texts = [text_feature(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", word).lower()) for word in spelled]
         known = [text for text in texts if text is not None]
         right = 0, 0
         if len(known) == len(spelled) and all(text.shape == matrix.shape[1:] for text in known):
@@ -206,8 +207,3 @@ def _counts(cosines: NDArray[np.float64]) -> list[int]:
     bins = np.floor((np.clip(cosines, -1.0, 1.0) + 1.0) / 2.0 * NUM_COSINE_BINS).astype(np.int64)
     counts: list[int] = np.bincount(np.minimum(bins, NUM_COSINE_BINS - 1), minlength=NUM_COSINE_BINS).tolist()
     return counts
-
-
-def _words_of(category: str) -> str:
-    """Return `DiningTable` as `dining table`."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", category).lower()

@@ -98,11 +98,6 @@ class TextMatchWithImages(DecisionModel):
         return self._rules.answer(question, attempt)
 
 
-def agent_names() -> list[str]:
-    """Return the built-in agents of the paper."""
-    return [name for name in PAPER_ORDER if name in BUILT_IN]
-
-
 def measure(sampling: Sampling, *, agents: Sequence[str] | None = None, has_growth: bool = True) -> Iterator[Row]:
     """Yield the time of a decision round of each agent.
 
@@ -114,7 +109,7 @@ def measure(sampling: Sampling, *, agents: Sequence[str] | None = None, has_grow
     Raises:
         SimulationError: A stage fails.
     """
-    names = agent_names() if agents is None else agents
+    names = [name for name in PAPER_ORDER if name in BUILT_IN] if agents is None else agents
     for number, name in enumerate(names):
         sampling.on_progress(number, len(names), name)
         round_ms: list[float] = []

@@ -7,7 +7,6 @@ from typing import ClassVar
 from evonav.memory.forgetting.rule import (
     EntryStates,
     ForgettingRule,
-    Look,
     detected_ids,
     expected_px,
     look_at_places,
@@ -246,16 +245,14 @@ class StatusWindow(ForgettingRule):
         for look in look_at_places(map_, view, update, self.evidence):
             if look.is_detected:
                 self._num_missed[look.entry_id] = 0
-            elif self._is_expected(map_, look, view):
+            elif (
+                look.is_clear(self.min_points, self.min_shown) and expected_px(map_, look.entry_id, view) >= self.min_px
+            ):
                 missed = self._num_missed[look.entry_id] = self._num_missed.get(look.entry_id, 0) + 1
                 if missed >= self.window + self.max_pending and not self._is_anchor(map_, look.entry_id):
                     gone.append(look.entry_id)
                     del self._num_missed[look.entry_id]
         return gone
-
-    def _is_expected(self, map_: ObjectMap, look: Look, view: View) -> bool:
-        is_clear = look.is_clear(self.min_points, self.min_shown)
-        return is_clear and expected_px(map_, look.entry_id, view) >= self.min_px
 
     def _is_anchor(self, map_: ObjectMap, entry_id: int) -> bool:
         entry = map_.entry(entry_id) if self.anchors else None

@@ -193,17 +193,13 @@ class QueryCounts:
             objects: All that the question names, where it stands now.
             places: The answer, the best first.
         """
+        ranks = (
+            rank
+            for rank, place in enumerate(places, start=1)
+            if any(distance_to_box_m(place.position_m, body) <= HIT_M for body in objects)
+        )
         self.n += 1
-        rank = true_rank(objects, places)
-        if rank is not None:
+        if (rank := next(ranks, None)) is not None:
             self.hits_at_1 += rank == 1
             self.hits_at_5 += rank <= NUM_PLACES
             self.reciprocal_ranks += 1.0 / rank
-
-
-def true_rank(objects: Sequence[SceneObject], places: Sequence[FoundPlace]) -> int | None:
-    """Return the 1-based rank of the first place within `HIT_M` of an object; `None` if there is none."""
-    for rank, place in enumerate(places, start=1):
-        if any(distance_to_box_m(place.position_m, body) <= HIT_M for body in objects):
-            return rank
-    return None
