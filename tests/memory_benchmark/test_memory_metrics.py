@@ -13,10 +13,8 @@ from evonav.memory_benchmark.metrics.costs import (
     Sample,
     byte_note,
     growth_per_minute,
-    percentiles,
     slope_per_100_entries,
     slope_per_1000_frames,
-    theil_sen,
     thinned,
 )
 from evonav.memory_benchmark.metrics.counts import (
@@ -82,15 +80,6 @@ def test_kaplan_meier_against_a_loop(spells: list[tuple[int, bool]]) -> None:
     assert shares.tolist() == pytest.approx(expected)
 
 
-def test_percentiles_in_milliseconds() -> None:
-    found = percentiles(np.arange(101) / 1000.0)
-    assert found is not None
-    assert (found.n, found.mean_ms, found.p50_ms, found.p95_ms, found.p99_ms, found.max_ms) == pytest.approx(
-        (101, 50.0, 50.0, 95.0, 99.0, 100.0)
-    )
-    assert percentiles([]) is None
-
-
 def test_slopes_survive_outliers() -> None:
     # 1 ms and 0.5 ms more for every 100 entries; a tenth of the frames take ten times as long.
     samples = [Sample(i, 2.0 * i, (10.0 if i % 10 == 0 else 1.0) * (1.0 + 0.01 * i)) for i in range(200)]
@@ -103,11 +92,6 @@ def test_slope_over_frames_is_taken_at_constant_size() -> None:
     assert slope_per_1000_frames(leak) == pytest.approx(2.0)
     growth = [Sample(i, float(i), 1.0 + 0.01 * i) for i in range(200)]  # it costs more since it holds more
     assert slope_per_1000_frames(growth) is None
-
-
-def test_theil_sen_is_the_median_of_pairs() -> None:
-    assert theil_sen(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 10.0])) == 5.0  # of 1, 5 and 9
-    assert theil_sen(np.array([1.0, 1.0]), np.array([0.0, 1.0])) is None
 
 
 def test_thinned_takes_medians() -> None:

@@ -142,14 +142,3 @@ def test_the_list_leaves_out_detections_without_a_depth() -> None:
     frame.view.depth_m[:] = np.inf
     memory.observe(replace(frame))
     assert memory.entries() == []
-
-
-def test_the_size_grows_with_the_entries() -> None:
-    for name in ("never", "numpy-list"):
-        memory = MEMORIES[name].create()
-        memory.reset(INFO)
-        sizes = []
-        for index in range(3):
-            memory.observe(a_frame(index, ("Cup", 20 * index)))
-            sizes.append(memory.num_bytes())  # type: ignore[attr-defined]
-        assert sizes[0] < sizes[1] < sizes[2]
