@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from update_readme import headline, readme_results
 
+pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parents[2]
 NUM_TASKS_AGAIN = 3
 
@@ -36,12 +37,10 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "demo"
 
 
-@pytest.mark.slow
 def test_readme_shows_what_the_demo_measures(demo: Path) -> None:
     assert readme_results() == headline(demo), "run `make readme`"
 
 
-@pytest.mark.slow
 def test_report_is_one_page_with_every_stage(demo: Path) -> None:
     page = (demo / "report.html").read_text(encoding="utf-8")
     rows = _rows(demo)
@@ -51,7 +50,6 @@ def test_report_is_one_page_with_every_stage(demo: Path) -> None:
         assert task_id in page
 
 
-@pytest.mark.slow
 def test_one_worker_leaves_the_same_bytes_as_two(demo: Path, tmp_path: Path) -> None:
     _evonav("demo", "--workers", 1, "--limit", NUM_TASKS_AGAIN, "--out", "again", cwd=tmp_path)
     again, before = _rows(tmp_path / "again"), _rows(demo)
@@ -59,16 +57,8 @@ def test_one_worker_leaves_the_same_bytes_as_two(demo: Path, tmp_path: Path) -> 
     assert again == {key: before[key] for key in again}
 
 
-@pytest.mark.slow
 def test_readme_code_runs(tmp_path: Path) -> None:
     blocks = re.findall(r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     for block in blocks:
         subprocess.run([sys.executable, "-W", "error", "-c", block], cwd=tmp_path, check=True)
-
-
-def test_links_of_the_documents_lead_somewhere() -> None:
-    for document in [*REPOSITORY.glob("*.md"), *REPOSITORY.glob("docs/*.md")]:
-        for link in re.findall(r"\]\(([^)#]+)", document.read_text(encoding="utf-8")):
-            if not link.startswith(("http:", "https:")):
-                assert (document.parent / link).exists(), f"{document.name}: {link}"

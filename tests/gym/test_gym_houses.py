@@ -4,7 +4,6 @@ from itertools import islice
 from pathlib import Path
 
 import gymnasium
-import numpy as np
 import pytest
 
 import evonav.gym
@@ -30,20 +29,6 @@ def test_episodes_are_in_ever_new_houses_and_follow_from_the_seed() -> None:
     assert all(task.startswith("endless-train-") for task in found)
     one.close()
     again.close()
-
-
-def test_the_vector_environment_has_the_same_episodes() -> None:
-    envs = gymnasium.make_vec(evonav.gym.ENV_ID, num_envs=2, houses="endless:7", **SMALL)
-    single = gymnasium.make(evonav.gym.ENV_ID, houses="endless:7", **SMALL)
-    observations, infos = envs.reset(seed=3)
-    for index in range(2):
-        observation, info = single.reset(seed=3 + index)
-        assert info["task_id"] == infos["task_id"][index]
-        np.testing.assert_array_equal(observation["depth"], observations["depth"][index])
-    for _ in range(30):  # over the ends of stages and tasks
-        envs.step(np.ones(2, np.int64))
-    envs.close()
-    single.close()
 
 
 def test_a_chosen_house_gives_the_task_that_the_generator_gives_it() -> None:

@@ -53,16 +53,6 @@ def test_tasks_are_drawn_as_without_looks() -> None:
     assert tasks[0] == tasks[1]
 
 
-def test_a_batch_gives_the_frames_of_single_environments() -> None:
-    settings = SMALL | {"randomize": ("materials", "lighting")}
-    batch = VectorEnv(num_envs=3, num_threads=2, **settings)
-    frames = batch.reset(seed=20, options=TASK)[0]["rgb"]
-    for index in range(3):
-        np.testing.assert_array_equal(frames[index], _first(_make(randomize=settings["randomize"]), 20 + index)["rgb"])
-    assert (frames[0] != frames[1]).any(axis=-1).mean() > 0.3
-    batch.close()
-
-
 def test_an_unknown_thing_to_randomise_is_named() -> None:
     with pytest.raises(
         InvalidArgumentError,

@@ -46,6 +46,8 @@ def _make(mode, num_envs, **settings):
         {"max_steps": 9, "num_threads": 1},
         {"max_steps": 4, "num_threads": 3, "action_mode": "waypoints", "reward": "spl"},
         {"max_steps": 5, "action_mode": "waypoints", "waypoint_frame": "start", "oracle_info": True},
+        {"max_steps": 3, "houses": "endless:7", "num_threads": 2},
+        {"max_steps": 3, "randomize": ("materials", "lighting"), "style": "default"},
     ],
 )
 def test_a_batch_is_as_many_environments_alone(settings):

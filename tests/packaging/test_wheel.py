@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
 REPOSITORY = Path(__file__).parents[2]
 MAX_WHEEL_BYTES = 13_000_000
 
@@ -26,7 +27,6 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-@pytest.mark.slow
 def test_wheel_is_abi3_and_holds_types_and_data(wheel: Path) -> None:
     assert "-cp310-abi3-" in wheel.name
     assert wheel.stat().st_size < MAX_WHEEL_BYTES
@@ -49,7 +49,6 @@ def test_metadata_of_the_wheel_has_the_readme_with_absolute_links(wheel: Path) -
     assert [target for target in targets if not target.startswith(("https://", "#"))] == []
 
 
-@pytest.mark.slow
 def test_installed_wheel_runs_the_demo_elsewhere(wheel: Path, tmp_path: Path) -> None:
     site = tmp_path / "site"
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", site, wheel]

@@ -13,11 +13,10 @@ from evonav.api.progress import progress_bar
 from evonav.api.run import Run
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate_all
 from evonav.evaluation.run.run import Evaluation
-from evonav.evaluation.run.run_settings import DecisionResources, RunSettings, Settings, SpendingSettings, settings_of
-from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SimulatorSettings
+from evonav.evaluation.run.run_settings import RunSettings, Settings, SpendingSettings, settings_of
+from evonav.evaluation.run.settings import CommandSettings, DecisionSettings, PerceptionSettings, SimulatorSettings
 
 AgentSource = str | Callable[..., Agent]
 """A name, a class, or a function that makes an agent."""
@@ -80,36 +79,28 @@ def evaluate(
     """
     refuse_in_agent_process("evonav.evaluate")
     named = named_agents(agents)
-    settings = read_settings(RunSettings, "", {**options, "workers": _num_workers(workers, named)}, "evaluate")
-    decisions = read_settings(DecisionSettings, "kind", decision, "decision")
-    simulation = read_settings(SimulatorSettings, "kind", simulator, "simulator")
-    settings = settings.with_episodes([decisions], [simulation])
-    costs = read_settings(SpendingSettings, "", spending or {}, "spending")
+    run = read_settings(RunSettings, "", {**options, "workers": _num_workers(workers, named)}, "evaluate")
+    settings = CommandSettings(
+        **dict(run),
+        **dict(read_settings(SpendingSettings, "", spending or {}, "spending")),
+        decision=read_settings(DecisionSettings, "kind", decision, "decision"),
+        perception=read_settings(PerceptionSettings, "make", perception, "perception"),
+        simulator=read_settings(SimulatorSettings, "kind", simulator, "simulator"),
+    )
+    settings = settings.with_episodes([settings.decision], [settings.simulator])
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
-    model = decisions.component(seed, DecisionResources.of_run(folder, costs, settings.num_episodes))
-    if not decisions.asks_rules:
-        model.create(seed).check()
-    backend = Backend(
-        simulator=simulation.component(),
-        perception=read_settings(PerceptionSettings, "make", perception, "perception").component(),
-        decision=model,
-    )
-    config = settings.config(seed, backend, decisions, protocol)
-    _run(Evaluation(named.names, tuple(found), folder, config), settings, retry_errored)
-    return Run(folder)
-
-
-def _run(evaluation: Evaluation, settings: RunSettings, retry_errored: bool) -> None:
-    evaluation.config.backend.check()
+    config = settings.run_config(seed, folder, protocol)
+    config.backend.check()
     with progress_bar("stages") as show:
         evaluate_all(
-            [evaluation],
+            [Evaluation(named.names, tuple(found), folder, config)],
             settings.workforce(),
             num_retries=settings.num_retries,
             retry_errored=retry_errored,
             on_progress=lambda _, state: show(state.num_done, state.num_stages, state.label),
         )
+    return Run(folder)
 
 
 def _num_workers(workers: int | None, agents: NamedAgents) -> int | None:

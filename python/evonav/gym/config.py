@@ -1,8 +1,9 @@
-"""Define the settings of an environment: camera, actions, observations, reward."""
+"""Define the settings of an environment (camera, actions, observations, reward), and check modes named by users."""
 
 from typing import Any, Literal, get_args
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from pydantic import Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
@@ -44,6 +45,9 @@ LEARN_IMAGE_PX = 84
 ACTIONS = (Action.MOVE_FORWARD, Action.TURN_LEFT, Action.TURN_RIGHT, Action.STOP)
 """Discrete actions by number: AI2-THOR's MoveAhead, RotateLeft and RotateRight, and the end of the stage."""
 STOP = ACTIONS.index(Action.STOP)
+
+RENDER_MODES = ("rgb_array",)
+"""Modes of `render`. Gymnasium makes `rgb_array_list` and `human` of it, by wrappers of its own."""
 
 STEP_COST = 0.01
 SUCCESS_REWARD = 2.5
@@ -143,3 +147,34 @@ class NavConfig(Record, strict=False):
     def has(self, name: str) -> bool:
         """Return whether an observation has a key."""
         return name in self.observations
+
+
+def check_render_mode(mode: str | None) -> None:
+    """Refuse a render mode that does not exist.
+
+    Raises:
+        InvalidArgumentError: It does not exist.
+    """
+    if mode is None or mode in RENDER_MODES:
+        return
+    hint = {
+        "human": "; for a window use `gymnasium.make`, which opens one with pygame",
+        "rgb_array_list": "; for a list of pictures use `gymnasium.make`",
+        "camera": "; choose the picture with `render_view`",
+        "map": "; choose the picture with `render_view`",
+    }.get(mode, "")
+    raise InvalidArgumentError(f"argument `render_mode` is {mode!r}, expected 'rgb_array' or None{hint}")
+
+
+def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return the mode of a name.
+
+    Raises:
+        InvalidArgumentError: It is neither `NEXT_STEP` nor `SAME_STEP`.
+    """
+    expected = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+    for known in expected:
+        if mode in (known, known.value):
+            return known
+    names = " or ".join(repr(known.value) for known in expected)
+    raise InvalidArgumentError(f"argument `autoreset_mode` is {mode!r}, expected {names}")

@@ -8,8 +8,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from evonav.gym.config import NavConfig
-from evonav.gym.modes import RENDER_MODES
+from evonav.gym.config import RENDER_MODES, NavConfig
 from evonav.gym.spaces import Infos, Observations
 from evonav.gym.vector_env import VectorEnv
 

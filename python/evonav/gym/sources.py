@@ -3,7 +3,6 @@
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -24,52 +23,6 @@ MAX_HOUSES_TRIED = 200
 """Houses in a row without a task after which there is none; of ProcTHOR's houses, one in five has a single room."""
 _NUM_CACHED = 64
 """Generated tasks that are kept in memory, about 1 MB each."""
-
-
-class TaskSource(Protocol):
-    """Numbered tasks, of which episodes are drawn."""
-
-    def draw(self, random: np.random.Generator) -> int:
-        """Draw the number of a task uniformly."""
-        ...
-
-    def find(self, name: str) -> int:
-        """Return the number of a task that `reset` was asked for.
-
-        Raises:
-            InvalidArgumentError: It does not exist.
-        """
-        ...
-
-    def task(self, number: int) -> Task:
-        """Return a task.
-
-        Raises:
-            TaskError: The task is malformed, or houses give none.
-        """
-        ...
-
-
-def task_source(
-    tasks: Path | str | None = None, houses: Path | str | None = None, subset: str | None = None
-) -> TaskSource:
-    """Return the tasks of a folder or of houses.
-
-    Args:
-        tasks: Folder of tasks; the bundled ones if neither is given.
-        houses: Houses, as `evonav.house.stream_houses` takes them.
-
-    Raises:
-        InvalidArgumentError: Both are given, or a subset of houses.
-        HouseError: The houses cannot be read.
-        TaskError: The folder has no tasks, or not the subset.
-    """
-    if houses is None:
-        return FolderTasks(tasks, subset=subset)
-    other = "tasks" if tasks is not None else "subset" if subset is not None else None
-    if other is not None:
-        raise InvalidArgumentError(f"argument `houses` is {str(houses)!r}: there is no `{other}` beside houses")
-    return HouseTasks(houses)
 
 
 class FolderTasks:
@@ -178,6 +131,32 @@ class HouseTasks:
         if self._endless is not None:
             return HouseText(*self._endless.house(number + 1))
         return self._texts[number % len(self._texts)]
+
+
+TaskSource = FolderTasks | HouseTasks
+"""Numbered tasks, from which episodes are drawn."""
+
+
+def task_source(
+    tasks: Path | str | None = None, houses: Path | str | None = None, subset: str | None = None
+) -> TaskSource:
+    """Return the tasks of a folder or of houses.
+
+    Args:
+        tasks: Folder of tasks; the bundled ones if neither is given.
+        houses: Houses, as `evonav.house.stream_houses` takes them.
+
+    Raises:
+        InvalidArgumentError: Both are given, or a subset of houses.
+        HouseError: The houses cannot be read.
+        TaskError: The folder has no tasks, or not the subset.
+    """
+    if houses is None:
+        return FolderTasks(tasks, subset=subset)
+    other = "tasks" if tasks is not None else "subset" if subset is not None else None
+    if other is not None:
+        raise InvalidArgumentError(f"argument `houses` is {str(houses)!r}: there is no `{other}` beside houses")
+    return HouseTasks(houses)
 
 
 def _checked(task: Task, name: str) -> Task:

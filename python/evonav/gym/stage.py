@@ -130,9 +130,7 @@ class Stages:
     def oracle(self, index: int) -> dict[str, Any]:
         """Return the target, the geodesic distance to it and the reference length, for `info["oracle"]`."""
         return {
-            "target_m": self._targets_m[index].copy(),
-            "geodesic_distance_m": float(self._distance_m[index]),
-            "reference_length_m": float(self._reference_length_m[index]),
+            name: values[index] if values.ndim > 1 else float(values[index]) for name, values in self.oracles().items()
         }
 
     def end(self, index: int, stage: int, end: Pose, *, is_last: bool) -> dict[str, Any]:

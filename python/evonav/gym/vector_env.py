@@ -19,8 +19,8 @@ from evonav import _core
 from evonav.agents.agent import SensorConfig
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
-from evonav.gym import modes, spaces
-from evonav.gym.config import STOP, NavConfig
+from evonav.gym import spaces
+from evonav.gym.config import RENDER_MODES, STOP, NavConfig, check_render_mode, checked_mode
 from evonav.gym.map_view import MapView
 from evonav.gym.sources import task_source
 from evonav.gym.spaces import Infos, Observations
@@ -62,7 +62,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
-        "render_modes": list(modes.RENDER_MODES),
+        "render_modes": list(RENDER_MODES),
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -102,11 +102,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         Raises:
             EvonavError: A setting is out of range, or the tasks or houses cannot be read.
         """
-        modes.check_render_mode(render_mode)
+        check_render_mode(render_mode)
         given = {name: getattr(config, name) for name in config.model_fields_set} if config else {}
         self.config = NavConfig(**(given | settings))
-        mode = modes.autoreset_mode(autoreset_mode)
-        self.metadata = self.metadata | {"autoreset_mode": mode}  # type: ignore[misc]
+        self.metadata = self.metadata | {"autoreset_mode": checked_mode(autoreset_mode)}  # type: ignore[misc]
         self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
         self.single_observation_space = spaces.observation_space(self.config)
         self.single_action_space = spaces.action_space(self.config)

@@ -28,8 +28,8 @@ def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str,
 
 def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
     """Return a table of cells, and one over seeds if there are several; axes with one value are left out."""
-    axes = [axis for axis in AXES if len({getattr(row, axis) for row in rows if row.cell}) > 1]
     cells = [row for row in rows if row.cell]
+    axes = swept_axes(cells)
     seeds = [row for row in rows if not row.cell]
     tables = [_table("Cells", cells, axes)]
     if seeds:

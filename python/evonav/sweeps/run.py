@@ -198,8 +198,8 @@ def read_claim(out: Path) -> dict[str, Any]:
         raise StoreError(f"{path}: no JSON: {error}") from None
     if not isinstance(content, dict) or not isinstance(content.get("cells"), dict):
         raise StoreError(f"{path}: not a sweep's: it names no cells")
-    if content.get("schema_version") != SCHEMA_VERSION:
-        found = content.get("schema_version")
+    found = content.get("schema_version")
+    if type(found) is not int or found != SCHEMA_VERSION:
         raise StoreError(f"{path}: schema version {found}, this evonav reads {SCHEMA_VERSION}")
     return content
 

@@ -87,24 +87,33 @@ def _cell_rows(run_dir: Path, name: str, cell: Mapping[str, Any]) -> list[SweepR
     found = _run_summary(run_dir)
     num_stages = cell["num_stages"] // len(cell["agents"])
     blank = {**dict.fromkeys(STATES, 0), "not_run": num_stages}
-    rows = []
-    for agent in cell["agents"]:
-        summary = found.get(agent, {})
-        rows.append(
-            SweepRow(
-                cell=name,
-                **cell["axes"],
-                agent=agent,
-                n=summary.get("n", 0),
-                num_stages=num_stages,
-                sr=summary.get("sr"),
-                sr_ci95=_interval(summary.get("sr_ci95")),
-                spl=summary.get("spl"),
-                spl_ci95=_interval(summary.get("spl_ci95")),
-                counts=summary.get("counts", blank),
-            )
-        )
-    return rows
+    return [
+        _row(name, cell["axes"], agent, num_stages, found.get(agent, {}), found.get(agent, {}).get("counts", blank))
+        for agent in cell["agents"]
+    ]
+
+
+def _row(
+    cell: str,
+    axes: Mapping[str, Any],
+    agent: str,
+    num_stages: int,
+    found: Mapping[str, Any],
+    counts: Mapping[str, int],
+) -> SweepRow:
+    """Return a row with the rates in `found`, which is empty for a run without records."""
+    return SweepRow(
+        cell=cell,
+        **axes,
+        agent=agent,
+        n=found.get("n", 0),
+        num_stages=num_stages,
+        sr=found.get("sr"),
+        sr_ci95=_interval(found.get("sr_ci95")),
+        spl=found.get("spl"),
+        spl_ci95=_interval(found.get("spl_ci95")),
+        counts=counts,
+    )
 
 
 def _run_summary(run_dir: Path) -> dict[str, dict[str, Any]]:
@@ -124,29 +133,15 @@ def _run_summary(run_dir: Path) -> dict[str, dict[str, Any]]:
 
 def _over_seeds(out: Path, cells: Mapping[str, Mapping[str, Any]], rows: list[SweepRow]) -> list[SweepRow]:
     """Return a row for each agent that runs with more than one seed."""
-    axes = {key: value for key, value in next(iter(cells.values()))["axes"].items() if key != "seed"}
+    axes = {**next(iter(cells.values()))["axes"], "seed": None}
     found = []
     for agent in dict.fromkeys(agent for cell in cells.values() for agent in cell["agents"]):
         parts = [row for row in rows if row.cell in cells and row.agent == agent]
         if len(parts) < 2:
             continue
-        pooled = _pooled([out / RUNS_NAME / row.cell for row in parts], agent)
+        pooled = asdict(_pooled([out / RUNS_NAME / row.cell for row in parts], agent))
         counts = {state: sum(row.counts[state] for row in parts) for state in STATES}
-        found.append(
-            SweepRow(
-                cell="",
-                **axes,
-                seed=None,
-                agent=agent,
-                n=pooled.n,
-                num_stages=sum(row.num_stages for row in parts),
-                sr=pooled.sr,
-                sr_ci95=pooled.sr_ci95,
-                spl=pooled.spl,
-                spl_ci95=pooled.spl_ci95,
-                counts=counts,
-            )
-        )
+        found.append(_row("", axes, agent, sum(row.num_stages for row in parts), pooled, counts))
     return found
 
 

@@ -1,5 +1,6 @@
 """Complete words in the shell; heavy imports happen only when the shell asks for words."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,7 @@ def agents(incomplete: str) -> list[str]:
     from evonav.agents.registry import agent_descriptions
     from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 
-    before, comma, last = incomplete.rpartition(",")
-    taken = before.split(",")
-    names = [
-        name for name in (*agent_descriptions(), *ORACLE_BASELINE_NAMES) if name.startswith(last) and name not in taken
-    ]
-    return [f"{before}{comma}{name}" for name in names]
+    return _further((*agent_descriptions(), *ORACLE_BASELINE_NAMES), incomplete)
 
 
 def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
@@ -29,9 +25,13 @@ def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click'
         known = list(summary["agents"])
     except (OSError, ValueError, KeyError, TypeError):
         return []
+    return _further(known, incomplete)
+
+
+def _further(known: Iterable[str], incomplete: str) -> list[str]:
+    """What may follow the names that are typed, which commas separate."""
     before, comma, last = incomplete.rpartition(",")
-    names = [name for name in known if name.startswith(last) and name not in before.split(",")]
-    return [f"{before}{comma}{name}" for name in names]
+    return [f"{before}{comma}{name}" for name in known if name.startswith(last) and name not in before.split(",")]
 
 
 def sweep_keys(incomplete: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Build the decision model of a command, and print what its model costs."""
+"""Print what the model of a command costs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,11 +10,9 @@ from evonav.cli.options.settings import MODEL_PANEL
 if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Sequence
 
-    from evonav.component import Component
-    from evonav.decision.question import DecisionModel
     from evonav.evaluation.run.run import RunConfig
     from evonav.evaluation.run.run_settings import SpendingSettings
-    from evonav.evaluation.run.settings import DecisionSettings
+    from evonav.evaluation.run.settings import CommandSettings
     from evonav.tasks.listing import TaskFile
 
 DryRun = Annotated[
@@ -27,39 +25,14 @@ DryRun = Annotated[
 ]
 
 
-def decision_component(
-    decisions: "DecisionSettings",
-    spending: "SpendingSettings",
-    out: Path,
-    seed: int,
-    num_askers: int,
-    *,
-    dry_run: bool = False,
-) -> "Component[DecisionModel]":
-    """Return the component of the decision model, after a check that it can be asked from here.
-
-    Args:
-        out: Folder of the run, which stores answers and costs.
-        num_askers: Number of episodes that may ask the model at once.
-        dry_run: Return a model that cannot be asked, for estimates.
-
-    Raises:
-        SettingError: A setting is invalid.
-        DecisionError: The model cannot be asked from here: a key or package is missing.
-        StoreError: The file of exchanges cannot be opened.
-    """
-    from evonav.evaluation.run.run_settings import DecisionResources
-
-    decisions.check()
-    if decisions.kind != "vlm":
-        flags = {"prices": spending.prices is not None, "max-cost": spending.max_cost is not None, "dry-run": dry_run}
-        for flag in (name for name, is_given in flags.items() if is_given):
-            raise typer.BadParameter(f"--{flag} is for --decision vlm")
-    resources = None if dry_run else DecisionResources.of_run(out, spending, num_askers)
-    decision = decisions.component(seed, resources)
-    if resources is not None and not decisions.asks_rules:
-        decision.create(seed).check()
-    return decision
+def refuse_costs_of_rules(run: "CommandSettings", *, dry_run: bool = False) -> None:
+    """Refuse options about the costs of a model where none is asked; other invalid settings of the model go first."""
+    if run.decision.kind == "vlm":
+        return
+    run.decision.check()
+    flags = {"prices": run.prices is not None, "max-cost": run.max_cost is not None, "dry-run": dry_run}
+    for flag in (name for name, is_given in flags.items() if is_given):
+        raise typer.BadParameter(f"--{flag} is for --decision vlm")
 
 
 def print_estimate(

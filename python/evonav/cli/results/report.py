@@ -6,17 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import print_table, show_tables, write_files
-from evonav.cli.options.shared import (
-    Exchanges,
-    RunAgents,
-    RunFolder,
-    RunTasks,
-    listed,
-)
+from evonav.cli.options.shared import Exchanges, RunAgents, RunFolder, RunTasks, listed
 from evonav.cli.results.view import replay_pages
 from evonav.cli.run.sweep import write_sweep_summary
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from evonav.report.run import RecordedRun
 
 NUM_REPLAYS = 2
@@ -56,37 +52,27 @@ def report(
     if text:
         _print_metrics(run, listed(agent) or None, out)
         return
-    if (run / SWEEP_NAME).is_file():
-        typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
-        return
     from evonav.evaluation.run.summary import save_summary
-    from evonav.report import load_run
+    from evonav.report import load_run, write_report
 
-    num_replays = _count(replays or str(NUM_REPLAYS))
+    is_sweep = (run / SWEEP_NAME).is_file()
+    num_replays = _count(replays or ("none" if is_sweep else str(NUM_REPLAYS)))
+
+    def write(recorded: "RecordedRun", to: Path | None) -> Path:
+        if num_replays != 0:
+            _replay(recorded, num_replays, tasks, exchanges)
+        return write_report(recorded, to, has_maps=maps)
+
+    if is_sweep:
+        typer.echo(f"report: {_report_sweep(run, out, write)}")
+        return
     recorded = load_run(run)
     save_summary(run, recorded.summaries, recorded.pairs)
     print_table(sorted(recorded.summaries, key=lambda summary: summary.agent))
-    typer.echo(f"report: {_report(recorded, out, num_replays, tasks, exchanges, maps)}")
+    typer.echo(f"report: {write(recorded, out)}")
 
 
-def _report(
-    run: "RecordedRun",
-    out: Path | None,
-    num_replays: int | None,
-    tasks: Path | None,
-    exchanges: Path | None,
-    has_maps: bool,
-) -> Path:
-    from evonav.report import write_report
-
-    if num_replays != 0:
-        _replay(run, num_replays, tasks, exchanges)
-    return write_report(run, out, has_maps=has_maps)
-
-
-def _report_sweep(
-    sweep: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
-) -> Path:
+def _report_sweep(sweep: Path, out: Path | None, write: "Callable[[RecordedRun, Path | None], Path]") -> Path:
     """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
     from evonav.report import load_run
@@ -97,8 +83,7 @@ def _report_sweep(
     rows = write_sweep_summary(sweep)
     reports = []
     for cell in sorted(path.parent for path in (sweep / RUNS_NAME).glob(f"*/{FILE_NAME}")):
-        to = None if out is None else out / RUNS_NAME / cell.name
-        reports.append((cell.name, _report(load_run(cell), to, num_replays, tasks, exchanges, has_maps)))
+        reports.append((cell.name, write(load_run(cell), None if out is None else out / RUNS_NAME / cell.name)))
         typer.echo(f"cell: {reports[-1][1]}")
     return write_sweep_page(out or sweep, sweep_title(sweep), rows, reports)
 

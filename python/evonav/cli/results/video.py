@@ -6,19 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import (
-    Exchanges,
-    RunFolder,
-    RunTask,
-    RunTasks,
-    Stages,
-    listed,
-    numbers_of,
-)
+from evonav.cli.options.shared import Exchanges, RunFolder, RunTask, RunTasks, Stages, listed, numbers_of
 from evonav.counted import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
+
+    from PIL.Image import Image
 
     from evonav.replay.replay import RunReplay
     from evonav.replay.types import ReplayedStage
@@ -60,50 +54,37 @@ def video(
 
     Both show the views, the agent's map and memory, and the truth.
     """
-    out = out or run / "episode.mp4"
-    if out.suffix == RECORDING:
-        _write_recording(run, task, agent, stage, out, tasks, exchanges)
-        return
+    from evonav.replay.rerun_export import check_recording, write_recording
     from evonav.replay.video import check_video, write_video
     from evonav.replay.video_frames import episode_frame, stage_frames
 
-    check_video(out, fps or ROUNDS_FPS, width)
-    replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
-    maps = {one.record.stage: one.floor_plan for one in stages[0] if one.floor_plan is not None}
-    frame, budget = episode_frame(stages[0], maps), replay.budget(agent)
+    out = out or run / "episode.mp4"
+    is_recording = out.suffix == RECORDING
+    if is_recording:
+        check_recording(out)
+    else:
+        check_video(out, fps or ROUNDS_FPS, width)
+    replay, every, shown, success_radius_m = _replayed(
+        run, task, agent, stage, tasks, exchanges, keeps_depth=is_recording
+    )
+    maps = {one.record.stage: one.floor_plan for one in every if one.floor_plan is not None}
+    what = f"{every[0].record.agent} in {every[0].record.task_id}"
+    if is_recording:
+        write_recording(shown, maps, out, success_radius_m=success_radius_m)
+        typer.echo(f"recording: {out} ({what}); open it with: rerun {out}")
+        return
+    frame, budget = episode_frame(every, maps), replay.budget(every[0].record.agent)
     with status("Drawing") as tell:
 
-        def pictures(one: "ReplayedStage"):  # type: ignore[no-untyped-def] # noqa: ANN202 - a generator of pictures
-            for number, picture in enumerate(
-                stage_frames(one, maps, frame, budget=budget, success_radius_m=success_radius_m), 1
-            ):
+        def pictures(one: "ReplayedStage") -> "Iterator[Image]":
+            drawn = stage_frames(one, maps, frame, budget=budget, success_radius_m=success_radius_m)
+            for number, picture in enumerate(drawn, 1):
                 tell(f"stage {one.record.stage}, picture {number} of {len(one.rounds) + 1}")
                 yield picture
 
         speed = fps or (ACTIONS_FPS if budget > MANY_ROUNDS else ROUNDS_FPS)
-        num = write_video((pictures(one) for one in stages[1]), out, fps=speed, width_px=width)
-    typer.echo(f"video: {out} ({agent} in {stages[0][0].record.task_id}, {counted(num, 'picture')})")
-
-
-def _write_recording(
-    run: Path,
-    task: str | None,
-    agent: str | None,
-    stage: "Sequence[str] | None",
-    out: Path,
-    tasks: Path | None,
-    exchanges: Path | None,
-) -> None:
-    """Write an episode for the rerun viewer."""
-    from evonav.replay.rerun_export import check_recording, write_recording
-
-    check_recording(out)
-    _, agent, (stages, shown), radius_m = _replayed(
-        run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
-    )
-    maps = {one.record.stage: one.floor_plan for one in stages if one.floor_plan is not None}
-    write_recording(shown, maps, out, success_radius_m=radius_m)
-    typer.echo(f"recording: {out} ({agent} in {stages[0].record.task_id}); open it with: rerun {out}")
+        num = write_video(map(pictures, shown), out, fps=speed, width_px=width)
+    typer.echo(f"video: {out} ({what}, {counted(num, 'picture')})")
 
 
 def _replayed(
@@ -113,11 +94,10 @@ def _replayed(
     stage: "Sequence[str] | None",
     tasks: Path | None,
     exchanges: Path | None,
-    heading_px: int,
     *,
-    keeps_depth: bool = False,
-) -> "tuple[RunReplay, str, tuple[list[ReplayedStage], list[ReplayedStage]], float]":
-    """Replay an episode; return the replay, its agent, its stages (all, and the chosen ones) and the success radius."""
+    keeps_depth: bool,
+) -> "tuple[RunReplay, list[ReplayedStage], list[ReplayedStage], float]":
+    """Replay an episode; return the replay, all stages, the chosen ones, and the success radius in metres."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
     from evonav.replay.run_pages import task_path
@@ -129,7 +109,7 @@ def _replayed(
     episodes = highlights_first(found)
     fitting = (one for one in episodes if one[0] == (agent or one[0]) and one[1] == (task or one[1]))
     name, task_id = next(fitting, (agent or "", task or ""))  # the replay raises if there is no record
-    replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px, keeps_depth=keeps_depth)
+    replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=VIEW_PX, keeps_depth=keeps_depth)
     with status("Replaying") as tell:
         last = None if wanted is None else max(wanted)
 
@@ -145,4 +125,4 @@ def _replayed(
         if reason:
             what = "is shown as recorded" if one.why_not else "differs from the record; the replay is shown"
             typer.echo(f"stage {one.record.stage} {what}: {reason}", err=True)
-    return replay, name, (stages, shown), found.success_radius_m
+    return replay, stages, shown, found.success_radius_m

@@ -6,16 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options.shared import (
-    Exchanges,
-    RunAgents,
-    RunFolder,
-    RunTask,
-    RunTasks,
-    Stages,
-    listed,
-    numbers_of,
-)
+from evonav.cli.options.shared import Exchanges, RunAgents, RunFolder, RunTask, RunTasks, Stages, listed, numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

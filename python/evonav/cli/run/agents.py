@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from evonav.cli.display import print_checks, status
-from evonav.cli.options.decisions import decision_component
+from evonav.cli.options.decisions import refuse_costs_of_rules
 from evonav.cli.options.settings import BaseUrl, Decision, Model, Perception, set_option, settings_from
 from evonav.cli.options.shared import Seed
 
@@ -82,16 +82,12 @@ def check_agent(
     check fails.
     """
     from evonav.evaluation.contract.check import check_agent
-    from evonav.evaluation.run.components import Backend
 
-    given = {"perception.make": perception, "decision.kind": decision, "decision.model": model}
+    given = {"perception.make": perception, "decision.kind": decision, "decision.model": model, "workers": 0}
     run = settings_from({**given, "decision.base_url": base_url}, set_, KEYS)
-    perceived = run.perception.component()
+    refuse_costs_of_rules(run)
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
-        backend = Backend(
-            perception=perceived,
-            decision=decision_component(run.decision, run, Path(folder), seed, 1),
-        )
+        backend = run.run_config(seed, Path(folder)).backend
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=run.agent_timeout_s or TIMEOUT_S)
     print_checks(
         report.conclusion,

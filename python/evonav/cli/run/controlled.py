@@ -7,7 +7,7 @@ import typer
 
 from evonav.cli.display import interruptible, print_table, show_tables, status
 from evonav.cli.group import Command, new_app
-from evonav.cli.options.decisions import decision_component
+from evonav.cli.options.decisions import refuse_costs_of_rules
 from evonav.cli.options.settings import (
     BaseUrl,
     Decision,
@@ -138,7 +138,6 @@ def evaluate(
     """
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
-    from evonav.evaluation.run.components import Backend
 
     record = read_controlled(directory)
     given = {"simulator.allow_unknown_assets": record.options.allow_unknown_assets, "perception.make": perception}
@@ -147,11 +146,8 @@ def evaluate(
     run = settings_from(given, set_)
     run = run.with_episodes([run.decision], [run.simulator])
     workforce = run.workforce()
-    backend = Backend(
-        simulator=run.simulator.component(),
-        perception=run.perception.component(),
-        decision=decision_component(run.decision, run, directory, seed, run.num_episodes),
-    )
+    refuse_costs_of_rules(run)
+    config = run.run_config(seed, directory)
     names = names_of(agent)
 
     def tell(arm: str, progress: "Progress") -> None:
@@ -161,7 +157,7 @@ def evaluate(
         summaries = evaluate_controlled(
             directory,
             names,
-            config=run.config(seed, backend, run.decision),
+            config=config,
             workforce=workforce,
             num_retries=run.num_retries,
             retry_errored=retry_errored,

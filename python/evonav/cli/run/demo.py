@@ -23,13 +23,12 @@ def demo(
 
     It takes a minute or two. The report is a page with tables, maps and replays of one task.
     """
-    from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.evaluate import evaluate
     from evonav.report import write_report
 
     context.with_resource(early_worker())
     run = settings_from({"workers": workers})
-    config = run.config(seed, Backend(), run.decision)
+    config = run.run_config(seed, out)
     task_files = chosen_tasks(None, limit, None)
     with running(out, config) as show:
         summaries = evaluate(

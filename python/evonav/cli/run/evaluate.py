@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible, print_table, progress, show_tables, status
-from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
+from evonav.cli.options.decisions import DryRun, print_estimate, print_spending, refuse_costs_of_rules
 from evonav.cli.options.settings import (
     BaseUrl,
     Decision,
@@ -107,7 +107,6 @@ def evaluate(
 
     Three agents run on the bundled tasks by default. Look at the results with `evonav report OUT`.
     """
-    from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.evaluate import evaluate_all
     from evonav.evaluation.run.run import Evaluation
 
@@ -130,12 +129,8 @@ def evaluate(
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
     run = run.with_episodes([run.decision], [run.simulator])
     workforce = run.workforce()
-    backend = Backend(
-        simulator=run.simulator.component(),
-        perception=run.perception.component(),
-        decision=decision_component(run.decision, run, out, seed, run.num_episodes, dry_run=dry_run),
-    )
-    config = run.config(seed, backend, run.decision)
+    refuse_costs_of_rules(run, dry_run=dry_run)
+    config = run.run_config(seed, out, asks_model=not dry_run)
     if pdb:
         config = replace(config, hosting=AgentHosting("debugger"))
     names = names_of(agent)

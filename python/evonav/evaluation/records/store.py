@@ -152,7 +152,7 @@ class RunStore:
                 if "meta" not in there:
                     self._db.execute("INSERT INTO meta VALUES ('schema_version', ?)", (_json(SCHEMA_VERSION),))
         version = self.meta("schema_version")
-        if version != SCHEMA_VERSION:
+        if type(version) is not int or version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
 
     def __enter__(self) -> "RunStore":

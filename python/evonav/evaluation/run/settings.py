@@ -15,8 +15,15 @@ from evonav.decision.goal_input import GoalInput
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.errors import StoreError
-from evonav.evaluation.run.components import USUAL_CAMERA
-from evonav.evaluation.run.run_settings import RunSettings, SettingError, Settings, SpendingSettings
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.components import USUAL_CAMERA, Backend
+from evonav.evaluation.run.run_settings import (
+    DecisionResources,
+    RunSettings,
+    SettingError,
+    Settings,
+    SpendingSettings,
+)
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, parse_perception
 from evonav.world.ai2thor.startup import Ai2ThorOptions
@@ -24,7 +31,7 @@ from evonav.world.simulator import Simulator, SimulatorConfig, Style
 
 if TYPE_CHECKING:
     from evonav.decision.options import AskedOptions, VlmOptions
-    from evonav.evaluation.run.run_settings import DecisionResources
+    from evonav.evaluation.run.run import RunConfig
 
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""
@@ -258,7 +265,7 @@ class DecisionSettings(Settings):
         noise = dict(self.noise) or None
         return {"tells_of_change": self.tell_of_change, "goal_input": self.goal_input, "noise": noise}
 
-    def component(self, seed: int, resources: "DecisionResources | None") -> Component[DecisionModel]:
+    def component(self, seed: int, resources: DecisionResources | None) -> Component[DecisionModel]:
         """Return the component of this decision model.
 
         Args:
@@ -334,6 +341,32 @@ class CommandSettings(RunSettings, SpendingSettings):
     simulator: SimulatorSettings = SimulatorSettings()
     perception: PerceptionSettings = PerceptionSettings()
     decision: DecisionSettings = DecisionSettings()
+
+    def run_config(
+        self, seed: int, out: Path, protocol: ProtocolConfig | None = None, *, asks_model: bool = True
+    ) -> "RunConfig":
+        """Return the configuration of a run, after a check that its decision model can be asked from here.
+
+        Args:
+            seed: Seed of every random choice.
+            out: Folder of the run, which stores answers and costs.
+            protocol: Default: the paper's.
+            asks_model: Without it, the model cannot be asked, which is enough for estimates.
+
+        Raises:
+            InvalidArgumentError: A setting is invalid.
+            DecisionError: The model cannot be asked from here: a key or package is missing.
+            StoreError: The file of exchanges cannot be opened.
+        """
+        resources = DecisionResources.of_run(out, self, self.num_episodes) if asks_model else None
+        backend = Backend(
+            simulator=self.simulator.component(),
+            perception=self.perception.component(),
+            decision=self.decision.component(seed, resources),
+        )
+        if asks_model and not self.decision.asks_rules:
+            backend.decision.create(seed).check()
+        return self.config(seed, backend, self.decision, protocol)
 
 
 def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
