@@ -116,10 +116,7 @@ def _num_workers(workers: int | None, agents: NamedAgents) -> int | None:
 
 
 def read_settings(
-    model: type[SettingsT],
-    word: str,
-    value: str | Mapping[str, Any] | SettingsT,
-    name: str,
+    model: type[SettingsT], word: str, value: str | Mapping[str, Any] | SettingsT, name: str
 ) -> SettingsT:
     """Return settings from what an argument may be: a word, a mapping, or the settings themselves.
 

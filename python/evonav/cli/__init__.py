@@ -77,8 +77,7 @@ def options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
     debug: Annotated[
-        bool,
-        typer.Option("--debug", help=f"Show the traceback of an error, as the variable {DEBUG_VARIABLE}=1 does."),
+        bool, typer.Option("--debug", help=f"Show the traceback of an error, as the variable {DEBUG_VARIABLE}=1 does.")
     ] = False,
 ) -> None:
     """EvoNav-Bench: lifelong navigation in homes that change. Begin with `evonav demo`."""

@@ -35,12 +35,8 @@ def _without_types(params: list[Any]) -> list[Any]:
         if getattr(param, "is_flag", False):
             param.metavar = ""
         elif param.param_type_name == "argument":
-            param.display_type_rich = _no_type
+            param.display_type_rich = lambda ctx: None
     return params
-
-
-def _no_type(ctx: Any) -> None:  # noqa: ANN401 - click's
-    """Stand for the type of an argument."""
 
 
 class Group(TyperGroup):

@@ -12,7 +12,5 @@ __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 ENV_ID = "evonav/LifelongNav-v0"
 
 gymnasium.register(
-    id=ENV_ID,
-    entry_point="evonav.gym.env:LifelongNavEnv",
-    vector_entry_point="evonav.gym.vector_env:VectorEnv",
+    id=ENV_ID, entry_point="evonav.gym.env:LifelongNavEnv", vector_entry_point="evonav.gym.vector_env:VectorEnv"
 )

@@ -94,12 +94,7 @@ def _cell_rows(run_dir: Path, name: str, cell: Mapping[str, Any]) -> list[SweepR
 
 
 def _row(
-    cell: str,
-    axes: Mapping[str, Any],
-    agent: str,
-    num_stages: int,
-    found: Mapping[str, Any],
-    counts: Mapping[str, int],
+    cell: str, axes: Mapping[str, Any], agent: str, num_stages: int, found: Mapping[str, Any], counts: Mapping[str, int]
 ) -> SweepRow:
     """Return a row with the rates in `found`, which is empty for a run without records."""
     return SweepRow(

@@ -1,6 +1,6 @@
 """Turn options and `--set KEY=VALUE` into settings; the keys are those of sweep files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -86,11 +86,7 @@ Prices = Annotated[
 ]
 MaxCost = Annotated[
     float | None,
-    typer.Option(
-        metavar="X",
-        rich_help_panel=MODEL_PANEL,
-        help="Largest cost in dollars; it needs --prices.",
-    ),
+    typer.Option(metavar="X", rich_help_panel=MODEL_PANEL, help="Largest cost in dollars; it needs --prices."),
 ]
 
 
@@ -166,14 +162,6 @@ def _print_keys(prefixes: Sequence[str]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(no_wrap=True)
-    for key, text in _described(prefixes):
-        table.add_row(Text(key), Text(text))
-    Console().print(table)
-
-
-def _described(prefixes: Sequence[str]) -> Iterator[tuple[str, str]]:
     from evonav.evaluation.run.settings import CommandSettings
     from evonav.tasks.records import descriptions
 
@@ -181,9 +169,12 @@ def _described(prefixes: Sequence[str]) -> Iterator[tuple[str, str]]:
     for name, field in CommandSettings.model_fields.items():
         if isinstance(field.annotation, type) and f"{name}." in PARTS.values():
             texts |= {f"{name}.{key}": text for key, text in descriptions(field.annotation).items()}
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True)
     for key in setting_keys(prefixes):
         if key not in FLAGS:
-            yield key, " ".join(texts.get(key, "").split())
+            table.add_row(Text(key), Text(" ".join(texts.get(key, "").split())))
+    Console().print(table)
 
 
 def usage_error(error: Exception) -> typer.BadParameter | None:

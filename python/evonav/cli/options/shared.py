@@ -50,8 +50,7 @@ RunTask = Annotated[
     typer.Option("--task", metavar="ID", help="Task of the run. Default: the one that best shows how agents differ."),
 ]
 Stages = Annotated[
-    list[str] | None,
-    typer.Option("--stage", metavar="N", help=f"Stage of the task. {_SEVERAL} Default: all."),
+    list[str] | None, typer.Option("--stage", metavar="N", help=f"Stage of the task. {_SEVERAL} Default: all.")
 ]
 Exchanges = Annotated[
     Path | None,
@@ -100,35 +99,19 @@ AssetFile = Annotated[
 StartOfHouses = Annotated[
     str,
     typer.Option(
-        "--start",
-        metavar="file|auto",
-        help="Start where a house has none: none (file), a free place (auto).",
+        "--start", metavar="file|auto", help="Start where a house has none: none (file), a free place (auto)."
     ),
 ]
 TASKS_HELP = "Folder of tasks, or bundled. Default: the bundled tasks."
-Tasks = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FOLDER",
-        help=TASKS_HELP,
-        autocompletion=completion.task_folders,
-    ),
-]
+Tasks = Annotated[Path | None, typer.Option(metavar="FOLDER", help=TASKS_HELP, autocompletion=completion.task_folders)]
 TaskFolder = Annotated[
-    Path | None,
-    typer.Argument(
-        metavar="FOLDER",
-        help=TASKS_HELP,
-        autocompletion=completion.task_folders,
-    ),
+    Path | None, typer.Argument(metavar="FOLDER", help=TASKS_HELP, autocompletion=completion.task_folders)
 ]
 Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="Take only the first N tasks or houses.")]
 Subset = Annotated[
     str | None,
     typer.Option(
-        metavar="SPLIT-N",
-        help="Take only a named subset, such as test-90.",
-        autocompletion=completion.subsets,
+        metavar="SPLIT-N", help="Take only a named subset, such as test-90.", autocompletion=completion.subsets
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of every random choice.")]
@@ -137,11 +120,7 @@ GeneratorFile = Annotated[
     typer.Option(metavar="FILE", help="TOML file with parameters of the task generator. Default: the paper's."),
 ]
 AnyAsset = Annotated[
-    bool,
-    typer.Option(
-        "--allow-unknown-assets",
-        help="Give missing assets the usual size of their category.",
-    ),
+    bool, typer.Option("--allow-unknown-assets", help="Give missing assets the usual size of their category.")
 ]
 Workers = Annotated[
     int | None,

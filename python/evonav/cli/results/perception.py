@@ -100,8 +100,5 @@ def perception(
             show_tables(perception_tables(shown, is_brief=True))
             typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
     if failures:
-        typer.echo(
-            f"incomplete: {counted(len(done), 'task')} done; run the same command again to resume",
-            err=True,
-        )
+        typer.echo(f"incomplete: {counted(len(done), 'task')} done; run the same command again to resume", err=True)
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -21,8 +21,7 @@ NUM_REPLAYS = 2
 def report(
     run: RunFolder,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder to write, or a Markdown file of --text. Default: RUN."),
+        Path | None, typer.Option(metavar="FOLDER", help="Folder to write, or a Markdown file of --text. Default: RUN.")
     ] = None,
     text: Annotated[
         bool, typer.Option("--text", help="Print the report's tables of metrics to the terminal; write no page.")

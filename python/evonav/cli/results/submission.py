@@ -65,10 +65,7 @@ def verify(
     tasks: Tasks = None,
     limit: Limit = None,
     subset: Subset = None,
-    scores_only: Annotated[
-        bool,
-        typer.Option("--scores-only", help=SCORES_ONLY_HELP),
-    ] = False,
+    scores_only: Annotated[bool, typer.Option("--scores-only", help=SCORES_ONLY_HELP)] = False,
     as_json: AsJson = False,
     workers: Workers = None,
 ) -> None:

@@ -40,10 +40,7 @@ from evonav.counted import counted
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run import Progress
 
-controlled_app = new_app(
-    "controlled",
-    help="Measure what a change costs: the same tasks, one difference.",
-)
+controlled_app = new_app("controlled", help="Measure what a change costs: the same tasks, one difference.")
 
 Directory = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Folder of the analysis, from `evonav controlled generate`.")
@@ -56,8 +53,7 @@ def generate(
         Path, typer.Option(metavar="FOLDER", help="Folder of the analysis; an unfinished analysis is resumed.")
     ],
     houses: Annotated[
-        Path,
-        typer.Option(metavar="HOUSES", help=f"Houses: {HOUSES}; or a folder of tasks, whose houses are used."),
+        Path, typer.Option(metavar="HOUSES", help=f"Houses: {HOUSES}; or a folder of tasks, whose houses are used.")
     ],
     rates: Annotated[
         str | None,

@@ -81,17 +81,13 @@ def evaluate(
     fail_fast: Annotated[
         bool,
         typer.Option(
-            "--fail-fast",
-            rich_help_panel=DEVELOP_PANEL,
-            help="Stop at the first errored stage with its traceback.",
+            "--fail-fast", rich_help_panel=DEVELOP_PANEL, help="Stop at the first errored stage with its traceback."
         ),
     ] = False,
     pdb: Annotated[
         bool,
         typer.Option(
-            "--pdb",
-            rich_help_panel=DEVELOP_PANEL,
-            help="Open the debugger where an agent raises, then stop.",
+            "--pdb", rich_help_panel=DEVELOP_PANEL, help="Open the debugger where an agent raises, then stop."
         ),
     ] = False,
     profile: Annotated[
@@ -120,6 +116,8 @@ def evaluate(
     given |= {"decision.model": model, "decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
     run = settings_from(given, set_)
     if profile:
+        from evonav.report.profile import profiling, write_profile
+
         run = profiled(run)
     if pdb:
         from evonav.evaluation.hosting.agent import check_terminal
@@ -141,7 +139,8 @@ def evaluate(
     if dry_run:
         print_estimate(run, names, task_files, config, run.num_workers)
         return
-    with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling(out, profile):
+    sampling = profiling(out) if profile else nullcontext()
+    with running(out, config, has_bar=not pdb) as show, stopping_early(out), sampling:
         (summaries,) = evaluate_all(
             [Evaluation(tuple(names), tuple(task_files), out, config)],
             workforce,
@@ -151,7 +150,9 @@ def evaluate(
         )
     print_results(out, summaries)
     if profile:
-        print_profile(out)
+        tables, flame_graph = write_profile(out)
+        show_tables(tables)
+        typer.echo(f"flame graph, for https://www.speedscope.app: {flame_graph}")
     exit_if_incomplete(summaries)
 
 
@@ -250,24 +251,6 @@ def profiled(run: "CommandSettings") -> "CommandSettings":
     if (run.episodes_at_once or 1) > 1:
         raise typer.BadParameter("--profile samples one thread of each worker: use --set episodes_at_once=1")
     return run.model_copy(update={"isolation": run.isolation or "process", "episodes_at_once": 1})
-
-
-def sampling(out: Path, is_profiled: bool) -> "AbstractContextManager[None]":
-    """Return what samples the processes of a run that is profiled."""
-    if not is_profiled:
-        return nullcontext()
-    from evonav.report.profile import profiling  # builds tables: the command must start fast
-
-    return profiling(out)
-
-
-def print_profile(out: Path) -> None:
-    """Write the profile of a run, and print its tables."""
-    from evonav.report.profile import write_profile
-
-    tables, flame_graph = write_profile(out)
-    show_tables(tables)
-    typer.echo(f"flame graph, for https://www.speedscope.app: {flame_graph}")
 
 
 def exit_if_incomplete(summaries: "list[AgentSummary]") -> None:

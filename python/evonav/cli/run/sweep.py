@@ -1,5 +1,6 @@
 """`evonav sweep`: run many evaluations from one file."""
 
+import json
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -54,7 +55,9 @@ def sweep(
     OUT/runs. Also writes summary.json, .csv and .md.
     """
     if schema:
-        _print_schema()
+        from evonav.sweeps.file import sweep_schema
+
+        typer.echo(json.dumps(sweep_schema(), indent=2))
         return
     if file is None:
         raise typer.BadParameter("name a sweep file, such as examples/sweeps/noise.toml")
@@ -186,11 +189,3 @@ def _print_plan(
         typer.echo("no prices: name a file of prices in the sweep file, such as prices = 'prices.json'")
     if settings.max_cost is not None and total_usd > settings.max_cost:
         typer.echo(f"more than max_cost = {settings.max_cost:g}: stages beyond it would end as errored")
-
-
-def _print_schema() -> None:
-    import json
-
-    from evonav.sweeps.file import sweep_schema
-
-    typer.echo(json.dumps(sweep_schema(), indent=2))

@@ -139,8 +139,7 @@ def subset(
         ),
     ],
     name: Annotated[
-        str,
-        typer.Argument(metavar="SPLIT-N", help="Subset, such as test-90.", autocompletion=completion.subsets),
+        str, typer.Argument(metavar="SPLIT-N", help="Subset, such as test-90.", autocompletion=completion.subsets)
     ],
     out: Annotated[
         Path | None,

@@ -144,8 +144,7 @@ def check_houses(
 @houses_app.command(name="make", cls=Command)
 def make(
     out: Annotated[
-        Path,
-        typer.Option(metavar="FILE", help="File of the houses, .jsonl or .jsonl.gz; a part is resumed."),
+        Path, typer.Option(metavar="FILE", help="File of the houses, .jsonl or .jsonl.gz; a part is resumed.")
     ],
     count: Annotated[int, typer.Option(min=1, metavar="N", help="Number of houses.")] = 100,
     seed: Seed = 0,
