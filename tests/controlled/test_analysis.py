@@ -15,7 +15,7 @@ from evonav.controlled.page import controlled_plots, write_controlled_report
 from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records.changes import TransitionRecord
+from evonav.evaluation.records.schema import TransitionRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import compare
 from evonav.report.compare.selection import read_compared_agents

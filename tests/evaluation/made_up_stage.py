@@ -1,24 +1,24 @@
 """Records made up by hand for tests of measures. Never results."""
 
-from evonav.evaluation.records.changes import TransitionRecord
+from evonav.agents.agent import NavigateTo
 from evonav.evaluation.records.schema import (
-    ActionRecord,
     EndState,
     EntryRecord,
     ErrorKind,
     GoalRecord,
-    PoseRecord,
     RoundRecord,
     StageError,
     StageRecord,
     TargetRecord,
+    TransitionRecord,
 )
+from evonav.world.pose import Pose
 
 TARGET_M = (5.0, 0.8, 1.0)
 
 
 def pose(x_m, z_m=1.0):
-    return PoseRecord(x_m=x_m, y_m=0.9, z_m=z_m, yaw_rad=0.0, horizon_rad=0.0)
+    return Pose(x_m, 0.9, z_m, 0.0, 0.0)
 
 
 def entry(label="Mug", centre_m=TARGET_M, entry_id=7, *, is_stale=False):
@@ -33,7 +33,7 @@ def taken(number, chosen=None, *, step_m=0.5, is_target_visible=False, counters=
     return RoundRecord(
         round=number,
         pose=pose(x_m),
-        action=ActionRecord(kind="navigate_to", position_m=(9.0, 1.0)),
+        action=NavigateTo((9.0, 1.0)),
         path_m=((x_m, 1.0), (x_m + step_m, 1.0)),
         is_action_success=is_action_success,
         is_target_visible=is_target_visible,

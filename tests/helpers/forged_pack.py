@@ -76,7 +76,7 @@ def rescored(row: dict[str, Any]) -> None:
         "num_rounds": len(record.trace),
         "num_target_visible_rounds": sum(part.is_target_visible for part in record.trace),
         "has_stopped": record.trace[-1].action.kind == "stop",
-        "stop_reason": record.trace[-1].action.reason or "",
+        "stop_reason": getattr(record.trace[-1].action, "reason", ""),
         "path_length_m": length_m,
         "start_distance_m": score.start_distance_m,
         "terminal_distance_m": score.terminal_distance_m,

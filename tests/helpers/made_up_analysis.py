@@ -3,9 +3,8 @@
 from made_up_run import OLD_TABLE_M, entry, floor_plan, stage_record
 
 from evonav.controlled.layout import Arm, ControlledOptions, ControlledRecord, run_of, write_controlled
-from evonav.evaluation.records.changes import TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
-from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.schema import EndState, TransitionRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.tasks.dataset import SourceFile
 

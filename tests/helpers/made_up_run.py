@@ -3,23 +3,24 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from evonav.agents.agent import NavigateTo, Stop
 from evonav.drawing.plan import ObjectFootprint, OpeningFootprint, RoomFootprint
-from evonav.evaluation.records.changes import Relocation, TransitionRecord
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import (
-    ActionRecord,
     EndState,
     EntryRecord,
     ErrorKind,
     GoalRecord,
-    PoseRecord,
+    Relocation,
     RoundRecord,
     StageError,
     StageRecord,
     TargetRecord,
+    TransitionRecord,
 )
 from evonav.evaluation.records.store import RunStore
+from evonav.world.pose import Pose
 
 WriteRun = Callable[..., Path]
 
@@ -27,8 +28,8 @@ OLD_TABLE_M = (2.0, 0.4, 2.0)
 NEW_TABLE_M = (7.0, 0.4, 3.0)
 
 
-def pose(x_m: float, z_m: float) -> PoseRecord:
-    return PoseRecord(x_m=x_m, y_m=0.9, z_m=z_m, yaw_rad=0.5, horizon_rad=0.0)
+def pose(x_m: float, z_m: float) -> Pose:
+    return Pose(x_m, 0.9, z_m, 0.5, 0.0)
 
 
 def box(object_id: str, category: str, centre_m: tuple[float, float, float], x_m: float, z_m: float) -> ObjectFootprint:
@@ -82,9 +83,7 @@ def rounds(num: int, chosen: EntryRecord | None, *, has_stopped: bool) -> tuple[
         RoundRecord(
             round=i,
             pose=pose(1.0 + i, 1.0),
-            action=ActionRecord(kind="stop", reason="arrived")
-            if has_stopped and i == num - 1
-            else ActionRecord(kind="navigate_to", position_m=(2.0 + i, 1.0)),
+            action=Stop() if has_stopped and i == num - 1 else NavigateTo((2.0 + i, 1.0)),
             path_m=((1.0 + i, 1.0),) if has_stopped and i == num - 1 else ((1.0 + i, 1.0), (2.0 + i, 1.0)),
             is_action_success=True,
             is_target_visible=False,

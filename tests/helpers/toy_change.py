@@ -6,7 +6,7 @@ from dataclasses import replace
 from toy_house import OBJECTS, stage_case
 
 from evonav.evaluation.episode.spec import HouseChange
-from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
+from evonav.evaluation.records.schema import ChangeDuringStage, Relocation, TransitionRecord
 
 
 def changing_stage(stage, target_id, at_round, moves, **options):

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
-from evonav.evaluation.records.changes import Relocation, TransitionRecord
-from evonav.evaluation.records.schema import TargetRecord
+from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
 from evonav.tasks.public import Goal
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig

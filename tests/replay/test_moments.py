@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 from made_up_run import NEW_TABLE_M, OLD_TABLE_M, box, floor_plan, stage_record
 
-from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
 from evonav.evaluation.records.floor_plans import FloorPlan
-from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.records.schema import ChangeDuringStage, EndState, Relocation, StageRecord, TransitionRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.types import ReplayedRound, ReplayedStage
 from evonav.replay.video_frames import episode_frame, stage_frames

@@ -113,7 +113,7 @@ def _trail(stage: ReplayedStage, step: ReplayedRound, unit: float) -> str:
             pieces.append(f'<path class="{css}" stroke-width="{width * unit:.1f}" d="{path}"/>')
         if one is step:
             break
-    if step.record is None or step.record.action.position_m is None:
+    if step.record is None or step.record.action.kind != "navigate_to":
         return join(pieces)
     places = step.record.path_m or ((step.pose.x_m, step.pose.z_m),)
     goal = cm(step.record.action.position_m)

@@ -166,18 +166,19 @@ class _Rounds:
 
     def _decision(self, record: RoundRecord) -> dict[str, Any]:
         action = record.action
-        verbs = {"navigate_to": "go to", "stop": "stop", "move": (action.action or "").lower().replace("_", " ")}
         found: dict[str, Any] = {
-            "action": verbs[action.kind],
+            "action": "stop",
             "choice": describe_choice(record),
             "path": polyline(simplified([cm(point) for point in record.path_m])),
             "len": round(sum(math.dist(a, b) for a, b in pairwise(record.path_m)), 3),
             "seen": record.is_target_visible,
             "n": [record.num_entries, record.num_frontiers],
         }
-        if action.position_m is not None:
-            found["to"] = list(cm(action.position_m))
-        if action.reason:
+        if action.kind == "navigate_to":
+            found |= {"action": "go to", "to": list(cm(action.position_m))}
+        elif action.kind == "move":
+            found["action"] = action.action.value.lower().replace("_", " ")
+        elif action.reason:
             found["why"] = describe_reason(action.reason)
         if not record.is_action_success:
             found["failed"] = True

@@ -22,7 +22,6 @@ from evonav.evaluation.episode.observer import EpisodeObserver
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.staleness import entry_record, matched_object
 from evonav.evaluation.hosting.process import AgentFailedError
-from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.replay.types import (
@@ -128,10 +127,10 @@ class Recorder(EpisodeObserver):
             assert rgb is not None
             jpeg = jpeg_of(rgb, heading_px if is_heading else side_px, quality)
             depth = depth_png(view.depth_m) if self._keeps_depth else None
-            views.append(ReplayedView(pose_record(view.pose), jpeg, depth))
+            views.append(ReplayedView(view.pose, jpeg, depth))
             width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
             self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
-        self._pending = ReplayedRound(None, pose_record(observation.pose), tuple(views))
+        self._pending = ReplayedRound(None, observation.pose, tuple(views))
         self._lose(len(self._rounds))
 
     def _lose(self, num_rounds: int) -> None:

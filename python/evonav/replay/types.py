@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from evonav.agents.agent import PlaceBelief
 from evonav.agents.explanation import FrontierBelief
 from evonav.evaluation.records.floor_plans import FloorPlan
-from evonav.evaluation.records.schema import EntryRecord, PoseRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.schema import EntryRecord, RoundRecord, StageRecord
 from evonav.points import Point2, Point3
+from evonav.world.pose import Pose
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `ReplayedMap.cells`; explored cells are free ones that were seen from close by."""
@@ -43,7 +44,7 @@ class ReplayedEntry:
 class ReplayedView:
     """Colour image of one camera in a round."""
 
-    pose: PoseRecord
+    pose: Pose
     """The camera's, as the agent was given it."""
     jpeg: bytes
     depth_png: bytes | None = None
@@ -82,7 +83,7 @@ class ReplayedRound:
 
     record: RoundRecord | None
     """`None` when the stage errored in this round."""
-    pose: PoseRecord
+    pose: Pose
     """Pose of the agent when it observed."""
     views: tuple[ReplayedView, ...]
     """The heading view last."""

@@ -197,7 +197,9 @@ def _reason(record: RoundRecord | None) -> str:
     """Return the reason of a round in plain words; empty where the agent gives none."""
     if record is None:
         return ""
-    reason = record.action.reason or record.details.get("reason")
+    reason = record.details.get("reason")
+    if record.action.kind == "stop":
+        reason = record.action.reason or reason
     return describe_reason(reason) if isinstance(reason, str) else ""
 
 

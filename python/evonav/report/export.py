@@ -95,7 +95,7 @@ def round_table(run_dir: Path, agents: Sequence[str] | None = None) -> Iterator[
 
 
 def _target(one: RoundRecord) -> tuple[float | None, float | None]:
-    return one.action.position_m or (None, None)
+    return one.action.position_m if one.action.kind == "navigate_to" else (None, None)
 
 
 def _chosen(one: RoundRecord, field: str) -> Any:  # noqa: ANN401 - a field of the entry

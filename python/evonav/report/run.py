@@ -13,9 +13,8 @@ from evonav.evaluation.agent_order import agents_in_order
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.metrics.stage_rows import read_stage_metrics
-from evonav.evaluation.records.base import BeliefRecord
 from evonav.evaluation.records.floor_plans import FloorPlan
-from evonav.evaluation.records.schema import EndState, StageError, StageRecord
+from evonav.evaluation.records.schema import BeliefRecord, EndState, StageError, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.points import Point3
 from evonav.report.maps.stage_map import success_radius_of

@@ -14,9 +14,9 @@ from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
 from evonav.evaluation.episode.stage_house import changed_ids
 from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.convert import pose_record, sensor_config
-from evonav.evaluation.records.schema import EndState, PoseRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.schema import EndState, RoundRecord, StageRecord
 from evonav.points import Point2, Point3
+from evonav.world.pose import Pose
 
 TOLERANCE = 1e-9
 """Allowed difference of a claimed score, since other machines may round sums differently."""
@@ -36,7 +36,7 @@ def target_findings(record: StageRecord, spec: EpisodeSpec) -> Iterator[str]:
             yield f"{name} is another than the task's"
     if (record.state is EndState.GUIDED) != (stage.guided is not None):
         yield f"it is {record.state.value}, the task's stage is {'not ' if stage.guided is None else ''}guided"
-    if record.stage == 1 and record.requested_start != pose_record(spec.start):
+    if record.stage == 1 and record.requested_start != spec.start:
         yield "requested_start is another than the task's"
 
 
@@ -54,7 +54,7 @@ def change_findings(record: StageRecord, stage: StageSpec, protocol: ProtocolCon
         return
     due = None
     if record.sensing is not None and stage.guided is None:
-        due = protocol.step_of_round(planned.round, sensor_config(record.sensing))
+        due = protocol.step_of_round(planned.round, record.sensing)
     is_due = due is not None and due < len(record.trace)
     if found.at_round != (due if is_due else None):
         yield f"during.at_round is {found.at_round}, the task's round gives {due if is_due else None}"
@@ -112,7 +112,7 @@ def path_findings(record: StageRecord, before: StageRecord | None, protocol: Pro
 def _round_findings(record: StageRecord, protocol: ProtocolConfig) -> Iterator[str]:
     """Yield what the protocol does not allow in the rounds."""
     assert record.sensing is not None  # checked by the caller
-    trace, sensors = record.trace, sensor_config(record.sensing)
+    trace, sensors = record.trace, record.sensing
     try:
         protocol.check(sensors)
     except InvalidArgumentError as error:
@@ -157,7 +157,7 @@ def _score_findings(record: StageRecord, start_m: Point2, end_m: Point2, protoco
         "num_rounds": len(trace),
         "num_target_visible_rounds": sum(entry.is_target_visible for entry in trace),
         "has_stopped": last.kind == "stop",
-        "stop_reason": last.reason or "" if last.kind == "stop" else "",
+        "stop_reason": last.reason if last.kind == "stop" else "",
         "state": EndState.SUCCESS if score.is_success else EndState.FAILURE,
         "path_length_m": length_m,
         "start_distance_m": score.start_distance_m,
@@ -182,7 +182,7 @@ def _length_m(entry: RoundRecord) -> float:
     return polyline_length_m(entry.path_m)
 
 
-def _gap_m(pose: PoseRecord, other: PoseRecord) -> float:
+def _gap_m(pose: Pose, other: Pose) -> float:
     return math.dist(_place(pose), _place(other))
 
 
@@ -190,5 +190,5 @@ def _on_ground(point_m: Point3) -> Point2:
     return (point_m[0], point_m[2])
 
 
-def _place(pose: PoseRecord) -> Point2:
+def _place(pose: Pose) -> Point2:
     return (pose.x_m, pose.z_m)

@@ -6,6 +6,7 @@ paths, visibility, staleness, distances, SPL and success again.
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,7 @@ import numpy as np
 from evonav.agents.agent import (
     AgentAction,
     EntryBelief,
-    Move,
-    NavigateTo,
     SensorConfig,
-    Stop,
 )
 from evonav.agents.explanation import Explanation
 from evonav.component import Component
@@ -24,14 +22,13 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.convert import sensor_config
 from evonav.evaluation.records.record_diff import record_differences
-from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
+from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.perception import Percept, StageScene
 from evonav.sensors.observation import Detections, Observation
 from evonav.tasks.public import Goal, TaskInfo
-from evonav.world.simulator import Action, Frame, Simulator
+from evonav.world.simulator import Frame, Simulator
 
 
 class RecordedAgent:
@@ -55,7 +52,7 @@ class RecordedAgent:
         self._num_acted = 0
         if self._record.sensing is None:
             raise InvalidArgumentError(f"{self._record.task_id} stage {goal.stage}: the record has no `sensing`")
-        self.sensors = sensor_config(self._record.sensing)
+        self.sensors = replace(self._record.sensing, needs_rgb=False)  # nobody looks
 
     def act(self, observation: Observation) -> AgentAction:
         """Return the recorded action of this round."""
@@ -63,7 +60,7 @@ class RecordedAgent:
         if self._num_acted == len(trace):
             raise InvalidArgumentError(f"the record ends after {len(trace)} rounds, without a stop or the budget's end")
         self._num_acted += 1
-        return _action_of(trace[self._num_acted - 1].action)
+        return trace[self._num_acted - 1].action
 
     def _explanation(self) -> Explanation:
         """Return the recorded explanation of the round, with the entries at the stage's end."""
@@ -73,7 +70,7 @@ class RecordedAgent:
         return Explanation(
             objects=self._entries,
             choice=recorded.choice,
-            chosen_entry=None if recorded.chosen_entry is None else _belief_of(recorded.chosen_entry),
+            chosen_entry=recorded.chosen_entry,
             num_entries=recorded.num_entries,
             num_frontiers=recorded.num_frontiers,
             counters=recorded.counters,
@@ -81,7 +78,7 @@ class RecordedAgent:
         )
 
     def _entries(self) -> Sequence[EntryBelief]:
-        return [_belief_of(entry) for entry in self._here.entries]
+        return self._here.entries
 
     @property
     def _here(self) -> StageRecord:
@@ -131,10 +128,9 @@ def rescore(
 
 
 def _checkable(record: StageRecord) -> str:
-    """Return a record without the fields that depend on the agent's memory between rounds, which is not recorded."""
-    return record.model_copy(
-        update={"memory_at_start": None, "num_forgotten": None, "stale_entries": (), "moved_objects": ()}
-    ).model_dump_json()
+    """Return a record without what is not carried out: the agent's memory between rounds, which is not recorded."""
+    left_out = dict.fromkeys(("sensing", "memory_at_start", "belief_at_start", "num_forgotten"))
+    return record.model_copy(update={**left_out, "stale_entries": (), "moved_objects": ()}).model_dump_json()
 
 
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
@@ -155,21 +151,3 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
         return json.dumps([[stage, list(differences)] for stage, differences in found if differences])
 
     return answer
-
-
-def _action_of(recorded: ActionRecord) -> AgentAction:
-    if recorded.kind == "navigate_to" and recorded.position_m is not None:
-        return NavigateTo(recorded.position_m, recorded.face_m)
-    if recorded.kind == "move" and recorded.action is not None:
-        return Move(Action(recorded.action))
-    return Stop(recorded.reason or "")
-
-
-def _belief_of(entry: EntryRecord) -> EntryBelief:
-    return EntryBelief(
-        entry_id=entry.entry_id,
-        label=entry.label,
-        centre_m=entry.centre_m,
-        size_m=entry.size_m,
-        num_detections=entry.num_detections,
-    )

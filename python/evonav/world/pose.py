@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 from evonav.points import Point3, Real
 
@@ -21,6 +22,8 @@ class Pose:
         >>> pose.position_m, pose.yaw_deg
         ((1.0, 0.9, 2.0), 90.0)
     """
+
+    __pydantic_config__: ClassVar = {"strict": True, "extra": "forbid", "revalidate_instances": "always"}
 
     x_m: Real
     y_m: Real

@@ -11,7 +11,7 @@ from evonav.evaluation.episode.staleness import (
     matched_objects,
     shows_place,
 )
-from evonav.evaluation.records.changes import Relocation
+from evonav.evaluation.records.schema import Relocation
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
 

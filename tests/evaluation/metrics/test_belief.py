@@ -16,7 +16,6 @@ from evonav.agents.hosting import wire
 from evonav.agents.proactive.agent import Proactive
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.belief import MIN_P, belief_summary, calibration, place_score
-from evonav.evaluation.records.base import PlacesRecord
 from evonav.evaluation.records.schema import StageRecord
 
 PLACES = PlaceBelief(0.5, ((0.25, 0.25), (0.75, 0.25), (5.25, 0.25)), (0.5, 0.2, 0.2))
@@ -61,16 +60,15 @@ def test_an_impossible_presence_is_refused(p):
 
 
 def test_the_place_of_the_target_is_scored():
-    record = PlacesRecord(cell_m=0.5, centres_m=PLACES.centres_m, probabilities=PLACES.probabilities)
-    score = place_score(record, (0.8, 0.3), 2.0)
+    score = place_score(PLACES, (0.8, 0.3), 2.0)
     assert score.p_near == pytest.approx(0.7)
     assert score.rank == 2  # one square is likelier; the other one is just as likely
     assert score.brier == pytest.approx(0.25 + 0.04 + 0.04 + 0.01 - 2 * 0.2 + 1.0)
     assert (score.top, score.is_top_right) == (pytest.approx(0.7), True)
-    elsewhere = place_score(record, (9.0, 9.0), 2.0)
+    elsewhere = place_score(PLACES, (9.0, 9.0), 2.0)
     assert (elsewhere.p_near, elsewhere.rank, elsewhere.is_top_right) == (0.0, 4, False)
     assert elsewhere.brier == pytest.approx(0.25 + 0.04 + 0.04 + 0.01 - 2 * 0.1 + 1.0)
-    sure = place_score(PlacesRecord(cell_m=0.5, centres_m=((0.25, 0.25),), probabilities=(1.0,)), (0.3, 0.3), 2.0)
+    sure = place_score(PlaceBelief(cell_m=0.5, centres_m=((0.25, 0.25),), probabilities=(1.0,)), (0.3, 0.3), 2.0)
     assert (sure.p_near, sure.brier, sure.rank) == (1.0, 0.0, 1)
 
 
@@ -99,7 +97,7 @@ def test_the_largest_mass_is_that_of_a_plain_search(cells, radius_m, corner_m):
     ]
     top, middle_m = max(plain, default=(0.0, (1e9, 1e9)))
     target_m = (corner_m + 0.3, 0.7 - corner_m)
-    score = place_score(PlacesRecord(cell_m=0.5, centres_m=centres_m, probabilities=probabilities), target_m, radius_m)
+    score = place_score(PlaceBelief(cell_m=0.5, centres_m=centres_m, probabilities=probabilities), target_m, radius_m)
     assert score.top == min(top, 1.0)
     assert score.is_top_right == (math.dist(middle_m, target_m) < radius_m)
 

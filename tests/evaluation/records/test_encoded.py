@@ -1,6 +1,7 @@
 """A finished stage is validated and encoded once."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from made_up_stage import made_up_record, taken
@@ -35,12 +36,9 @@ def test_a_record_that_was_copied_with_invalid_parts_is_refused():
 
 def test_a_round_is_validated_once_when_it_is_made():
     one = taken(0)
-    for wrong in ({"round": 2**63}, {"pose": dict(one.pose) | {"x_m": 2e9}}, {"path_m": ((0.0, "north"),)}):
+    for wrong in ({"round": 2**63}, {"pose": replace(one.pose, x_m=2e9)}, {"path_m": ((0.0, "north"),)}):
         with pytest.raises(ValidationError):
             RoundRecord.model_validate(dict(one) | wrong)
-        with pytest.raises(ValidationError):
-            one.model_copy(update=wrong)
-    assert one.model_copy(update={"round": 7}).round == 7
     assert StageRecord.model_validate(made_up_record(stage=2, trace=(one,))).trace[0] is one
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from evonav.agents.agent import Agent
+from evonav.agents.agent import Agent, AgentAction, Move, NavigateTo, Stop
 from evonav.agents.hosting.error_text import describe
 from evonav.agents.hosting.serving import refuse_in_agent_process
 from evonav.agents.registry import agent_factory, import_name, needed_arguments, new_agent
@@ -226,6 +226,11 @@ def _difference(first: Iterable[StageRecord], second: Iterable[StageRecord]) -> 
     return None
 
 
-def _shown(action: Any) -> str:  # noqa: ANN401 - `ActionRecord`
-    details = action.position_m or action.action or action.reason or ""
-    return f"{action.kind} {details}".strip()
+def _shown(action: AgentAction) -> str:
+    match action:
+        case NavigateTo(place_m):
+            return f"navigate_to {place_m}"
+        case Move(step):
+            return f"move {step.value}"
+        case Stop(reason):
+            return f"stop {reason}".strip()

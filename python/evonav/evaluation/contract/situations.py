@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from evonav.agents.agent import Agent
+from evonav.agents.agent import Agent, NavigateTo
 from evonav.counted import counted
 from evonav.evaluation.contract.points import Check
 from evonav.evaluation.episode import motion
@@ -22,8 +22,7 @@ from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, StageSpec
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.changes import TransitionRecord
-from evonav.evaluation.records.schema import StageRecord, TargetRecord
+from evonav.evaluation.records.schema import StageRecord, TargetRecord, TransitionRecord
 from evonav.evaluation.run.components import Backend
 from evonav.house import House
 from evonav.perception import Percept, Perception
@@ -227,7 +226,7 @@ def _not_near(target: TargetRecord) -> Callable[[StageRecord], str | None]:
     place = (target.position_m[0], target.position_m[2])
 
     def missing(record: StageRecord) -> str | None:
-        goals = [entry.action.position_m for entry in record.trace if entry.action.position_m is not None]
+        goals = [entry.action.position_m for entry in record.trace if isinstance(entry.action, NavigateTo)]
         if any(dist(goal, place) <= NEAR_M for goal in goals):
             return None
         if not goals and not record.has_stopped:

@@ -8,10 +8,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
 from evonav.evaluation.records.floor_plans import FloorPlan, floor_plan_of, image_uri
 from evonav.evaluation.records.oracle import during_record, target_record, transition_record
-from evonav.evaluation.records.schema import EndState, GoalRecord, StageRecord, TargetRecord
+from evonav.evaluation.records.schema import (
+    ChangeDuringStage,
+    EndState,
+    GoalRecord,
+    StageRecord,
+    TargetRecord,
+    TransitionRecord,
+)
 from evonav.house import House
 from evonav.points import Point2, Point3
 from evonav.tasks import Task

@@ -17,10 +17,8 @@ from evonav.evaluation.episode.stage_house import StageHouse
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.base import BeliefRecord
-from evonav.evaluation.records.convert import action_record, pose_record, sensing_record, with_places
 from evonav.evaluation.records.costs import Stopwatch
-from evonav.evaluation.records.schema import EndState, ErrorKind, MemoryRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.schema import BeliefRecord, EndState, ErrorKind, MemoryRecord, RoundRecord, StageRecord
 from evonav.perception import Perception, StageScene
 from evonav.points import Point2
 from evonav.sensors.observation import Observation
@@ -125,8 +123,8 @@ class Stage:
         is_in_room = self._house.is_in_room(self._requested, self._record.transition.room_id)
         self._record = self._record.model_copy(
             update={
-                "requested_start": pose_record(self._requested),
-                "effective_start": pose_record(start),
+                "requested_start": self._requested,
+                "effective_start": start,
                 "is_snapped": is_snapped,
                 "transition": self._record.transition.model_copy(update={"is_agent_in_room": is_in_room}),
             }
@@ -145,7 +143,7 @@ class Stage:
                 beliefs = self._entries()
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
         self._belief_at_start = self._staleness.presence(beliefs or ())
-        self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensor_config)})
+        self._record = self._record.model_copy(update={"sensing": self._sensor_config})
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensors are held for the stage."""
@@ -240,7 +238,7 @@ class Stage:
         self._rounds(progress, follow, is_guided=True)
         end = self._simulator.pose
         return self._with_memory(self._with_trace(self._record)).model_copy(
-            update={"state": EndState.GUIDED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
+            update={"state": EndState.GUIDED, "terminal": end, "path_length_m": progress.path_length_m}
         )
 
     def _change_house(self, number: int, progress: StageProgress, sensors: Sensors) -> None:
@@ -300,12 +298,13 @@ class Stage:
         with AttributedErrors(ErrorKind.AGENT):
             diagnostics, bodies = self._agent.diagnostics(), self._staleness.bodies
             chosen = diagnostics.chosen_entry
-            if number == 0:
-                self._belief_at_start = with_places(self._belief_at_start, diagnostics.places)
+            if number == 0 and diagnostics.places is not None:
+                belief = self._belief_at_start or BeliefRecord()
+                self._belief_at_start = belief.model_copy(update={"places": diagnostics.places})
             return RoundRecord(
                 round=number,
-                pose=pose_record(pose),
-                action=action_record(action),
+                pose=pose,
+                action=action,
                 path_m=done.path_m,
                 is_action_success=done.is_success,
                 is_target_visible=self._staleness.is_target_visible,
@@ -326,7 +325,7 @@ class Stage:
         record = self._with_memory(self._with_trace(self._record)).model_copy(
             update={
                 "state": EndState.SUCCESS if score.is_success else EndState.FAILURE,
-                "terminal": pose_record(end),
+                "terminal": end,
                 "has_stopped": stop_reason is not None,
                 "stop_reason": stop_reason or "",
                 "start_distance_m": score.start_distance_m,

@@ -8,7 +8,7 @@ from evonav.errors import SimulationError
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.changes import ChangeDuringStage
+from evonav.evaluation.records.schema import ChangeDuringStage
 from evonav.points import Point2, Point3
 from evonav.world.embedded import core_of
 from evonav.world.pose import Pose

@@ -17,9 +17,14 @@ import numpy as np
 
 from evonav import _core
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.records.base import BeliefRecord
-from evonav.evaluation.records.changes import Relocation
-from evonav.evaluation.records.schema import EntryRecord, MemoryRecord, MovedObjectRecord, StaleEntryRecord
+from evonav.evaluation.records.schema import (
+    BeliefRecord,
+    EntryRecord,
+    MemoryRecord,
+    MovedObjectRecord,
+    Relocation,
+    StaleEntryRecord,
+)
 from evonav.points import Point3
 from evonav.tasks.language import STRUCTURE_TYPES
 from evonav.world.camera import project
@@ -67,13 +72,15 @@ def matched_objects(
 
 def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]]) -> EntryRecord:
     """Return an entry for the record, with the evaluator's judgement whether it is stale."""
+    is_stale = matched_object(belief.label, belief.centre_m, bodies) is None
     return EntryRecord(
-        entry_id=belief.entry_id,
-        label=belief.label,
-        centre_m=belief.centre_m,
-        size_m=belief.size_m,
-        num_detections=belief.num_detections,
-        is_stale=matched_object(belief.label, belief.centre_m, bodies) is None,
+        belief.entry_id,
+        belief.label,
+        belief.centre_m,
+        belief.size_m,
+        belief.num_detections,
+        belief.p_present,
+        is_stale=is_stale,
     )
 
 

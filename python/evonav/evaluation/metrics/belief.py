@@ -7,7 +7,8 @@ from statistics import median
 
 import numpy as np
 
-from evonav.evaluation.records.base import BeliefRecord, PlacesRecord
+from evonav.agents.agent import PlaceBelief
+from evonav.evaluation.records.schema import BeliefRecord
 from evonav.points import Point2, Point3
 
 NUM_BINS = 10
@@ -48,7 +49,7 @@ class Calibration:
     """Expected calibration error: mean gap between probability and share of truths, over `NUM_BINS` bins by size."""
 
 
-def place_score(places: PlacesRecord, target_m: Point2, radius_m: float) -> PlaceScore:
+def place_score(places: PlaceBelief, target_m: Point2, radius_m: float) -> PlaceScore:
     """Score a belief about places.
 
     Args:

@@ -1,16 +1,17 @@
 """Compute the metrics of a stage from its record (defined in docs/metrics.md): a flat row."""
 
-import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from itertools import groupby
+from itertools import accumulate, compress, groupby
+
+from pydantic_core import to_json
 
 from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.failure_causes import cause_of
 from evonav.evaluation.metrics.scoring import stage_spl
 from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.schema import EndState, MemoryRecord, StageRecord
 from evonav.tasks.language import STRUCTURE_TYPES
 
 STRICT_RADIUS_M = 1.0
@@ -177,7 +178,7 @@ def encode_metrics(record: StageRecord) -> str:
         | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
         "is_fresh": record.stage == 1 or record.memory_lost_at == record.stage,
     }
-    return json.dumps(values, separators=(",", ":"), allow_nan=False)
+    return to_json(values, inf_nan_mode="constants").decode()
 
 
 def metrics_of(record: StageRecord) -> RecordMetrics:
@@ -188,8 +189,10 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
     """
     is_success = record.state is EndState.SUCCESS if record.is_scored else None
     cause = cause_of(record)
-    travelled_m = _travelled_m(record.trace)
-    visits = [list(group) for (_, is_stale), group in groupby(record.trace, key=_chosen) if is_stale]
+    lengths_m = [math.fsum(map(math.dist, taken.path_m, taken.path_m[1:])) for taken in record.trace]
+    travelled_m = list(accumulate(lengths_m, initial=0.0))  # before each round
+    chosen = [None if (entry := one.chosen_entry) is None else (entry.entry_id, entry.is_stale) for one in record.trace]
+    went_to_stale = [one is not None and one[1] for one in chosen]
     start, end = record.memory_at_start, record.memory_at_end
     has_memory = end is not None
     cleared = [(e.evident_round, e.cleared_round) for e in record.stale_entries]
@@ -216,9 +219,9 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         ring_spl=_ring_spl(record),
         first_target_visible_round=next((r.round for r in record.trace if r.is_target_visible), None),
         num_failed_actions=sum(not taken.is_action_success for taken in record.trace),
-        num_stale_visits=len(visits),
-        num_stale_rounds=sum(map(len, visits)),
-        stale_path_m=math.fsum(_length_m(taken) for visit in visits for taken in visit),
+        num_stale_visits=sum(one is not None and one[1] for one, _ in groupby(chosen)),
+        num_stale_rounds=sum(went_to_stale),
+        stale_path_m=math.fsum(compress(lengths_m, went_to_stale)),
         num_stale_at_start=len(record.stale_entries) if has_memory else None,
         num_stale_evident=sum(evident is not None for evident, _ in cleared) if has_memory else None,
         num_stale_cleared=sum(gone is not None for _, gone in cleared) if has_memory else None,
@@ -251,23 +254,6 @@ def _spl_after_change(record: StageRecord) -> float | None:
         return None
     path_m = max(0.0, record.path_length_m - (during.path_before_m or 0.0))
     return stage_spl(record.state is EndState.SUCCESS, path_m, during.reference_after_m)
-
-
-def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:
-    entry = taken.chosen_entry
-    return (None, False) if entry is None else (entry.entry_id, entry.is_stale)
-
-
-def _length_m(taken: RoundRecord) -> float:
-    return math.fsum(map(math.dist, taken.path_m, taken.path_m[1:]))
-
-
-def _travelled_m(trace: Sequence[RoundRecord]) -> list[float]:
-    """Return the path length travelled before each round."""
-    travelled = [0.0]
-    for taken in trace:
-        travelled.append(travelled[-1] + _length_m(taken))
-    return travelled
 
 
 def _whole(spans: Iterable[tuple[int | None, int | None]]) -> Iterator[tuple[int, int]]:

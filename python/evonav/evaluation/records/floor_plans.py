@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from evonav.drawing.plan import HousePlan, ObjectFootprint, plan_of
-from evonav.evaluation.records.base import Whole
+from evonav.evaluation.records.schema import Whole
 from evonav.house import House
 from evonav.records import Version
 

@@ -1,7 +1,6 @@
 """Convert a task's oracle data to the parts of records that describe target and hidden change."""
 
-from evonav.evaluation.records.changes import ChangeDuringStage, Relocation, TransitionRecord
-from evonav.evaluation.records.schema import TargetRecord
+from evonav.evaluation.records.schema import ChangeDuringStage, Relocation, TargetRecord, TransitionRecord
 from evonav.tasks import Task
 from evonav.tasks.oracle import Evolution, OracleStage
 

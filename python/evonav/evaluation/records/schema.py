@@ -5,19 +5,27 @@ A record is a function of the run's inputs: wall-clock times are in a table of t
 Points are `(x, y, z)` or `(x, z)` in metres, AI2-THOR's world frame; angles are radians.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
-from evonav.evaluation.records.base import BeliefRecord, CheckedRecord, Whole, WholeRecord
-from evonav.evaluation.records.changes import ChangeDuringStage, TransitionRecord
+from evonav.agents.agent import AgentAction, EntryBelief, PlaceBelief, SensorConfig
 from evonav.points import Point2, Point3, Real
-from evonav.records import Version
+from evonav.records import Record, Version
+from evonav.world.pose import Pose
 
 SCHEMA_VERSION = 1
 """Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
+
+
+Whole = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+"""A count or number of a record: 64 bits."""
+
+
+class WholeRecord(Record, revalidate_instances="always"):
+    """A record whose parts are validated again with the whole: `model_copy` does not validate."""
 
 
 class EndState(str, Enum):
@@ -102,16 +110,6 @@ class StageFailure:
     traceback: str = ""
 
 
-class PoseRecord(CheckedRecord):
-    """A pose of the agent."""
-
-    x_m: Real
-    y_m: Real
-    z_m: Real
-    yaw_rad: Real
-    horizon_rad: Real
-
-
 class GoalRecord(WholeRecord):
     """The goal that the agent received, without the image."""
 
@@ -136,16 +134,93 @@ class TargetRecord(WholeRecord):
     """Its place in stage 1, if `is_relocated`."""
 
 
-class EntryRecord(CheckedRecord):
+class Relocation(WholeRecord):
+    """One object moved in a change. Oracle."""
+
+    object_id: str
+    category: str
+    from_m: Point3
+    to_m: Point3
+
+
+class TransitionRecord(WholeRecord):
+    """A change of the house: between the previous stage and this one, or during this one. Oracle."""
+
+    mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
+    """`None` when the paper's process changed nothing."""
+    room_id: str | None = None
+    is_agent_in_room: bool = False
+    """True if the agent stands in the evolved room as the house changes: at the start of the stage, or during it."""
+    relocations: tuple[Relocation, ...] = ()
+    num_added: Whole = 0
+    """Objects that an extension added. The two fields below are of extensions, too."""
+    num_removed: Whole = 0
+    num_states: Whole = 0
+    """Doors and objects that opened, closed, or went on or off."""
+
+    @property
+    def kind(self) -> str:
+        """The mode in lower case, `activities` where people moved things, `extensions` where others did, `static`."""
+        if self.mode is not None:
+            return self.mode.lower()
+        if self.relocations:
+            return "activities"
+        return "extensions" if self.num_added or self.num_removed or self.num_states else "static"
+
+
+DURING_STRATA = ("target_moved_during", "changed_during", "unchanged_during")
+"""Events during a stage: its target moved, other things changed, or nothing did before the stage ended."""
+
+
+class ChangeDuringStage(WholeRecord):
+    """The change of the house during the stage (docs/extensions.md). Oracle."""
+
+    round: Whole
+    """The decision round that was drawn for it."""
+    change: TransitionRecord
+    """The change as the task has it, whatever of it took place before the stage ended."""
+    at_round: Whole | None = None
+    """The round of the trace before whose views it took place; `None` if the stage ended before it."""
+    skipped_ids: tuple[str, ...] = ()
+    """Ids of what did not change in the stage, because the agent stood in the way; it changes after the stage."""
+    target_position_m: Point3 | None = None
+    """Position of the target once it took place: success is judged by it; `None` if the stage ended before it."""
+    is_target_relocated: bool = False
+    """The target moved during the stage."""
+    path_before_m: Real | None = None
+    """Length of the agent's path up to the change."""
+    reference_after_m: Real | None = None
+    """Length of the shortest path from the agent's place at the change to the target after it; `None` without one."""
+
+    @property
+    def stratum(self) -> str:
+        """The name in `DURING_STRATA` of what happened during the stage."""
+        if self.at_round is None:
+            return "unchanged_during"
+        return "target_moved_during" if self.is_target_relocated else "changed_during"
+
+    @property
+    def done(self) -> tuple[Relocation, ...]:
+        """The moves that took place during the stage."""
+        if self.at_round is None:
+            return ()
+        return tuple(one for one in self.change.relocations if one.object_id not in self.skipped_ids)
+
+    @property
+    def left(self) -> tuple[Relocation, ...]:
+        """The moves that take place after the stage, unseen."""
+        done = self.done
+        return tuple(one for one in self.change.relocations if one not in done)
+
+
+@dataclass(frozen=True, slots=True)
+class EntryRecord(EntryBelief):
     """An object entry as the agent believed it, judged by the evaluator."""
 
-    entry_id: Whole
-    label: str
-    centre_m: Point3
-    size_m: Point3
-    num_detections: Whole
-    is_stale: bool
+    is_stale: bool = field(kw_only=True)
     """The entry is stale, as `evonav.evaluation.episode.staleness` defines it."""
+    # What comes from an agent was checked at its border, and a stage has hundreds.
+    __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
 
 
 class MemoryRecord(WholeRecord):
@@ -162,6 +237,17 @@ class MemoryRecord(WholeRecord):
     """Seen objects that a right entry stands for."""
     position_error_m: Real | None
     """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
+
+
+class BeliefRecord(Record):
+    """The probabilities that an agent stated as a stage began."""
+
+    presence: tuple[tuple[Real, bool], ...] = ()
+    """Probabilities that entries' objects are there, each with whether the entry is right.
+
+    They are read before the first round. Entries without one, and those of doors and windows, are left out."""
+    places: PlaceBelief | None = None
+    """Belief of where the target is, after the first look."""
 
 
 class StaleEntryRecord(WholeRecord):
@@ -185,42 +271,14 @@ class MovedObjectRecord(WholeRecord):
     """The round, from that one on, after which an entry stands for it."""
 
 
-class ActionRecord(CheckedRecord):
-    """The agent's answer."""
-
-    kind: Literal["move", "navigate_to", "stop"]
-    action: str | None = None
-    """The action of a `move`: `MOVE_FORWARD`, `TURN_LEFT`, `TURN_RIGHT` or `STOP`."""
-    position_m: Point2 | None = None
-    """The destination of a `navigate_to`."""
-    face_m: Point2 | None = None
-    """The point that the agent of a `navigate_to` turns towards on arrival, if given."""
-    reason: str | None = None
-    """The reason of a `stop`."""
-
-
-class SensingRecord(WholeRecord):
-    """The sensing and motion that the agent was granted in a stage, without colours.
-
-    Together with the actions, this is enough to carry them out again (`evonav.submission.rescore`).
-    """
-
-    first_round: tuple[Whole, Real]
-    """Views, and degrees between them."""
-    later_rounds: tuple[Whole, Real]
-    motion: Literal["waypoints", "actions"]
-    max_travel_m: Real
-    occupancy_range_m: Real
-
-
-class RoundRecord(CheckedRecord):
-    """One decision round: where the agent stood, what it chose, how it went."""
+class RoundRecord(Record):
+    """One decision round, validated when it is made, and not again with its stage, which may have hundreds."""
 
     round: Whole
     """0-based."""
-    pose: PoseRecord
+    pose: Pose
     """The agent's pose at the observation."""
-    action: ActionRecord
+    action: Annotated[AgentAction, Field(discriminator="kind")]
     path_m: tuple[Point2, ...]
     """Waypoints travelled, the pose's own position first; a single point when the agent stood still."""
     is_action_success: bool
@@ -258,13 +316,14 @@ class StageRecord(WholeRecord):
     during: ChangeDuringStage | None = None
     """`None` for a task without a change during the stage."""
 
-    requested_start: PoseRecord | None = None
+    requested_start: Pose | None = None
     """The pose carried over (stage 1: the manifest's)."""
-    effective_start: PoseRecord | None = None
+    effective_start: Pose | None = None
     """The start after snapping to the nearest reachable position; equal to the requested one if that was free."""
     is_snapped: bool = False
-    sensing: SensingRecord | None = None
-    terminal: PoseRecord | None = None
+    sensing: SensorConfig | None = None
+    """The sensors that the agent was granted."""
+    terminal: Pose | None = None
     num_rounds: Whole = 0
     has_stopped: bool = False
     """The agent ended the stage itself (otherwise the budget did). Success needs no stop (paper, Sec. C.2)."""

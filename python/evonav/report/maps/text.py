@@ -46,7 +46,7 @@ def describe_choice(entry: RoundRecord, *, has_truth: bool = False) -> str:
 
 def _action_words(entry: RoundRecord) -> str:
     if entry.action.kind == "move":
-        return (entry.action.action or "").lower().replace("_", " ")
+        return entry.action.action.value.lower().replace("_", " ")
     return "stop" if entry.action.kind == "stop" else "go to a point"
 
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from evonav.drawing.floor_plan import Frame, distance_m, furniture
 from evonav.drawing.plan import ObjectFootprint
 from evonav.drawing.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
-from evonav.evaluation.records.changes import Relocation
 from evonav.evaluation.records.floor_plans import FloorPlan
-from evonav.evaluation.records.schema import EndState, EntryRecord, RoundRecord, StageRecord, TargetRecord
+from evonav.evaluation.records.schema import EndState, EntryRecord, Relocation, RoundRecord, StageRecord, TargetRecord
 from evonav.report.maps.text import describe_choice
 from evonav.tasks.language import noun_of
 

@@ -20,7 +20,7 @@ from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentSummary, Rates, rates
 from evonav.evaluation.metrics.stage_metrics import RecordMetrics
-from evonav.evaluation.records.changes import DURING_STRATA
+from evonav.evaluation.records.schema import DURING_STRATA
 from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.numbers import NONE, rate
