@@ -195,6 +195,13 @@ def test_what_has_not_begun_may_change(file, tmp_path):
     assert small(file, out).exit_code == 0
 
 
+@pytest.mark.parametrize("version", ["2", "true", "null"])
+def test_a_sweep_of_another_schema_is_refused(tmp_path, version):
+    (tmp_path / "sweep.json").write_text(f'{{"schema_version": {version}, "cells": {{}}}}')
+    with pytest.raises(StoreError, match="this evonav reads 1"):
+        sweep_rows(tmp_path)
+
+
 def test_a_part_of_a_sweep_can_be_run(file, tmp_path):
     out = tmp_path / "out"
     some = small(file, out, "--set", "seeds=[0,1]", "--only", "*__s1")
