@@ -124,7 +124,7 @@ def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():
     case = pair_case(is_evolved=False)
     case = replace(case, stages=(replace(case.stages[1], guided=zigzag), *case.stages[1:]))
     walk = run("unigoal", case, ProtocolConfig(max_rounds=1, max_actions=1))[0]
-    steps = [taken.action.action for taken in walk.trace]
+    steps = [taken.action.action.value for taken in walk.trace]
     assert walk.state is EndState.GUIDED
     assert "MOVE_FORWARD" in steps[:-1]
     assert all(taken.counters["collisions"] == 0 for taken in walk.trace)
