@@ -53,7 +53,7 @@ def test_summary_counts_every_stage_once(tasks, tmp_path):
     [
         ("toy_agents:Raising", "RuntimeError: no idea [toy_agents:"),
         ("toy_agents:Speechless", "is no action"),
-        ("toy_agents:Lost", "coordinates = nan: must be"),
+        ("toy_agents:Lost", "position_m.0 = nan: Input should be a finite number"),
         ("toy_agents:FarSighted", "occupancy_range_m"),
     ],
 )
