@@ -20,7 +20,7 @@ from evonav.evaluation.run import evaluate as engine
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.worker import EpisodeWork
 from evonav.parallel import folders
-from evonav.parallel.local import Program
+from evonav.parallel.local import WorkerProgram
 from evonav.tasks.listing import task_files
 
 AGENT = "random-walk"
@@ -47,7 +47,7 @@ class Canned(EpisodeWork):
         return "null"
 
 
-engine.PROGRAM = Program("fault_driver:Canned")
+engine.PROGRAM = WorkerProgram("fault_driver:Canned")
 
 
 def arm(folder, mode=0, number=0, error=0):

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from viewer_run import MARKUP
 
 from evonav.cli import app
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.svg import cm
 from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState
@@ -130,7 +130,7 @@ def made_up_round(number: int, truth: Truth | None, agent_map: ReplayedMap | Non
 def made_up_page(rounds: list[ReplayedRound]) -> list[dict]:
     record = stage_record("a", "t", 2, EndState.FAILURE)
     page = PageData()
-    page.add_stage(ReplayedStage(record, None, tuple(rounds), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    page.add_stage(ReplayedStage(record, None, tuple(rounds), "", (), 1.0), {}, PlanFrame(0, 0, 900, 400), 50)
     return json.loads(page.text())["stages"][0]["rounds"]
 
 
@@ -163,7 +163,7 @@ def test_what_became_of_a_stale_entry(truth: Truth | None, now: object, words: s
 def test_a_lost_memory_is_told() -> None:
     record = stage_record("a", "t", 2, EndState.FAILURE).model_copy(update={"failed_before": (1,), "memory_lost_at": 2})
     page = PageData()
-    page.add_stage(ReplayedStage(record, None, (), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    page.add_stage(ReplayedStage(record, None, (), "", (), 1.0), {}, PlanFrame(0, 0, 900, 400), 50)
     (stage,) = json.loads(page.text())["stages"]
     told = "the agent failed in stage 1; its process was lost, and it began again, without memory, in stage 2"
     assert stage["lost"] == told

@@ -12,7 +12,7 @@ from html_page import HtmlPage
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.drawing.floor_plan import Frame, item_labels, label_point
+from evonav.drawing.floor_plan import PlanFrame, item_labels, label_point
 from evonav.drawing.plan import ObjectFootprint
 from evonav.drawing.svg import cm
 from evonav.generation import GenerationParameters, generate_task
@@ -113,7 +113,7 @@ def test_groups_are_drawn_while_they_stand_together() -> None:
             polygon_m=corners,
         )
 
-    frame = Frame.around([(0.0, 0.0), (9.0, 9.0)])
+    frame = PlanFrame.around([(0.0, 0.0), (9.0, 9.0)])
     together = _groups([chair(0, 0.0), chair(1, 1.0)], frame)
     assert 'd="M0 0h150v-50h-150z"' in together
     assert "group: chair, chair" in together

@@ -52,7 +52,7 @@ _STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class CheckResult:
     """The result of one check."""
 
     name: str
@@ -103,7 +103,7 @@ def doctor(
         raise typer.Exit(EXIT_BROKEN)
 
 
-def _print(checks: list[Check]) -> None:
+def _print(checks: list[CheckResult]) -> None:
     from rich.console import Console
     from rich.text import Text
 
@@ -116,7 +116,7 @@ def _print(checks: list[Check]) -> None:
         console.print(line, soft_wrap=True)
 
 
-def all_checks(out: Path, *, uses_network: bool = True, base_url: str | None = None) -> Iterator[Check]:
+def all_checks(out: Path, *, uses_network: bool = True, base_url: str | None = None) -> Iterator[CheckResult]:
     """Run every check; a check that raises counts as failed.
 
     Args:
@@ -148,7 +148,7 @@ def all_checks(out: Path, *, uses_network: bool = True, base_url: str | None = N
             finding = " ".join(f"{type(error).__name__}: {error}".split())
             found = ("failed", finding, "pip install --force-reinstall evonav" if is_essential else "")
         state, finding, *remedy = found
-        yield Check(name, state, finding, "".join(remedy), is_essential)
+        yield CheckResult(name, state, finding, "".join(remedy), is_essential)
 
 
 def _core() -> Result:

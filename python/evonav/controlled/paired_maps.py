@@ -8,7 +8,7 @@ from pathlib import Path
 from evonav.controlled.analysis import SPLITS, Analysis, Key, has_moved_far, split_of
 from evonav.controlled.layout import run_of
 from evonav.drawing.files import check_picture, write_picture
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -121,13 +121,13 @@ def pair_svg(pair: Sequence[Rollout]) -> str:
     return sheet(name, head + lines + image + panels, width_px, top_px, GAP_PX, foot=dotted, foot_px=28)
 
 
-def pair_frame(pair: Sequence[Rollout]) -> Frame:
+def pair_frame(pair: Sequence[Rollout]) -> PlanFrame:
     """Return the frame that all arms of a pair share."""
     maps = {i: floor_plan for i, one in enumerate(pair) for floor_plan in one.maps.values()}
     return replace(task_frame(maps, [one.record for one in pair]), marker_scale=MARKER_SCALE)
 
 
-def _panel(rollout: Rollout, frame: Frame, left_px: int) -> str:
+def _panel(rollout: Rollout, frame: PlanFrame, left_px: int) -> str:
     record = rollout.record
     verdict = "ok" if record.state is EndState.SUCCESS else "bad"
     css = "quiet" if record.transition.kind == "static" else "change-words"
@@ -155,7 +155,7 @@ def describe_split(analysis: Analysis, agent: str, key: Key) -> str:
     return SPLITS[split_of(analysis.outcomes[analysis.arms[-1], agent][key])]
 
 
-def walk_and_course(rollout: Rollout, frame: Frame) -> str:
+def walk_and_course(rollout: Rollout, frame: PlanFrame) -> str:
     """Draw the way that the agent was guided, and what it then did itself."""
     points = [cm(point) for walk in rollout.walks for taken in walk.trace for point in taken.path_m]
     drawn = ""
@@ -166,7 +166,7 @@ def walk_and_course(rollout: Rollout, frame: Frame) -> str:
     return drawn + target_move(rollout.record, frame) + course(rollout.record, frame, rollout.success_radius_m)
 
 
-def target_move(record: StageRecord, frame: Frame) -> str:
+def target_move(record: StageRecord, frame: PlanFrame) -> str:
     """Draw an arrow from where the target stood to where it is, if it moved."""
     target = record.target
     if target.first_position_m is None or not target.is_relocated_now:

@@ -51,7 +51,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PlanFrame:
     """The part of the page that a map fills, in centimetres."""
 
     left: int
@@ -72,20 +72,20 @@ class Frame:
         return f"{self.left} {self.top} {self.width} {self.height}"
 
     @staticmethod
-    def around(points_m: Iterable[Point]) -> "Frame":
+    def around(points_m: Iterable[Point]) -> "PlanFrame":
         """Return the frame that holds all points with a margin; 10 m wide if there are none."""
         points = [cm(point) for point in points_m] or [(-500, -500), (500, 500)]
         xs, ys = [x for x, _ in points], [y for _, y in points]
         left, top = min(xs) - MARGIN_CM, min(ys) - MARGIN_CM
-        return Frame(left, top, max(xs) + MARGIN_CM - left, max(ys) + MARGIN_CM - top)
+        return PlanFrame(left, top, max(xs) + MARGIN_CM - left, max(ys) + MARGIN_CM - top)
 
 
-def frame_of(maps: Iterable[HousePlan]) -> Frame:
+def frame_of(maps: Iterable[HousePlan]) -> PlanFrame:
     """Return the frame that all stages of a task share."""
     maps = list(maps)
     points: list[Point] = [point for m in maps for room in m.rooms for point in room.polygon_m]
     points += [point for m in maps for wall in m.walls for point in wall]
-    return Frame.around(points)
+    return PlanFrame.around(points)
 
 
 def moving_ids(maps: Sequence[HousePlan]) -> frozenset[str]:
@@ -107,7 +107,7 @@ def moving_ids(maps: Sequence[HousePlan]) -> frozenset[str]:
     return frozenset(name for name, num in seen.items() if name in moved or num != len(maps))
 
 
-def ground(floor_plan: HousePlan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
+def ground(floor_plan: HousePlan, frame: PlanFrame, without: frozenset[str] = frozenset()) -> str:
     """Draw floors, furniture, walls and openings; `without` names objects to leave out."""
     items = furniture([item for item in floor_plan.objects if item.object_id not in without], frame)
     return floors(floor_plan) + items + structure(floor_plan, frame)
@@ -121,7 +121,7 @@ def floors(floor_plan: HousePlan) -> str:
     )
 
 
-def structure(floor_plan: HousePlan, frame: Frame) -> str:
+def structure(floor_plan: HousePlan, frame: PlanFrame) -> str:
     """Draw walls, doors and windows."""
     u = frame.unit
     doors = [(o.from_m, o.to_m) for o in floor_plan.openings if o.kind == "door"]
@@ -134,14 +134,14 @@ def structure(floor_plan: HousePlan, frame: Frame) -> str:
     )
 
 
-def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
+def furniture(items: Iterable[ObjectFootprint], frame: PlanFrame, css: str = "items", *, has_parts: bool = True) -> str:
     """Draw footprints, lower ones first, each with its category as tooltip; `has_parts` draws large ones in detail."""
     ordered = sorted(items, key=lambda item: (item.centre_m[1] + item.size_m[1] / 2, item.object_id))
     drawn = join(_footprint(item, has_parts=has_parts) for item in ordered)
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
-def labels(floor_plan: HousePlan, frame: Frame) -> str:
+def labels(floor_plan: HousePlan, frame: PlanFrame) -> str:
     """Write the names of rooms where there is least furniture."""
     u = frame.unit
     taken = [_box(item) for item in floor_plan.objects if item.category not in FLAT_CATEGORIES]
@@ -150,7 +150,7 @@ def labels(floor_plan: HousePlan, frame: Frame) -> str:
 
 
 def item_labels(
-    items: Iterable[ObjectFootprint], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
+    items: Iterable[ObjectFootprint], frame: PlanFrame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
 ) -> str:
     """Write the names of the furniture that is large enough to hold them, none over another.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.svg import Point, cm, escape, polyline, star, title
 from evonav.tasks.language import noun_of
 
@@ -44,7 +44,7 @@ def cells_layer(cells: NDArray[np.uint8], cell_m: float, corner_m: Point) -> str
     return f'<image {box} {look} href="{uri}"/>'
 
 
-def boxes_layer(boxes: Iterable[Box], frame: Frame) -> str:
+def boxes_layer(boxes: Iterable[Box], frame: PlanFrame) -> str:
     """Draw labelled boxes from above, larger ones first; a name that would lie on another is left to the tooltip."""
     u = frame.unit
     letters_cm = LETTERS * u
@@ -67,7 +67,7 @@ def boxes_layer(boxes: Iterable[Box], frame: Frame) -> str:
     )
 
 
-def points_layer(points: Iterable[tuple[str, Point]], frame: Frame) -> str:
+def points_layer(points: Iterable[tuple[str, Point]], frame: PlanFrame) -> str:
     """Draw named points as diamonds."""
     r = 1.3 * frame.unit
     line = f'class="frontier" stroke-width="{0.2 * frame.unit:.1f}"'
@@ -77,7 +77,7 @@ def points_layer(points: Iterable[tuple[str, Point]], frame: Frame) -> str:
     )
 
 
-def path_layer(points_m: Sequence[Point], frame: Frame) -> str:
+def path_layer(points_m: Sequence[Point], frame: PlanFrame) -> str:
     """Draw a path with a star at its end; nothing if it has no points."""
     if not len(points_m):
         return ""
@@ -90,7 +90,7 @@ def path_layer(points_m: Sequence[Point], frame: Frame) -> str:
     )
 
 
-def pose_layer(point_m: Point, yaw_rad: float, fov_rad: float, frame: Frame) -> str:
+def pose_layer(point_m: Point, yaw_rad: float, fov_rad: float, frame: PlanFrame) -> str:
     """Draw where an agent stands, and the sector in which it looks."""
     u = frame.unit
     x, y = cm(point_m)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav._core import House
 from evonav.drawing.files import write_picture
-from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
+from evonav.drawing.floor_plan import PlanFrame, frame_of, ground, item_labels, labels
 from evonav.drawing.layers import Box, boxes_layer, cells_layer, path_layer, points_layer, pose_layer
 from evonav.drawing.plan import plan_of
 from evonav.drawing.style import map_file
@@ -29,7 +29,7 @@ _RULES = (
 class Picture:
     """A picture as SVG: notebooks show it, and `save` writes it."""
 
-    def __init__(self, drawing: str, frame: Frame, title: str) -> None:
+    def __init__(self, drawing: str, frame: PlanFrame, title: str) -> None:
         """Put a drawing on a page.
 
         Args:
@@ -89,7 +89,7 @@ def boxes_picture(boxes: Iterable[Box], title: str, house: House | None = None) 
     """Draw labelled boxes from above, over a house if it is given."""
     boxes = list(boxes)
     if house is None:
-        frame = Frame.around(
+        frame = PlanFrame.around(
             (centre_m[0] + sign * size_m[0] / 2, centre_m[2] + sign * size_m[2] / 2)
             for _, centre_m, size_m in boxes
             for sign in (-1, 1)
@@ -107,6 +107,6 @@ def cells_picture(
     """Draw a map's cells (`cells_layer`) and named points over them."""
     x_m, z_m = map_frame.corner_m
     far_m = (x_m + map_frame.cols * map_frame.cell_m, z_m + map_frame.rows * map_frame.cell_m)
-    frame = Frame.around([(x_m, z_m), far_m])
+    frame = PlanFrame.around([(x_m, z_m), far_m])
     drawing = cells_layer(cells, map_frame.cell_m, (x_m, z_m)) + points_layer(points, frame)
     return Picture(drawing, frame, title)

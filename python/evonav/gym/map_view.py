@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from evonav._core import House
-from evonav.drawing.floor_plan import Frame, frame_of
+from evonav.drawing.floor_plan import PlanFrame, frame_of
 from evonav.drawing.plan import HousePlan, plan_of
 from evonav.gym.config import NavConfig
 from evonav.gym.worlds import StageWorld
@@ -56,7 +56,7 @@ class _Scale:
     """Half of the side in metres."""
 
     @classmethod
-    def of(cls, frame: Frame, side_px: int) -> "_Scale":
+    def of(cls, frame: PlanFrame, side_px: int) -> "_Scale":
         centre_m = ((frame.left + frame.width / 2) / 100, -(frame.top + frame.height / 2) / 100)
         return cls(side_px, centre_m, max(frame.width, frame.height) / 200)
 

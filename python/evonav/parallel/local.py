@@ -48,7 +48,7 @@ def num_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Program(NamedTuple):
+class WorkerProgram(NamedTuple):
     """The code that a worker runs."""
 
     work: str
@@ -64,7 +64,7 @@ class Program(NamedTuple):
 class ProcessHost:
     """Starts processes on this machine."""
 
-    def __init__(self, program: Program, settings: str, *, has_threads: bool = False) -> None:
+    def __init__(self, program: WorkerProgram, settings: str, *, has_threads: bool = False) -> None:
         """Remember the program and its settings; no process is started.
 
         Args:
@@ -94,7 +94,7 @@ _START = "import sys; sys.path[:] = sys.argv[5:]; from evonav.parallel.local imp
 class WorkerProcess:
     """A process that runs jobs until its parent closes the connection or dies."""
 
-    def __init__(self, program: Program, has_threads: bool = False) -> None:
+    def __init__(self, program: WorkerProgram, has_threads: bool = False) -> None:
         """Start the process, which imports its work and waits for `begin`.
 
         Args:
@@ -113,7 +113,7 @@ class WorkerProcess:
                     self._process = context.Process(target=_serve, args=(far_end, program.work), daemon=True)
                     self._process.start()
 
-    def _started(self, program: Program, connection: int) -> "subprocess.Popen[bytes]":
+    def _started(self, program: WorkerProgram, connection: int) -> "subprocess.Popen[bytes]":
         life, self._life = os.pipe()
         try:
             return subprocess.Popen(  # noqa: S603 - ourselves
@@ -176,7 +176,7 @@ def _exit_code(
 
 class _Early(NamedTuple):
     worker: WorkerProcess
-    program: Program
+    program: WorkerProgram
     surroundings: tuple[Mapping[str, str], Sequence[str]]
 
 
@@ -184,7 +184,7 @@ _early: _Early | None = None
 
 
 @contextmanager
-def started_early(program: Program) -> Iterator[None]:
+def started_early(program: WorkerProgram) -> Iterator[None]:
     """Start a process now, for the first `ProcessHost` that needs one while the block runs.
 
     The process imports its work while this one still imports what decides the settings.
@@ -200,7 +200,7 @@ def started_early(program: Program) -> Iterator[None]:
         _early = None
 
 
-def _taken_early(program: Program, has_threads: bool) -> WorkerProcess | None:
+def _taken_early(program: WorkerProgram, has_threads: bool) -> WorkerProcess | None:
     """Return the process that was started early, unless a process that starts now would be another one."""
     global _early
     if _early is None or has_threads or (_early.program, _early.surroundings) != (program, _surroundings()):

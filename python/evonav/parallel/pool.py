@@ -100,9 +100,9 @@ def open_pool(
     elif workforce.num_workers == 0:
         pool = InlinePool(work, settings)
     else:
-        from evonav.parallel.local import ProcessHost, Program
+        from evonav.parallel.local import ProcessHost, WorkerProgram
 
-        local_host = ProcessHost(Program(work, prelude), settings, has_threads=workforce.jobs_at_once > 1)
+        local_host = ProcessHost(WorkerProgram(work, prelude), settings, has_threads=workforce.jobs_at_once > 1)
         pool = WorkerPool(local_host, workforce.num_workers, timeout_s, max_losses, workforce.jobs_at_once)
     with closing(pool):
         yield pool
@@ -155,7 +155,7 @@ class InlinePool:
 
 
 @dataclass(slots=True, eq=False)
-class _Slot:
+class _WorkerJobs:
     """A worker and the jobs that it runs, by their keys."""
 
     worker: Worker
@@ -179,7 +179,7 @@ class WorkerPool:
         self._max_losses = max_losses
         self._queue: deque[Job] = deque()
         self._answers: deque[Answer] = deque()
-        self._slots: list[_Slot] = []
+        self._slots: list[_WorkerJobs] = []
         self._losses: Counter[int] = Counter()
         self._num_failed_starts = 0
 
@@ -210,7 +210,7 @@ class WorkerPool:
     def _limit_s(self, job: Job) -> float:
         return self._timeout_s if job.timeout_s is None else job.timeout_s
 
-    def _deadline_s(self, slot: _Slot) -> float:
+    def _deadline_s(self, slot: _WorkerJobs) -> float:
         """Return when a worker is given up."""
         if not slot.is_ready:
             return slot.began_s + START_TIMEOUT_S
@@ -225,9 +225,9 @@ class WorkerPool:
         num_missing = min(len(self._queue) - num_starting, self._num_workers - len(self._slots))
         if self._num_failed_starts >= MAX_FAILED_STARTS and self._has_ready:
             return
-        self._slots += [_Slot(self._host.start()) for _ in range(num_missing)]
+        self._slots += [_WorkerJobs(self._host.start()) for _ in range(num_missing)]
 
-    def _free_slot(self, job: Job) -> _Slot | None:
+    def _free_slot(self, job: Job) -> _WorkerJobs | None:
         """Return the worker for the next job: the one with the fewest, which leaves the others their share."""
         are_all_started = self._num_failed_starts >= MAX_FAILED_STARTS
         num_slots = sum(slot.is_ready for slot in self._slots) if are_all_started else self._num_workers
@@ -241,7 +241,7 @@ class WorkerPool:
         ]
         return min(free, key=lambda slot: len(slot.jobs), default=None)
 
-    def _receive(self, slot: _Slot) -> None:
+    def _receive(self, slot: _WorkerJobs) -> None:
         try:
             message = slot.worker.receive()
         except WorkerLostError as error:
@@ -264,7 +264,7 @@ class WorkerPool:
                 self._losses.pop(answer.key, None)
                 del slot.jobs[message.key]
 
-    def _lose(self, slot: _Slot, message: str) -> None:
+    def _lose(self, slot: _WorkerJobs, message: str) -> None:
         self._close(slot)
         if not slot.is_ready:
             self._num_failed_starts += 1
@@ -279,7 +279,7 @@ class WorkerPool:
                 is_shared = len(slot.jobs) > 1
                 self._answers.append(Answer(key, failure="crash", detail=message, is_shared=is_shared))
 
-    def _give_up(self, slot: _Slot) -> None:
+    def _give_up(self, slot: _WorkerJobs) -> None:
         """End a worker with a job that was silent for too long."""
         self._close(slot)
         if not slot.is_ready:
@@ -293,7 +293,7 @@ class WorkerPool:
             else:
                 self._answers.append(Answer(key, is_shared=is_shared, is_displaced=True))
 
-    def _close(self, slot: _Slot) -> None:
+    def _close(self, slot: _WorkerJobs) -> None:
         slot.worker.close()
         self._slots.remove(slot)
 

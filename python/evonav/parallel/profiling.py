@@ -37,7 +37,7 @@ _own: "_Sampler | None" = None
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class StackFrame:
     """A function."""
 
     name: str
@@ -51,7 +51,7 @@ class Samples:
     """CPU time by stack, of all processes of one name."""
 
     name: str
-    cpu_s: dict[tuple[Frame, ...], float] = field(default_factory=lambda: defaultdict(float))
+    cpu_s: dict[tuple[StackFrame, ...], float] = field(default_factory=lambda: defaultdict(float))
     """CPU seconds by stack, the outermost function first."""
 
     @property
@@ -59,9 +59,9 @@ class Samples:
         """CPU seconds of all stacks."""
         return sum(self.cpu_s.values())
 
-    def own_s(self) -> dict[Frame, float]:
+    def own_s(self) -> dict[StackFrame, float]:
         """Return the CPU seconds of each function without those that it called."""
-        own: defaultdict[Frame, float] = defaultdict(float)
+        own: defaultdict[StackFrame, float] = defaultdict(float)
         for stack, seconds in self.cpu_s.items():
             own[stack[-1]] += seconds
         return dict(own)
@@ -168,7 +168,7 @@ def read_samples(folder: Path) -> list[Samples]:
     for path in sorted(folder.glob("*.json")):
         try:
             content = json.loads(path.read_bytes())
-            functions = [Frame(name, file, line) for name, file, line in content["functions"]]
+            functions = [StackFrame(name, file, line) for name, file, line in content["functions"]]
             samples = by_name.setdefault(content["name"], Samples(content["name"]))
             for stack in content["stacks"]:
                 samples.cpu_s[tuple(functions[index] for index in stack["frames"])] += float(stack["cpu_s"])

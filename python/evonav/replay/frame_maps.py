@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.layers import cells_layer, sector
 from evonav.drawing.svg import cm, cross, escape, join, polyline
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -22,13 +22,13 @@ _TAG_UNITS = 2.6
 """Height of the names of entries, in units of a frame."""
 
 
-def house_layer(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float) -> str:
+def house_layer(record: StageRecord, maps: Mapping[int, FloorPlan], frame: PlanFrame, success_radius_m: float) -> str:
     """Return what stays the same in a stage: the house, what moved before, and the target in its radius."""
     target = ring(record, frame, success_radius_m) + target_mark(record.target, frame)
     return house_drawing(record, maps, frame) + target
 
 
-def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
+def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: PlanFrame) -> str:
     """Return an agent's map, entries and frontiers in one round, and its way so far."""
     if step.map is None:
         return way_layer(stage, step, frame)
@@ -74,7 +74,7 @@ def heat_layer(step: ReplayedRound) -> str:
     return join(squares)
 
 
-def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
+def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: PlanFrame) -> str:
     """Return where the memory wrongly holds the target, and the agent's way so far."""
     wrong = []
     for entry in step.entries:
@@ -89,7 +89,7 @@ def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
     return join(wrong) + way_layer(stage, step, frame)
 
 
-def way_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
+def way_layer(stage: ReplayedStage, step: ReplayedRound, frame: PlanFrame) -> str:
     """Return the start, the way of all rounds so far, where the agent goes, where it stands and what it looks at."""
     u = frame.unit
     at = cm((step.pose.x_m, step.pose.z_m))
@@ -122,7 +122,7 @@ def _trail(stage: ReplayedStage, step: ReplayedRound, unit: float) -> str:
     return join(pieces) + f'<g class="goto" stroke-width="{0.4 * unit:.1f}">{line}{mark}</g>'
 
 
-def _entry(entry: ReplayedEntry, frame: Frame, *, is_candidate: bool, is_chosen: bool, is_goal: bool) -> str:
+def _entry(entry: ReplayedEntry, frame: PlanFrame, *, is_candidate: bool, is_chosen: bool, is_goal: bool) -> str:
     belief, u = entry.record, frame.unit
     x, y = cm((belief.centre_m[0], belief.centre_m[2]))
     width, depth = (

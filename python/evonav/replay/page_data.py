@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from evonav.agents.agent import PlaceBelief
 from evonav.agents.explanation import FrontierBelief
 from evonav.counted import counted
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.svg import clean, cm, polyline, simplified
 from evonav.evaluation.records.floor_plans import FloorPlan
 from evonav.evaluation.records.schema import EndState, RoundRecord, StageRecord
@@ -85,7 +85,7 @@ class PageData:
             self.prompts.append(parts)
         return self._prompt_index[key]
 
-    def add_stage(self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int) -> None:
+    def add_stage(self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: PlanFrame, budget: int) -> None:
         """Add a stage, in which the agent had `budget` rounds, to the page."""
         record = stage.record
         rounds = _Rounds(self, record)

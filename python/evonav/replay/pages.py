@@ -11,7 +11,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.drawing.floor_plan import Frame, floors, furniture, item_labels, labels, structure
+from evonav.drawing.floor_plan import PlanFrame, floors, furniture, item_labels, labels, structure
 from evonav.drawing.svg import cm
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -118,7 +118,7 @@ def _page(
 
 
 def _drawings(
-    index: int, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float
+    index: int, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: PlanFrame, radius_m: float
 ) -> list[dict[str, Any]]:
     """Return the layers of a stage's map in each of its moments, and the rounds in which they are shown."""
     parts = moments(stage.record, maps)
@@ -129,7 +129,7 @@ def _drawings(
     ]
 
 
-def _layers(moment: Moment, frame: Frame, radius_m: float) -> dict[str, Markup]:
+def _layers(moment: Moment, frame: PlanFrame, radius_m: float) -> dict[str, Markup]:
     """Return the layers of a map that are the same in all rounds of a moment."""
     record, maps = moment.record, moment.maps
     floor_plan = maps.get(record.stage)

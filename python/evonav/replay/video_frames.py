@@ -7,7 +7,7 @@ from PIL import Image
 
 from evonav.counted import counted
 from evonav.drawing.files import png_of
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.style import light_css
 from evonav.drawing.svg import escape, join, text_lines
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -39,7 +39,7 @@ _LETTER = 0.56
 
 
 def stage_frames(
-    stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, *, budget: int, success_radius_m: float
+    stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: PlanFrame, *, budget: int, success_radius_m: float
 ) -> Iterator[Image.Image]:
     """Yield a picture a round, and one of how the stage ended; the agent had `budget` rounds.
 
@@ -52,7 +52,7 @@ def stage_frames(
     yield film.end()
 
 
-def episode_frame(stages: Sequence[ReplayedStage], maps: Mapping[int, FloorPlan]) -> Frame:
+def episode_frame(stages: Sequence[ReplayedStage], maps: Mapping[int, FloorPlan]) -> PlanFrame:
     """Return the frame of a task's maps."""
     return task_frame(maps, [stage.record for stage in stages])
 
@@ -61,7 +61,7 @@ class _StageFilm:
     """Draw what all pictures of a stage share once, and each round over it."""
 
     def __init__(
-        self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float
+        self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: PlanFrame, budget: int, radius_m: float
     ) -> None:
         self._style = f"<style>{light_css(text_of('film.css'))}</style>"
         self._stage, self._frame, self._budget = stage, frame, budget

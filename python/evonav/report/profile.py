@@ -12,7 +12,7 @@ import evonav
 from evonav._core import __version__
 from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import write_atomically
-from evonav.parallel.profiling import VARIABLE, Frame, Samples, read_samples, sampled
+from evonav.parallel.profiling import VARIABLE, Samples, StackFrame, read_samples, sampled
 from evonav.report.tables.numbers import NONE
 from evonav.report.tables.table import Table, markdown_tables
 
@@ -87,7 +87,7 @@ def function_table(samples: Samples) -> Table:
     return Table(title, ("function", "place", "seconds", "share"), rows, notes)
 
 
-def _place(frame: Frame) -> str:
+def _place(frame: StackFrame) -> str:
     """Return a function's file and line; the file from the folder of its package on."""
     if not frame.file:
         return NONE
@@ -104,7 +104,7 @@ def speedscope(samples: Sequence[Samples], name: str) -> dict[str, object]:
 
     Source: https://www.speedscope.app/file-format-schema.json.
     """
-    frames: dict[Frame, int] = {}
+    frames: dict[StackFrame, int] = {}
     profiles = [
         {
             "type": "sampled",

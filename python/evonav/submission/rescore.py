@@ -86,7 +86,7 @@ class RecordedAgent:
         return self._record
 
 
-class _Blind:
+class _NoDetections:
     """A perception that detects nothing."""
 
     needs_rgb = False
@@ -119,7 +119,7 @@ def rescore(
         A stage, and how its record differs from the result of its actions; no differences for a true record.
     """
     agent = RecordedAgent(records)
-    for outcome in Episode(case, records[1].agent, agent, simulator, _Blind(), protocol, seed=0).run():
+    for outcome in Episode(case, records[1].agent, agent, simulator, _NoDetections(), protocol, seed=0).run():
         stage = outcome.record.stage
         yield (
             stage,

@@ -77,7 +77,7 @@ _POSES = TypeAdapter(dict[str, HousePose])
 
 
 @dataclass(slots=True)
-class Agent:
+class AgentBody:
     """Pose and body of the agent."""
 
     x_m: float = 0.0

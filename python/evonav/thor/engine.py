@@ -12,7 +12,7 @@ import numpy as np
 from evonav.errors import EvonavError
 from evonav.thor.actions import registry
 from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode
-from evonav.thor.agent import Agent
+from evonav.thor.agent import AgentBody
 from evonav.thor.geometry import Vec3, vector
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView, Images
@@ -26,7 +26,7 @@ _MAX_MESSAGE = 4000
 _logged: set[tuple[str, int | None]] = set()
 
 
-class Settings(Arguments, extra="allow"):
+class EngineSettings(Arguments, extra="allow"):
     """The settings of `Initialize`, by AI2-THOR's names; the client also passes other keywords of its constructor."""
 
     agentMode: str = "default"
@@ -127,9 +127,9 @@ class Engine:
 
     width_px: int = 300
     height_px: int = 300
-    settings: Settings = field(default_factory=Settings)
+    settings: EngineSettings = field(default_factory=EngineSettings)
     scene: Scene = field(default_factory=Scene)
-    agent: Agent = field(default_factory=Agent)
+    agent: AgentBody = field(default_factory=AgentBody)
     cameras: list[ThirdPartyCamera] = field(default_factory=list)
     """Third-party cameras, by their ids."""
     map_view: ThirdPartyCamera | None = None

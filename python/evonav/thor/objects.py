@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.thor.actions.registry import ActionError
-from evonav.thor.agent import Agent
+from evonav.thor.agent import AgentBody
 from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
 from evonav.thor.geometry import Vec3, box_around, vector
 from evonav.thor.scene import Scene
@@ -71,7 +71,7 @@ def views(engine: "Engine") -> Iterator[tuple[Record, float, bool]]:
         yield record, distance_m, record["objectId"] in seen
 
 
-class Table(NamedTuple):
+class ObjectTable(NamedTuple):
     """All records of a scene, and what is derived with them."""
 
     records: list[Record]
@@ -85,15 +85,15 @@ class Table(NamedTuple):
     """The records by object id."""
 
 
-_tables: WeakKeyDictionary[EmbeddedSimulator, Table] = WeakKeyDictionary()
+_tables: WeakKeyDictionary[EmbeddedSimulator, ObjectTable] = WeakKeyDictionary()
 
 
-def table_of(scene: Scene) -> Table:
+def table_of(scene: Scene) -> ObjectTable:
     """Return the records of a scene in its present version."""
     return scene.derived(_related_table)
 
 
-def _related_table(scene: Scene) -> Table:
+def _related_table(scene: Scene) -> ObjectTable:
     if scene.house is None:
         return _build({}, ())
     table = _tables.get(scene.simulator)
@@ -123,7 +123,7 @@ def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
     return np.array(asset.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
 
 
-def _build(house: Mapping[str, Any], all_bodies: Sequence[SceneObject]) -> Table:
+def _build(house: Mapping[str, Any], all_bodies: Sequence[SceneObject]) -> ObjectTable:
     """Make the records of all objects, without their receptacles."""
     found = [(index, body) for index, body in enumerate(all_bodies) if body.kind != "ceiling"]
     bodies = {body.id: body for _, body in found}
@@ -135,7 +135,7 @@ def _build(house: Mapping[str, Any], all_bodies: Sequence[SceneObject]) -> Table
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
     by_body = {index: body.id for index, body in found}
     instances = {object_id: index + 1 for index, object_id in by_body.items()}
-    return Table(records, positions_m, instances, by_body, {})
+    return ObjectTable(records, positions_m, instances, by_body, {})
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -325,7 +325,7 @@ def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
     return math.degrees(math.atan2(float(start["z"]) - float(end["z"]), float(end["x"]) - float(start["x"]))) % 360.0
 
 
-def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
+def visible_ids(scene: Scene, agent: AgentBody, distance_m: float) -> set[str]:
     """Return the ids of the objects that AI2-THOR calls visible, by `EmbeddedSimulator.visible_objects`."""
     if scene.house is None:
         return set()
@@ -334,7 +334,7 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     return {by_body[body] for body in seen}
 
 
-def camera_axes(agent: Agent) -> NDArray[np.float64]:
+def camera_axes(agent: AgentBody) -> NDArray[np.float64]:
     """Return `world_from_camera`, `(3, 3)`: right, up and ahead as columns."""
     return rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})
 

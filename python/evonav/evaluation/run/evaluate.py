@@ -115,7 +115,7 @@ def evaluate_all(
             run.begin(workforce, scratch, num_retries, retry_errored=retry_errored)
             on_progress(index, run.progress(None))
         if num_jobs := sum(len(run.jobs) for run in runs):
-            schedule = Schedule(runs, num_retries)
+            schedule = JobSchedule(runs, num_retries)
             with open_pool(
                 PROGRAM.work,
                 worker_settings(workforce.jobs_at_once, [run.setup for run in runs]),
@@ -133,7 +133,7 @@ def evaluate_all(
 
 
 @dataclass(slots=True)
-class _Episode:
+class _JobState:
     """A job and how it goes."""
 
     index: int
@@ -147,15 +147,15 @@ class _Episode:
     """Number of failed attempts by stage."""
 
 
-class Schedule:
+class JobSchedule:
     """The jobs of several runs: those that wait for a worker, and those that a pool runs."""
 
     def __init__(self, runs: Sequence[Evaluation], num_retries: int) -> None:
         """Let all jobs wait."""
         self._runs = runs
         self._num_retries = num_retries
-        self._waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
-        self._under_way: dict[int, _Episode] = {}
+        self._waiting = deque(_JobState(index, job) for index, run in enumerate(runs) for job in run.jobs)
+        self._under_way: dict[int, _JobState] = {}
         self._numbers = count()
 
     def fill(self, pool: Pool) -> bool:
@@ -197,7 +197,7 @@ class Schedule:
         if answer.is_end:
             run.end_job()
 
-    def _is_repeated(self, episode: _Episode, failure: StageFailure, *, is_shared: bool) -> bool:
+    def _is_repeated(self, episode: _JobState, failure: StageFailure, *, is_shared: bool) -> bool:
         """Return true if a retry of the stage is left, and use it up.
 
         A lost worker that ran several episodes does not tell which of them was the cause. So none of them fails by it:

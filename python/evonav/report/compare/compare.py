@@ -34,7 +34,7 @@ GUIDED = EndState.GUIDED.value
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ComparedPart:
     """A comparison on some of the stages."""
 
     key: str
@@ -75,7 +75,7 @@ class Comparison:
 
     a: str
     b: str
-    parts: tuple[Part, ...]
+    parts: tuple[ComparedPart, ...]
     """`all` first: its verdicts allow for the number of pairs compared, by Holm. Those of the others do not."""
     dropped: Mapping[str, int]
     """Stages of either that are not compared, by reason."""
@@ -84,7 +84,7 @@ class Comparison:
     """Settings in which the two runs differ."""
 
     @property
-    def all(self) -> Part:
+    def all(self) -> ComparedPart:
         """The comparison on all pairs of stages."""
         return self.parts[0]
 
@@ -251,7 +251,9 @@ def _reason(a: ComparedAgent, b: ComparedAgent, key: tuple[str, int], allow_diff
     return None
 
 
-def _part(key: str, label: str, pairs: Sequence[tuple[StageMetrics, StageMetrics]], fields: Sequence[str]) -> Part:
+def _part(
+    key: str, label: str, pairs: Sequence[tuple[StageMetrics, StageMetrics]], fields: Sequence[str]
+) -> ComparedPart:
     by_missing: dict[tuple[int, ...], list[str]] = {}
     for field in fields:
         there = tuple(i for i, pair in enumerate(pairs) if all(getattr(row, field) is not None for row in pair))
@@ -265,7 +267,7 @@ def _part(key: str, label: str, pairs: Sequence[tuple[StageMetrics, StageMetrics
     only_a = sum(bool(x.success) and not y.success for x, y in pairs)
     only_b = sum(bool(y.success) and not x.success for x, y in pairs)
     ordered = {name: effects[name] for name in fields if name in effects}
-    return Part(key, label, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
+    return ComparedPart(key, label, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
 
 
 def _flip(a: ComparedAgent, b: ComparedAgent, pair: tuple[StageMetrics, StageMetrics]) -> Flip:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from evonav.drawing.floor_plan import Frame, frame_of, ground, item_labels, labels
+from evonav.drawing.floor_plan import PlanFrame, frame_of, ground, item_labels, labels
 from evonav.drawing.style import map_file
 from evonav.drawing.svg import escape, join, slug, text_lines
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
@@ -43,13 +43,13 @@ def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
     return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
 
 
-def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:
+def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> PlanFrame:
     """Return the frame that a task's pictures share: the house, or the path where no house was recorded."""
     if any(floor_plan.rooms or floor_plan.walls for floor_plan in maps.values()):
         return frame_of(maps.values())
     points = [point for record in records for entry in record.trace for point in entry.path_m]
     points += [(record.target.position_m[0], record.target.position_m[2]) for record in records]
-    return Frame.around(points)
+    return PlanFrame.around(points)
 
 
 def success_radius_of(config: Mapping[str, object]) -> float:
@@ -60,7 +60,12 @@ def success_radius_of(config: Mapping[str, object]) -> float:
 
 
 def stage_drawing(
-    record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float, *, has_item_names: bool
+    record: StageRecord,
+    maps: Mapping[int, FloorPlan],
+    frame: PlanFrame,
+    success_radius_m: float,
+    *,
+    has_item_names: bool,
 ) -> str:
     """Return a stage's house and what happened in it, as the content of an `svg` element."""
     floor_plan = maps.get(record.stage)
@@ -69,7 +74,7 @@ def stage_drawing(
 
 
 def house_drawing(
-    record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, item_names: str = "", *, on_it: str = ""
+    record: StageRecord, maps: Mapping[int, FloorPlan], frame: PlanFrame, item_names: str = "", *, on_it: str = ""
 ) -> str:
     """Return the house of a stage, with what moved before it, `on_it`, and the names of its rooms on top."""
     floor_plan, changed = maps.get(record.stage), change(record, maps, frame)
@@ -91,7 +96,7 @@ def sheet(title: str, content: str, width_px: int, top_px: int, margin_px: int, 
 def panel(
     record: StageRecord,
     drawing: str,
-    frame: Frame,
+    frame: PlanFrame,
     place_px: tuple[int, int],
     width_px: int,
     heading: tuple[str, str],
@@ -113,7 +118,7 @@ def panel(
     )
 
 
-def panel_height_px(frame: Frame, width_px: int) -> int:
+def panel_height_px(frame: PlanFrame, width_px: int) -> int:
     """Return the height of a map of some width."""
     return round(width_px * frame.height / frame.width)
 

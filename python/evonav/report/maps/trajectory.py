@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
-from evonav.drawing.floor_plan import Frame, distance_m, furniture
+from evonav.drawing.floor_plan import PlanFrame, distance_m, furniture
 from evonav.drawing.plan import ObjectFootprint
 from evonav.drawing.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -24,7 +24,7 @@ CARRIED_GAP_M = 0.05
 """Largest distance between a moved object's footprint and an object that it carries."""
 
 
-def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+def course(record: StageRecord, frame: PlanFrame, success_radius_m: float) -> str:
     """Draw what one agent did in a stage: path, beliefs, start and end, and where the target was."""
     return (
         ring(record, frame, success_radius_m)
@@ -35,7 +35,7 @@ def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
     )
 
 
-def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame) -> str:
+def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: PlanFrame) -> str:
     """Draw relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
     The same for all agents. What was carried along on a moved piece of furniture is stressed, but has no arrow.
@@ -55,7 +55,7 @@ def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame) -> 
 
 
 def relocation_arrows(
-    relocations: Sequence[Relocation], frame: Frame, *, floor_plan: FloorPlan | None, previous_map: FloorPlan | None
+    relocations: Sequence[Relocation], frame: PlanFrame, *, floor_plan: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
     """Draw an arrow for each object that was not carried along by a larger one."""
     now, before = _by_id(floor_plan), _by_id(previous_map)
@@ -103,7 +103,7 @@ def _area_m2(item: ObjectFootprint | None) -> float:
     return 0.0 if item is None else item.size_m[0] * item.size_m[2]
 
 
-def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -> str:
+def _relocation_arrow(relocation: Relocation, frame: PlanFrame, *, is_large: bool) -> str:
     start, end = cm(_ground(relocation.from_m)), cm(_ground(relocation.to_m))
     u = frame.unit * (1.0 if is_large else 0.65)
     width = f'stroke-width="{0.55 * u:.1f}"'
@@ -127,7 +127,7 @@ def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -
     )
 
 
-def ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+def ring(record: StageRecord, frame: PlanFrame, success_radius_m: float) -> str:
     """Draw the circle around the target within which a stage is a success."""
     x, y = cm(_ground(record.target.position_m))
     radius_cm = round(100 * success_radius_m)
@@ -136,7 +136,7 @@ def ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
     return f'<circle class="ring" cx="{x}" cy="{y}" r="{radius_cm}" stroke-width="{width}">{hint}</circle>'
 
 
-def target_mark(target: TargetRecord, frame: Frame) -> str:
+def target_mark(target: TargetRecord, frame: PlanFrame) -> str:
     """Draw a star where the target is, and an empty one where it stood in stage 1."""
     u = frame.unit
     centre = cm(_ground(target.position_m))
@@ -149,7 +149,7 @@ def target_mark(target: TargetRecord, frame: Frame) -> str:
     return f'{first}<path class="star" stroke-width="{0.4 * u:.1f}" d="{star(centre, 2.9 * u)}">{hint}</path>'
 
 
-def _path(record: StageRecord, frame: Frame) -> str:
+def _path(record: StageRecord, frame: PlanFrame) -> str:
     if not record.trace:
         return ""
     u = frame.unit
@@ -188,7 +188,7 @@ def _legs(trace: Sequence[RoundRecord]) -> list[list[RoundRecord]]:
     return [list(same) for _, same in runs]
 
 
-def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame) -> tuple[str, float]:
+def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: PlanFrame) -> tuple[str, float]:
     """Return an arrow if the path reaches the place of the next one here, and the way since the last arrow."""
     every = ARROW_EVERY * frame.unit
     for a, b in itertools.pairwise(piece):
@@ -207,13 +207,13 @@ def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame
     return "", gone
 
 
-def start_mark(at: tuple[int, int], frame: Frame, text: str) -> str:
+def start_mark(at: tuple[int, int], frame: PlanFrame, text: str) -> str:
     """Draw a ring where a way begins."""
     size = f'r="{1.5 * frame.unit:.0f}" stroke-width="{0.7 * frame.unit:.1f}"'
     return f'<circle class="start" cx="{at[0]}" cy="{at[1]}" {size}>{title(text)}</circle>'
 
 
-def _ends(record: StageRecord, frame: Frame) -> str:
+def _ends(record: StageRecord, frame: PlanFrame) -> str:
     u = frame.unit
     marks = []
     if (start := record.effective_start) is not None:
@@ -244,7 +244,7 @@ def end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
     )
 
 
-def _stale_entries(record: StageRecord, frame: Frame) -> str:
+def _stale_entries(record: StageRecord, frame: PlanFrame) -> str:
     """Draw stale entries of the memory at the end; those of the goal's category and those gone to are stressed."""
     visited: dict[int, EntryRecord] = {}
     for decision in record.trace:
@@ -258,7 +258,7 @@ def _stale_entries(record: StageRecord, frame: Frame) -> str:
     return f'<g class="stale" stroke-width="{0.5 * frame.unit:.1f}">{join(marks)}</g>' if marks else ""
 
 
-def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visited: bool) -> str:
+def _stale_mark(entry: EntryRecord, frame: PlanFrame, *, is_stressed: bool, is_visited: bool) -> str:
     x, y = cm(_ground(entry.centre_m))
     u = frame.unit
     least = (3.2 if is_stressed else 1.5) * u

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from evonav.drawing.floor_plan import (
     FLAT_CATEGORIES,
-    Frame,
+    PlanFrame,
     floors,
     frame_of,
     furniture,
@@ -49,7 +49,7 @@ class TaskDrawing:
     task: Task
     prefix: str
     """Prefix of the ids of shared groups, different for every task of a page."""
-    frame: Frame
+    frame: PlanFrame
     maps: Mapping[int, FloorPlan]
     """Floor plans by stage."""
     doors: Mapping[str, tuple[Point, Point]]
@@ -82,7 +82,7 @@ def definitions(drawing: TaskDrawing) -> str:
     return join(f'<g class="map" id="{drawing.prefix}-{name}">{content}</g>' for name, content in shared.items())
 
 
-def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
+def before_svg(drawing: TaskDrawing, stage: int, frame: PlanFrame) -> str:
     """Draw the house of the stage before; what is about to move, go or open is stressed: content of an `svg`."""
     evolution = drawing.task.oracle(stage).evolution
     removed = {record.id for record in evolution.removals}
@@ -91,7 +91,7 @@ def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     return _plan(drawing, plan, evolution, frame, {"moved": leaving, "gone": removed})
 
 
-def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
+def after_svg(drawing: TaskDrawing, stage: int, frame: PlanFrame) -> str:
     """Draw the house of a stage with what was changed, and from where: content of an `svg` element."""
     oracle, previous = drawing.task.oracle(stage), _before(drawing, stage)
     evolution = oracle.evolution
@@ -121,7 +121,7 @@ def course_svg(drawing: TaskDrawing, stage: int) -> str:
     return plan + between + _course(oracle, frame) + target_mark(target_record(drawing.task, stage), frame)
 
 
-def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
+def change_frame(drawing: TaskDrawing, stage: int) -> PlanFrame:
     """Return the part of the house in which a stage's change happened."""
     evolution = drawing.task.oracle(stage).evolution
     changed = {change.id for change in evolution.changes}
@@ -132,7 +132,7 @@ def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
         points += [p for room in floor_plan.rooms if room.room_id == evolution.room_id for p in room.polygon_m]
         points += [p for item in floor_plan.objects if item.object_id in changed for p in item.polygon_m]
         points += [p for name, ends in drawing.doors.items() if name in changed for p in ends]
-    return Frame.around(points)
+    return PlanFrame.around(points)
 
 
 def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
@@ -166,7 +166,7 @@ def _plan(
     drawing: TaskDrawing,
     floor_plan: FloorPlan,
     evolution: Evolution,
-    frame: Frame,
+    frame: PlanFrame,
     stressed: Mapping[str, set[str]],
     ghosts: str = "",
 ) -> str:
@@ -205,18 +205,18 @@ def _plan(
     )
 
 
-def _opened_doors(drawing: TaskDrawing, states: set[str], frame: Frame) -> str:
+def _opened_doors(drawing: TaskDrawing, states: set[str], frame: PlanFrame) -> str:
     found = [ends for name, ends in sorted(drawing.doors.items()) if name in states]
     lines = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in found)
     return f'<g class="opened-doors" stroke-width="{1.2 * frame.unit:.1f}">{lines}</g>' if found else ""
 
 
-def _tint(room: RoomFootprint, frame: Frame) -> str:
+def _tint(room: RoomFootprint, frame: PlanFrame) -> str:
     hint = title(f"{noun_of(room.room_type)}: the room that changed")
     return f'<path class="tint" stroke-width="{2.2 * frame.unit:.0f}" d="{outline(room.polygon_m)}">{hint}</path>'
 
 
-def _groups(objects: Iterable[ObjectFootprint], frame: Frame) -> str:
+def _groups(objects: Iterable[ObjectFootprint], frame: PlanFrame) -> str:
     """Draw a soft shape around the members of every asset group, which ProcTHOR's ids number `room|group|member`."""
     members: dict[tuple[str, str], list[ObjectFootprint]] = {}
     for item in objects:
@@ -255,7 +255,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _course(oracle: OracleStage, frame: Frame) -> str:
+def _course(oracle: OracleStage, frame: PlanFrame) -> str:
     """Draw the reference trajectory, the start, and the reference pose with what it sees."""
     u = frame.unit
     path = polyline([cm(point) for point in oracle.reference_path_m])

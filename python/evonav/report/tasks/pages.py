@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from evonav.counted import counted
 from evonav.drawing.files import check_picture, write_picture
-from evonav.drawing.floor_plan import Frame
+from evonav.drawing.floor_plan import PlanFrame
 from evonav.drawing.style import map_css, map_file
 from evonav.drawing.svg import escape, join, slug
 from evonav.evaluation.records.floor_plans import FloorPlan
@@ -162,7 +162,7 @@ def _stage_values(drawing: TaskDrawing, stage: int) -> dict[str, object]:
     }
 
 
-def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
+def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, PlanFrame, str]]:
     """Return caption, frame and content of a stage's plans: where it changed, before and after, and the whole."""
     evolution = drawing.task.oracle(stage).evolution
     plans = []

@@ -11,7 +11,7 @@ from evonav.thor import objects
 from evonav.thor.actions import paths
 from evonav.thor.actions.motion import invalid_operation, out_of_range
 from evonav.thor.actions.registry import ActionError, Vector3, action
-from evonav.thor.agent import Agent
+from evonav.thor.agent import AgentBody
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import Vec3, ground_gap_m, vector
 from evonav.thor.surfaces import Hit, surfaces_of
@@ -74,7 +74,7 @@ def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: boo
     """Return the id of the object at a point of the image: 0 to 1 from its upper left corner."""
     object_id, _ = object_at(engine, x, y)
     if checkVisible and object_id not in _visible(engine):
-        raise invalid_operation(f"target hit ({object_id}) at ({x:g}, {y:g}) is not currently Visible to Agent")
+        raise invalid_operation(f"target hit ({object_id}) at ({x:g}, {y:g}) is not currently Visible to AgentBody")
     return object_id
 
 
@@ -283,7 +283,7 @@ def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) 
     return [at for at in positions if ground_gap_m((at.x, at.z), centre_m, size_m) <= reach_m + 1e-6]
 
 
-def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
+def _may_frame(engine: Engine, agent: AgentBody, record: objects.Record) -> bool:
     """Return whether the sphere around the object's box touches the cone around the image."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     radius_m = 0.5 * math.hypot(*box["size"].values()) + 1e-6

@@ -14,7 +14,7 @@ import numpy as np
 from evonav.thor import objects
 from evonav.thor.actions import motion
 from evonav.thor.actions.registry import ActionError, Vector3, action, missing_arguments
-from evonav.thor.agent import Agent
+from evonav.thor.agent import AgentBody
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import Point, ground_gap_m, vector
 from evonav.world.camera import project
@@ -191,7 +191,7 @@ def _look_action(engine: Engine, turns: range, step_deg: float, record: dict[str
     raise ActionError("Object doesn't seem visible from any rotation/horizon.")
 
 
-def _is_framed(engine: Engine, agent: Agent, record: dict[str, Any]) -> bool:
+def _is_framed(engine: Engine, agent: AgentBody, record: dict[str, Any]) -> bool:
     """Return whether a corner or the centre of an object's box is in the image, occluded or not."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     points_m = np.array([list(box["center"].values()), *box["cornerPoints"]], dtype=np.float64)
@@ -259,7 +259,7 @@ def _path_to_object(engine: Engine, record: dict[str, Any], start_m: Point, allo
     )
 
 
-def _looking_at(agent: Agent, point_m: Point, target: dict[str, float]) -> Agent:
+def _looking_at(agent: AgentBody, point_m: Point, target: dict[str, float]) -> AgentBody:
     """Return the agent at a point with its camera on a target."""
     right_m, ahead_m = target["x"] - point_m[0], target["z"] - point_m[1]
     down_m = agent.camera_height_m - target["y"]

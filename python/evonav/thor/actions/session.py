@@ -5,8 +5,8 @@ from dataclasses import replace
 from evonav.errors import EvonavError
 from evonav.thor import objects
 from evonav.thor.actions.registry import ActionError, action
-from evonav.thor.agent import Agent, body_of
-from evonav.thor.engine import Engine, Settings
+from evonav.thor.agent import AgentBody, body_of
+from evonav.thor.engine import Engine, EngineSettings
 from evonav.thor.events import scene_bounds
 from evonav.thor.geometry import vector
 from evonav.thor.images import FAR_M
@@ -29,7 +29,7 @@ def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
     """Replace the scene by an empty one."""
     if sceneName not in SCENES:
         raise ActionError(f"scene {sceneName!r} is not in this build, which holds {', '.join(SCENES)}")
-    engine.scene, engine.agent, engine.settings = Scene(sceneName), Agent(), Settings()
+    engine.scene, engine.agent, engine.settings = Scene(sceneName), AgentBody(), EngineSettings()
     engine.cameras, engine.object_filter = [], None
     engine.map_view, engine.map_view_size_m = None, -1.0
     engine.configure()
@@ -59,7 +59,7 @@ def create_house(engine: Engine, *, house: Document) -> None:
     engine.scene, engine.agent = scene, agent
 
 
-def check_settings(settings: Settings) -> None:
+def check_settings(settings: EngineSettings) -> None:
     """Check settings as AI2-THOR's `Initialize` does, with its messages."""
     if settings.agentCount != 1:
         raise ActionError(f"agentCount {settings.agentCount}: this engine has one agent")
@@ -87,7 +87,7 @@ def check_settings(settings: Settings) -> None:
 
 
 @action("Initialize")
-def initialize(engine: Engine, wanted: Settings) -> dict[str, float]:
+def initialize(engine: Engine, wanted: EngineSettings) -> dict[str, float]:
     """Set the settings; any keyword of the client's constructor is accepted."""
     check_settings(wanted)
     body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
