@@ -45,7 +45,7 @@ class NavigatorConfig:
 
 
 WITH_FALLBACK = NavigatorConfig(explorer=AS_THREE_D_MEM_PLUS)
-"""Of agents whose map takes the last observation of a cell, and that explore as long as anything is unknown."""
+"""The configuration of agents whose map takes a cell's last observation, and that explore all that is unknown."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ from evonav.tasks.public import Goal
 _WALL_THINGS = {"painting", "window", "doorway"}
 """Things on or in walls, which views show less often than what stands on the floor."""
 PICTURE_CONSTANT, PICTURE_NEAR, PICTURE_WHOLE = 3.56, -5.39, -12.95
-"""Of the logarithm of the ratio: the constant, and the weights of the distances near the object and in the whole view.
+"""The logarithm of the ratio: its constant, and the weights of the distances near the object and in the whole view.
 
 `scripts/data/calibrate_goal_pictures.py` fits them on the design houses.
 """

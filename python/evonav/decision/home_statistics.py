@@ -118,7 +118,7 @@ OF_TYPE: dict[str, tuple[float, tuple[float, float, float, float] | None]] = {
     "watch": (0.96, (1.55, 0.04, 1.62, 0.04)),
     "wine bottle": (0.38, (0.12, 4.17, 0.12, 0.12)),
 }
-"""By canonical noun: the mean number of objects of a type in 100 square metres of floor, and the type's rooms.
+"""The mean number of a type's objects in 100 square metres of floor, and its rooms, by canonical noun.
 
 These are its frequency in each type of room, relative to the mean of the floor, with four objects added by area. They
 are counted in the 88 houses of `procthor-generated/houses-train` by `scripts/data/fit_priors.py`, for types with five

@@ -1,4 +1,4 @@
-"""What the agent's own map says of a home: its rooms and walls, what it does not know, and what was searched."""
+"""Read a home's rooms and walls, the unknown floor and what was searched off the agent's own map."""
 
 import math
 from collections.abc import Sequence

@@ -311,7 +311,7 @@ def p_present(num_stages: int, weight: float, persistence: float) -> float:
     Args:
         num_stages: Number of stages since it was last seen.
         weight: The likelihood of this stage's looks if it is there, relative to that if it is not.
-        persistence: That it stays from one stage to the next.
+        persistence: The probability that it stays from one stage to the next.
     """
     prior = persistence**num_stages
     return prior * weight / (prior * weight + (1.0 - prior))

@@ -28,7 +28,7 @@ GROUP_CELL_M = 0.05
 Node = ObjectCandidate
 """An object in the scene graph; its caption is the label."""
 Relations = Mapping[tuple[int, int], str]
-"""How a node stands to another one, by the ids of both."""
+"""The relation of a node to another one, by the ids of both."""
 
 
 def name_of(node: Node) -> str:

@@ -29,7 +29,7 @@ def run_agents(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click'
 
 
 def _further(known: Iterable[str], incomplete: str) -> list[str]:
-    """What may follow the names that are typed, which commas separate."""
+    """Complete the last of the names that are typed, which commas separate."""
     before, comma, last = incomplete.rpartition(",")
     return [f"{before}{comma}{name}" for name in known if name.startswith(last) and name not in before.split(",")]
 

@@ -215,14 +215,14 @@ def _changing_tasks(backend: Backend) -> tuple[EpisodeSpec, EpisodeSpec]:
 
 def _difference(first: Iterable[StageRecord], second: Iterable[StageRecord]) -> str | None:
     """Describe the first action by which two episodes differ."""
-    befores, afters = (
+    former, latter = (
         [(record.stage, entry.action) for record in records for entry in record.trace] for records in (first, second)
     )
-    for (stage, before), (_, after) in zip(befores, afters, strict=False):
+    for (stage, before), (_, after) in zip(former, latter, strict=False):
         if before != after:
             return f"in stage {stage} it answers {_shown(after)} where it answered {_shown(before)}"
-    if len(befores) != len(afters):
-        return f"it acts {len(afters)} times where it acted {len(befores)} times"
+    if len(former) != len(latter):
+        return f"it acts {len(latter)} times where it acted {len(former)} times"
     return None
 
 

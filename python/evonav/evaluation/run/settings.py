@@ -351,7 +351,7 @@ class CommandSettings(RunSettings, SpendingSettings):
             seed: Seed of every random choice.
             out: Folder of the run, which stores answers and costs.
             protocol: Default: the paper's.
-            asks_model: Without it, the model cannot be asked, which is enough for estimates.
+            asks_model: True if the model can be asked; estimates do without.
 
         Raises:
             InvalidArgumentError: A setting is invalid.

@@ -42,7 +42,7 @@ def statistics_tables(found: TaskStatistics, *, is_brief: bool = False) -> list[
     """Return the metrics of each group beside the paper's, the tests, and the quantities.
 
     Args:
-        is_brief: For 80 columns: fewer quantiles, and none of the share of objects that were relocated.
+        is_brief: True for 80 columns: fewer quantiles, no share of relocated objects.
     """
     is_weighted = found.weighting is not None
     columns = ("", "paper", "here", "95%", "n", *(("rewtd", "95%") if is_weighted else ()))
