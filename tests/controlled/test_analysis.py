@@ -177,7 +177,7 @@ def test_the_crossover_is_where_the_line_falls_through_zero(leads, expected):
 
 def test_crossovers_in_words():
     assert Crossover(0.5, (0.25, math.inf)).text() == "0.50 [0.25, >1]"
-    assert Crossover(2.0, (1.5, math.inf)).text() == "none found: memory is ahead at every rate [>1, >1]"
+    assert Crossover(2.0, (1.5, math.inf)).text() == "none found: not overtaken at any rate [>1, >1]"
     assert Crossover(-1.0, (-math.inf, -0.2)).text().startswith("none found: stage-reset is ahead")
     assert Crossover(-math.inf, (-math.inf, 0.2)).text() == "none found [<0, 0.20]"
     assert Crossover(0.1, (-1.0, math.inf)).text() == "0.10, undetermined [<0, >1]"

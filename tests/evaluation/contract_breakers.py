@@ -88,6 +88,13 @@ class Wordless(Turning):
         return None
 
 
+class Evasive(Turning):
+    """It explains itself by a dictionary, already when a stage begins."""
+
+    def explain(self):
+        return {}
+
+
 class Opaque(Turning):
     def explain(self):
         return Explanation(details={"self": self}, objects=self.entries)

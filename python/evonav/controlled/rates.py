@@ -17,7 +17,7 @@ class Crossover:
     """Rate at which the straight line through an agent's lead over the baseline falls to zero."""
 
     rate: float
-    """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: at none."""
+    """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: the lead does not fall to zero."""
     ci95: Interval
     """Bootstrap by house; the rate twice where houses agree, or there is but one."""
 
@@ -26,7 +26,7 @@ class Crossover:
         low, high = self.ci95
         interval = f"[{_rate_words(low)}, {_rate_words(high)}]"
         if low > 1.0:
-            return f"none found: memory is ahead at every rate {interval}"
+            return f"none found: not overtaken at any rate {interval}"
         if high < 0.0:
             return f"none found: {BASELINE} is ahead at every rate {interval}"
         found = f"{self.rate:.2f}" if 0.0 <= self.rate <= 1.0 else "none found"

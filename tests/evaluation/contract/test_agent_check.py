@@ -47,6 +47,7 @@ def test_a_good_agent_passes_every_check():
         ("Halting", "begin_stage", "fail", "KeyError"),
         ("Wordless", "actions", "fail", "None is no action"),
         ("Opaque", "diagnostics", "fail", "not JSON-ready"),
+        ("Evasive", "diagnostics", "fail", "must be an evonav.Explanation"),
         ("Plain", "diagnostics", "warn", "no `explain()`: pages cannot show what the agent knows"),
         ("Needy", "made", "fail", "it needs the arguments `weights`: give them defaults"),
         ("Quitting", "own process", "fail", "exit code 1"),

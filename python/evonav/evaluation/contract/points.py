@@ -69,6 +69,8 @@ def points_of(probe: Probe, records: Sequence[StageRecord]) -> Iterator[Check]:
             yield Check(name, "pass", f"called {count}: {what}")
         else:
             yield Check(name, "skip", "not reached")
+    if "explain" in probe.errors and not probe.calls["act"]:
+        yield _diagnostics(probe)
     if probe.calls["act"]:
         yield _actions(probe, records)
         yield _budget(probe, records)
