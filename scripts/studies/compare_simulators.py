@@ -10,6 +10,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -80,9 +81,9 @@ def differing_images(run: Path, tasks: Sequence[TaskFile], every: int = 1) -> It
                 if not np.array_equal(embedded.occupancy().cells, thor.occupancy().cells):
                     yield f"{task.task_id}/{number}: occupancy differs"
                 poses = {entry.pose for record in records if record.stage == number for entry in record.trace}
-                for pose in sorted(poses, key=lambda pose: tuple(pose.model_dump().values()))[::every]:
+                for pose in sorted(poses, key=astuple)[::every]:
                     num_images += 1
-                    for name in _differing(embedded, thor, Pose(**pose.model_dump())):
+                    for name in _differing(embedded, thor, pose):
                         yield f"{task.task_id}/{number}: {name} differs at {pose}"
     if num_images == 0:
         yield "there was no pose to compare images at"

@@ -226,7 +226,7 @@ def test_the_page_nests_and_the_plots_are_xml(found: TaskStatistics, tmp_path: P
     HtmlPage(text)
     for measure in found.metrics:
         if measure.raw is not None:
-            assert f"<td>{measure.label.strip().replace(chr(39), '&#39;')}</td>" in text
+            assert f"<td>{measure.label.replace(chr(39), '&#39;')}</td>" in text
     svg = ET.fromstring((tmp_path / "statistics.svg").read_text(encoding="utf-8"))
     marks = [node for node in svg.iter("{http://www.w3.org/2000/svg}title") if ", the paper: " in (node.text or "")]
     assert len(marks) == 5 + 2

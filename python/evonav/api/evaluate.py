@@ -87,7 +87,7 @@ def evaluate(
         perception=read_settings(PerceptionSettings, "make", perception, "perception"),
         simulator=read_settings(SimulatorSettings, "kind", simulator, "simulator"),
     )
-    settings = settings.with_episodes([settings.decision], [settings.simulator])
+    settings = settings.with_episodes([settings.decision.kind], [settings.simulator.kind])
     folder = Path(tempfile.mkdtemp(prefix="evonav-")) if out is None else Path(out)
     found = task_list(tasks, limit, folder)
     config = settings.run_config(seed, folder, protocol)

@@ -99,7 +99,9 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     with _naming(path):
         sweep = settings_of(SweepFile, raw)
     _check(sweep, path)
-    return sweep.with_episodes(sweep.decisions.values(), sweep.simulators.values())
+    return sweep.with_episodes(
+        [one.kind for one in sweep.decisions.values()], [one.kind for one in sweep.simulators.values()]
+    )
 
 
 def sweep_schema() -> dict[str, Any]:

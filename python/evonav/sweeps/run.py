@@ -128,7 +128,7 @@ def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None)
         perception=sweep.perceptions[cell.perception].component(),
         decision=decision.component(cell.seed, resources),
     )
-    return sweep.config(cell.seed, backend, decision, sweep.protocol)
+    return sweep.config(cell.seed, backend, sweep.protocol, **decision.time_limits)
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:

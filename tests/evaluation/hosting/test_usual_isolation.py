@@ -45,7 +45,7 @@ def has_sandbox(monkeypatch):
 
 
 def config_of(backend=TOY, **settings):
-    return RunSettings(**settings).config(0, backend, DecisionSettings())
+    return RunSettings(**settings).config(0, backend, **DecisionSettings().time_limits)
 
 
 @pytest.mark.parametrize(

@@ -197,7 +197,8 @@ def test_the_default_number_is_for_models_that_are_waited_for():
     here, client = SimulatorSettings(), SimulatorSettings(kind="ai2thor")
 
     def number(settings, decisions, simulators):
-        return settings.with_episodes(decisions, simulators).workforce().jobs_at_once
+        kinds = [[one.kind for one in these] for these in (decisions, simulators)]
+        return settings.with_episodes(*kinds).workforce().jobs_at_once
 
     assert number(RunSettings(workers=2), [rules], [here]) == 1
     assert number(RunSettings(workers=2), [rules, model], [here]) == 16

@@ -140,7 +140,7 @@ def evaluate(
     given |= {"workers": workers, "isolation": isolation, "decision.kind": decision, "decision.model": model}
     given |= {"decision.base_url": base_url, "prices": prices, "max_cost": max_cost}
     run = settings_from(given, set_)
-    run = run.with_episodes([run.decision], [run.simulator])
+    run = run.with_episodes([run.decision.kind], [run.simulator.kind])
     workforce = run.workforce()
     refuse_costs_of_rules(run)
     config = run.run_config(seed, directory)

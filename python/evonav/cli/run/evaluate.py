@@ -125,7 +125,7 @@ def evaluate(
 
         check_terminal()
         run = run.model_copy(update={"workers": 0, "isolation": "none"})
-    run = run.with_episodes([run.decision], [run.simulator])
+    run = run.with_episodes([run.decision.kind], [run.simulator.kind])
     workforce = run.workforce()
     refuse_costs_of_rules(run, dry_run=dry_run)
     config = run.run_config(seed, out, asks_model=not dry_run)

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
-    from evonav.evaluation.run.settings import DecisionSettings, SimulatorSettings
 
 NUM_RETRIES = 2
 """Number of retries of a stage that lost its worker, its simulator or its agent's process."""
@@ -174,19 +173,17 @@ class RunSettings(Settings):
         """Number of episodes that are run at once, 1 or more; 1 a worker before `with_episodes`."""
         return max(1, self.num_workers) * (self.episodes_at_once or 1)
 
-    def with_episodes(
-        self: RunSettingsT, decisions: "Iterable[DecisionSettings]", simulators: "Iterable[SimulatorSettings]"
-    ) -> RunSettingsT:
+    def with_episodes(self: RunSettingsT, decisions: Iterable[str], simulators: Iterable[str]) -> RunSettingsT:
         """Return these settings with a number of episodes at once: the given one, or the default.
 
         Args:
-            decisions: The decision models that these workers use.
-            simulators: Their simulators; AI2-THOR's has a process for each episode, so only one runs by default.
+            decisions: Kinds of the decision models that these workers use.
+            simulators: Kinds of their simulators; AI2-THOR's has a process for each episode: one runs by default.
         """
         if self.episodes_at_once is not None:
             return self
-        waits = any(decision.kind == "vlm" for decision in decisions)
-        is_light = all(simulator.kind == "embedded" for simulator in simulators)
+        waits = "vlm" in decisions
+        is_light = set(simulators) == {"embedded"}
         has_processes = IS_SUPPORTED and self.num_workers > 0 and self.isolation != "none"
         number = VLM_EPISODES_AT_ONCE if waits and is_light and has_processes else 1
         return self.model_copy(update={"episodes_at_once": number})
@@ -211,25 +208,32 @@ class RunSettings(Settings):
         )
 
     def config(
-        self, seed: int, backend: "Backend", decisions: "DecisionSettings", protocol: ProtocolConfig | None = None
+        self,
+        seed: int,
+        backend: "Backend",
+        protocol: ProtocolConfig | None = None,
+        *,
+        stage_timeout_s: float,
+        answer_timeout_s: float,
     ) -> "RunConfig":
         """Return the configuration of a run with these limits.
 
         Args:
             seed: Seed of every random choice.
             backend: The parts of the run.
-            decisions: Settings of the decision model, which have the default limits.
             protocol: Default: the paper's.
+            stage_timeout_s: Limit of a stage if the settings have none.
+            answer_timeout_s: Limit of an agent's answer if the settings have none.
         """
         from evonav.evaluation.run.run import RunConfig
 
         isolation = self.isolation or self._usual_isolation(backend)
-        timeout_s = self.agent_timeout_s or decisions.answer_timeout_s
+        timeout_s = self.agent_timeout_s or answer_timeout_s
         return RunConfig(
             seed=seed,
             protocol=protocol or ProtocolConfig(),
             backend=backend,
-            stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
+            stage_timeout_s=self.stage_timeout_s or stage_timeout_s,
             hosting=AgentHosting(isolation, timeout_s, self.agent_memory_mb),
         )
 

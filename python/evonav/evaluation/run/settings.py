@@ -181,14 +181,11 @@ class DecisionSettings(Settings):
         return self.kind in RULES
 
     @property
-    def stage_timeout_s(self) -> float:
-        """Time limit of a stage; longer where a model is asked."""
-        return STAGE_TIMEOUT_S if self.asks_rules else VLM_STAGE_TIMEOUT_S
-
-    @property
-    def answer_timeout_s(self) -> float:
-        """Time limit of an agent's answer in a round; longer where a model is asked."""
-        return ANSWER_TIMEOUT_S if self.asks_rules else VLM_ANSWER_TIMEOUT_S
+    def time_limits(self) -> dict[str, float]:
+        """Limits of a stage and of an agent's answer in a round, by name; longer where a model is asked."""
+        if self.asks_rules:
+            return {"stage_timeout_s": STAGE_TIMEOUT_S, "answer_timeout_s": ANSWER_TIMEOUT_S}
+        return {"stage_timeout_s": VLM_STAGE_TIMEOUT_S, "answer_timeout_s": VLM_ANSWER_TIMEOUT_S}
 
     def named_model(self) -> str:
         """Return the name of the model on the server; `SettingError` if none is named."""
@@ -366,7 +363,7 @@ class CommandSettings(RunSettings, SpendingSettings):
         )
         if asks_model and not self.decision.asks_rules:
             backend.decision.create(seed).check()
-        return self.config(seed, backend, self.decision, protocol)
+        return self.config(seed, backend, protocol, **self.decision.time_limits)
 
 
 def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
