@@ -9,8 +9,8 @@ from command_line import command
 from made_up_run import WriteRun, entry, record_run, stage_record
 
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
-from evonav.report import write_report
 from evonav.report.pages import run_page as html
+from evonav.report.pages.run_page import write_report
 
 PROBE = (Path(__file__).parent / "report_probe.js").read_text("utf-8")
 FOREIGN = {"iframe", "object", "embed", "base", "link", "form", "video", "audio", "math", "animate", "foreignobject"}

@@ -17,8 +17,8 @@ from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, St
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.report import write_report
 from evonav.report.pages import run_page as html
+from evonav.report.pages.run_page import write_report
 from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables

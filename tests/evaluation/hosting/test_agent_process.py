@@ -30,7 +30,7 @@ from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.report import write_report
+from evonav.report.pages.run_page import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.listing import BUNDLED_TASKS, task_files
 from evonav.tasks.public import Goal, TaskInfo

@@ -19,7 +19,7 @@ from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import RunConfig
-from evonav.report import write_report
+from evonav.report.pages.run_page import write_report
 from evonav.tasks.listing import task_files
 
 SANDBOX = AgentHosting("sandbox", timeout_s=20.0)

@@ -15,7 +15,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.evaluate import evaluate
 from evonav.evaluation.run.run import NAMES_KEY, RunConfig
-from evonav.report import write_report
+from evonav.report.pages.run_page import write_report
 from evonav.submission.pack import pack
 from evonav.tasks.listing import BUNDLED_TASKS
 

@@ -52,7 +52,8 @@ def report(
         _print_metrics(run, listed(agent) or None, out)
         return
     from evonav.evaluation.run.summary import save_summary
-    from evonav.report import load_run, write_report
+    from evonav.report.pages.run_page import write_report
+    from evonav.report.run import load_run
 
     is_sweep = (run / SWEEP_NAME).is_file()
     num_replays = _count(replays or ("none" if is_sweep else str(NUM_REPLAYS)))
@@ -74,7 +75,7 @@ def report(
 def _report_sweep(sweep: Path, out: Path | None, write: "Callable[[RecordedRun, Path | None], Path]") -> Path:
     """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
-    from evonav.report import load_run
+    from evonav.report.run import load_run
     from evonav.sweeps import RUNS_NAME
     from evonav.sweeps.report import write_sweep_page
     from evonav.sweeps.summary import sweep_title

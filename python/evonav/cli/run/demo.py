@@ -23,10 +23,10 @@ def demo(
 
     It takes a minute or two. The report is a page with tables, maps and replays of one task.
     """
+    context.with_resource(early_worker())  # before imports, which take as long as its start
     from evonav.evaluation.run.evaluate import evaluate
-    from evonav.report import write_report
+    from evonav.report.pages.run_page import write_report
 
-    context.with_resource(early_worker())
     run = settings_from({"workers": workers})
     config = run.run_config(seed, out)
     task_files = chosen_tasks(None, limit, None)

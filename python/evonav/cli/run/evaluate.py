@@ -103,10 +103,10 @@ def evaluate(
 
     Three agents run on the bundled tasks by default. Look at the results with `evonav report OUT`.
     """
+    context.with_resource(early_worker())  # before imports, which take as long as its start
     from evonav.evaluation.run.evaluate import evaluate_all
     from evonav.evaluation.run.run import Evaluation
 
-    context.with_resource(early_worker())
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     if houses is None and (assets is not None or start != "file"):
