@@ -90,9 +90,16 @@ def test_equal_failures_are_listed_once(tmp_path):
     assert run("failures", tmp_path, "--brief").stdout.count("\n") == 1
 
 
-def test_importing_is_quick():
-    """The package and the command load nothing heavy: no pydantic, no rich, no evaluation."""
-    code = "import evonav, evonav.cli, sys; print([m for m in sys.modules if m.startswith(('pydantic', 'evonav.ev'))])"
+@pytest.mark.parametrize(
+    ("modules", "heavy"),
+    [
+        ("evonav, evonav.cli", ("pydantic", "rich", "evonav.ev")),
+        ("evonav.evaluation.run, evonav.parallel.local", ("pydantic", "numpy")),  # a worker starts with these
+        ("evonav.evaluation.run.evaluate", ("jinja2", "matplotlib", "evonav.report.pages")),
+    ],
+)
+def test_importing_is_quick(modules, heavy):
+    code = f"import {modules}, sys; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
 
