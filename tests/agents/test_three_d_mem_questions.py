@@ -61,6 +61,7 @@ def prefilter(names=CLASSES, stage=MUG_GOAL):
     [
         ("Snapshot 1, Object 0", SnapshotChoice(1, 0)),
         ("\n  snapshot 1 , object 1.\nIt stands by the sink.", SnapshotChoice(1, 1)),
+        ("Snapshot 01, Object 001", SnapshotChoice(1, 1)),
         ("FRONTIER 1\nSnapshot 0, Object 0", SnapshotChoice(None, 1)),
     ],
 )

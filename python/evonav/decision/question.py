@@ -112,7 +112,7 @@ class ClosedQuestion(Question[A]):
         """Return all valid answers, in a fixed order."""
 
     def parse(self, text: str) -> A:
-        """Read a first line that spells one of the choices, in any case, with spaces or a final dot or colon."""
+        """Read a first line that spells a choice; case, spaces, leading zeros and a final dot do not count."""
         line = first_line(text)
         for choice in self.choices():
             if _spelling(self.answer_text(choice)) == _spelling(line):
@@ -235,7 +235,8 @@ class Metered(ModelWrapper):
 
 
 def _spelling(line: str) -> str:
-    return " ".join(line.lower().rstrip(".: ").replace(",", " , ").split())
+    line = re.sub(r"\b0+(?=\d)", "", line.lower().rstrip(".: "))
+    return " ".join(line.replace(",", " , ").split())
 
 
 def first_line(text: str) -> str:
