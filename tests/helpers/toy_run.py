@@ -26,7 +26,7 @@ CHEAP = RunConfig(
     protocol=ProtocolConfig(max_rounds=3),
     hosting=AgentHosting(usual_isolation()),
 )
-"""Of tasks by the dozen, seen in few pixels."""
+"""A configuration for dozens of tasks, whose images have few pixels."""
 HERE_ALONE = {"config": replace(CHEAP, hosting=AgentHosting()), "num_workers": 0}
 """How these are evaluated in this process."""
 NEEDS_SANDBOX = pytest.mark.skipif(sandbox_problem() is not None, reason=f"no sandbox here: {sandbox_problem()}")

@@ -8,7 +8,7 @@ hold give a posterior probability. The agent goes to the likeliest object if tha
 yet": exploring does not tell apart two objects that were both seen. What cannot be seen counts 1: materials, details,
 corners.
 
-Of the goal's picture two distances of colours count: near the object, and in the whole view. The picture shows the goal
+Two distances of colours to the goal's picture count: near the object, and in the whole view. The picture shows the goal
 in its middle. Walls and floors tell rooms apart, so that the surroundings say more than the object itself.
 """
 

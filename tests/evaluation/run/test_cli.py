@@ -95,13 +95,24 @@ def test_equal_failures_are_listed_once(tmp_path):
     [
         ("evonav, evonav.cli", ("pydantic", "rich", "evonav.ev")),
         ("evonav.evaluation.run, evonav.parallel.local", ("pydantic", "numpy")),  # a worker starts with these
-        ("evonav.evaluation.run.evaluate", ("jinja2", "matplotlib", "evonav.report.pages")),
+        ("evonav.evaluation.run.evaluate, evonav.report.tables.table", ("jinja2", "matplotlib", "evonav.report.pages")),
     ],
 )
 def test_importing_is_quick(modules, heavy):
     code = f"import {modules}, sys; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", ["evaluate", "demo"])
+def test_a_worker_starts_before_the_imports_of_an_evaluation(command):
+    code = f"""if True:
+        import os, sys
+        from evonav.cli import app
+        from evonav.cli.run import {command} as module
+        module.early_worker = lambda: os._exit(10 + ("evonav.evaluation.run.evaluate" in sys.modules))
+        app(["{command}", "--out", "unused"])"""
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 10
 
 
 @pytest.mark.slow
